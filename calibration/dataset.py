@@ -1,0 +1,104 @@
+"""A dataset folder: dataset.json, nominal.urdf and the trials, opened one by one and never all at once."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pinocchio as pin
+from pydantic import ValidationError
+
+from calibration.errors import InputError, NoSuchElement
+from calibration.recording import Trial, read_trial, sha256
+from calibration.schema import Description, Role, TrialEntry
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A dataset folder that has been read and found consistent; trials are read on demand.
+
+    Attributes:
+        folder: Where it is.
+        description: The whole of dataset.json.
+        urdf: Text of nominal.urdf.
+    """
+
+    folder: Path
+    description: Description
+    urdf: str
+
+    def entries(self, role: Role, *kinds: str) -> tuple[TrialEntry, ...]:
+        """Trials of a role, of the given kinds (all kinds where none is named), in file order."""
+        return tuple(t for t in self.description.trials if t.role == role and (not kinds or t.kind in kinds))
+
+    def read(self, entry: TrialEntry) -> Trial:
+        """Read one trial and check it against dataset.json.
+
+        Raises:
+            InputError: The file is damaged, changed since it was listed, or names other joints.
+        """
+        path = self.folder / entry.file
+        if path.is_file() and sha256(path) != entry.sha256:
+            raise InputError(path, "its sha256 is not the one in dataset.json: truncated or changed; copy it again")
+        trial = read_trial(path, entry.id)
+        if trial.joint != self.description.joint_names:
+            raise InputError(path, f"joints {trial.joint}, dataset.json has {self.description.joint_names}")
+        return trial
+
+    def trials(self, role: Role, *kinds: str) -> Iterator[tuple[TrialEntry, Trial]]:
+        """Read the trials of a role one after the other."""
+        for entry in self.entries(role, *kinds):
+            yield entry, self.read(entry)
+
+
+def load(folder: Path | str) -> Dataset:
+    """Open a dataset folder.
+
+    Raises:
+        InputError: Something is missing or malformed; all findings of dataset.json at once.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(folder, "no such folder; a dataset is a folder with dataset.json, nominal.urdf and trials/")
+    description = _read_description(folder / "dataset.json")
+    missing = [t.file for t in description.trials if not (folder / t.file).is_file()]
+    if missing:
+        raise InputError(folder, f"files listed in dataset.json are missing: {missing}")
+    return Dataset(folder, description, _read_urdf(folder / "nominal.urdf", description))
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise InputError(path, "no such file; a dataset needs it") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, f"cannot be read ({error})") from error
+
+
+def _read_description(path: Path) -> Description:
+    text = _read_text(path)
+    try:
+        return Description.model_validate(json.loads(text))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}:{error.lineno}:{error.colno}", f"broken JSON: {error.msg}") from error
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc'])) or 'dataset'}: {e['msg']}" for e in error.errors()]
+        raise InputError(path, "; ".join(lines)) from error
+
+
+def _read_urdf(path: Path, description: Description) -> str:
+    text = _read_text(path)
+    try:
+        model = pin.buildModelFromXML(text)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(path, f"not a URDF Pinocchio can build ({error})") from error
+    joints, frames = list(model.names), [f.name for f in model.frames]
+    for kind, names, known in (
+        ("joint", description.joint_names, joints),
+        ("frame", (description.base_frame, description.tool_frame, *(b.link for b in description.bodies)), frames),
+    ):
+        for name in names:
+            if name not in known:
+                raise InputError(path, str(NoSuchElement(kind, name, known)))
+    return text

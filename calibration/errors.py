@@ -1,0 +1,39 @@
+"""What can go wrong in a calibration, each error with what was found and what to do."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+
+class CalibrationError(Exception):
+    """Root of every error of this package: the result must not be used."""
+
+
+class InputError(CalibrationError):
+    """A file that cannot be used as it is.
+
+    Attributes:
+        path: The file or folder concerned.
+    """
+
+    def __init__(self, path: Path | str, message: str) -> None:
+        self.path = Path(path)
+        super().__init__(f"{path}: {message}")
+
+
+class ShapeError(CalibrationError):
+    """An array whose shape is not the one its definition says."""
+
+    def __init__(self, name: str, found: tuple[int, ...], expected: Sequence[int | str]) -> None:
+        super().__init__(f"{name} has shape {found}, expected ({', '.join(str(e) for e in expected)})")
+
+
+class NoSuchElement(CalibrationError):
+    """A name that is not among the known ones."""
+
+    def __init__(self, kind: str, name: str, known: Sequence[str]) -> None:
+        self.name = name
+        super().__init__(f"no {kind} named {name!r}; there are {sorted(known)}")
+
+
+class NotEnoughData(CalibrationError):
+    """Recordings that cannot answer the question asked, with what would."""

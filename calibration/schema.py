@@ -1,0 +1,167 @@
+"""dataset.json: what a laboratory declares about its robot, its instruments and its trials.
+
+SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and tolerances only.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Vector3 = tuple[float, float, float]
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Role = Literal["calibration", "validation", "confirmation"]
+Kind = Literal["static", "sweep", "swing", "spin", "drive"]
+
+
+class Declaration(BaseModel):
+    """Strict and frozen: an unknown field or a NaN is an error, not a default."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Joint(Declaration):
+    """A measured joint: which encoders it has and how often they are logged [Hz]."""
+
+    name: str
+    encoders: tuple[Literal["motor", "link"], ...]
+    rate: Positive
+
+
+class Marker(Declaration):
+    """A marker and its nominal position in its body's frame [m]."""
+
+    name: str
+    xyz: Vector3
+
+
+class Body(Declaration):
+    """A rigid marker cluster; its frame nominally coincides with the frame of `link`."""
+
+    name: str
+    link: str
+    markers: tuple[Marker, ...]
+
+
+class Wheel(Declaration):
+    """A wheel: hub centre and nominal floor contact point, in the base frame [m]."""
+
+    name: str
+    type: Literal["drive", "caster"]
+    centre: Vector3
+    contact: Vector3
+
+
+class Plate(Declaration):
+    """A force plate: surface centre [m, lab], its axes as columns in the lab, edge lengths [m]."""
+
+    name: str
+    centre: Vector3
+    axes: tuple[Vector3, Vector3, Vector3]
+    size: tuple[Positive, Positive]
+
+
+class Payload(Declaration):
+    """A declared load: mass [kg] and centre of mass [m] in the frame of `link`, with its tolerance on the mass [kg]."""
+
+    link: str
+    mass: NonNegative
+    com: Vector3
+    tolerance: NonNegative
+
+
+class Sigmas(Declaration):
+    """Datasheet noise, standard deviations per sample.
+
+    Attributes:
+        marker: Per axis of a moving marker [m].
+        encoder: Per encoder reading [rad].
+        plate_force: Per axis [N].
+        plate_moment: Per axis [N.m].
+    """
+
+    marker: Positive
+    encoder: Positive
+    plate_force: Positive
+    plate_moment: Positive
+
+
+class Tolerances(Declaration):
+    """Datasheet tolerances, as standard deviations; the same for every arm joint.
+
+    Attributes:
+        joint_translation: Joint placement, per axis [m].
+        joint_rotation: Joint placement, per axis [rad].
+        encoder_offset: Zero of the motor encoder [rad, or m for a prismatic joint scaled by 0.1 m/rad].
+        joint_play: Motor-side reading minus joint angle, offset apart [rad].
+        body_translation: Marker cluster on its link, per axis [m].
+        body_rotation: Marker cluster on its link, per axis [rad].
+        link_mass: Relative to the link's mass [-].
+        link_com: Centre of mass, per axis [m].
+    """
+
+    joint_translation: Positive
+    joint_rotation: Positive
+    encoder_offset: Positive
+    joint_play: Positive
+    body_translation: Positive
+    body_rotation: Positive
+    link_mass: Positive
+    link_com: Positive
+
+
+class TrialEntry(Declaration):
+    """One continuous recording; `file` is relative to the dataset folder."""
+
+    id: str
+    role: Role
+    kind: Kind
+    motion: str
+    file: str
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class Description(Declaration):
+    """The whole of dataset.json."""
+
+    schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
+    robot: str
+    base_frame: str
+    tool_frame: str
+    joints: tuple[Joint, ...]
+    bodies: tuple[Body, ...]
+    wheels: tuple[Wheel, ...] = ()
+    plates: tuple[Plate, ...] = ()
+    payload: Payload | None = None
+    gravity: Vector3 = (0.0, 0.0, -9.81)
+    sigmas: Sigmas
+    tolerances: Tolerances
+    trials: tuple[TrialEntry, ...]
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True, serialize_by_alias=True
+    )
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> "Description":
+        groups = {
+            "joints": [j.name for j in self.joints],
+            "bodies": [b.name for b in self.bodies],
+            "markers": [m.name for b in self.bodies for m in b.markers],
+            "plates": [p.name for p in self.plates],
+            "trials": [t.id for t in self.trials],
+        }
+        for group, names in groups.items():
+            twice = sorted({n for n in names if names.count(n) > 1})
+            if twice:
+                raise ValueError(f"{group} named more than once: {twice}")
+        return self
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the measured joints, base to tip."""
+        return tuple(j.name for j in self.joints)
+
+    def body(self, name: str) -> Body | None:
+        """The marker body of that name, or None where the laboratory has none."""
+        return next((b for b in self.bodies if b.name == name), None)
