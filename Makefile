@@ -1,0 +1,53 @@
+# Every target does all it needs on a machine with Python 3.11-3.14 and make: the exact pinned
+# versions go into .venv once, and again when requirements.txt or pyproject.toml changes.
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/ready
+
+.PHONY: help demo test check slow bench bench-peer clean
+
+help:
+	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
+	@echo "make test        the fast tests"
+	@echo "make check       format, lint, types"
+	@echo "make slow        the tests that take minutes"
+	@echo "make bench       the benchmarks"
+	@echo "make bench-peer  the benchmarks against other programs"
+	@echo "make clean       remove .venv, caches and built files; runs/ stays"
+
+demo: $(READY)
+	$(BIN)/tiago-twin run humanoids2024 --out runs/demo
+
+test: $(READY)
+	$(BIN)/python -m pytest -q
+
+check: $(READY)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+slow: $(READY)
+	$(BIN)/python -m pytest -q -m slow -n 2
+
+bench: $(READY)
+	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench
+
+bench-peer: $(READY)
+	$(BIN)/python -m pytest -q -s -m "" -o python_files='peer_*.py' tests/bench
+
+$(READY): requirements.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \
+	  echo "Python 3.11 to 3.14 is needed; $(PYTHON) is $$($(PYTHON) --version 2>&1 | head -1)."; \
+	  echo "Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
+	@echo "Installing the pinned packages into .venv (once, about 1 GB)"
+	@$(PYTHON) -m venv .venv || { \
+	  echo "$(PYTHON) cannot create a virtual environment; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -r requirements.txt
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@found=$$($(BIN)/python -m pip check --disable-pip-version-check) || { echo "$$found"; exit 1; }
+	@touch $@
+
+clean:
+	rm -rf .venv dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
