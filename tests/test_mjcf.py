@@ -1,0 +1,433 @@
+"""The nominal robot: the files open, say what the datasheet says, and mean the same to MuJoCo and to Pinocchio."""
+
+import math
+import xml.etree.ElementTree as ET
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import mjcf
+
+HALF_PI = math.pi / 2
+
+# Joint placements as published: parent link, child link, xyz [m], rpy [rad].
+PUBLISHED_PLACEMENTS = """
+base_footprint base_link 0 0 0.0985 0 0 0
+base_footprint base_cover_link 0 0 0.13 0 0 0
+base_link base_laser_link 0.202 0 -0.004 0 0 0
+base_link base_imu_link 0.10171 0 0.11282 0 0 -H
+base_link wheel_right_link 0 -0.2022 0 -H 0 0
+base_link wheel_left_link 0 0.2022 0 -H 0 0
+base_link caster_front_right_1_link 0.1695 -0.102 -0.0335 0 0 0
+base_link caster_front_left_1_link 0.1695 0.102 -0.0335 0 0 0
+base_link caster_back_right_1_link -0.1735 -0.102 -0.0335 0 0 0
+base_link caster_back_left_1_link -0.1735 0.102 -0.0335 0 0 0
+caster_front_right_1_link caster_front_right_2_link -0.016 0 -0.04 -H 0 0
+caster_front_left_1_link caster_front_left_2_link -0.016 0 -0.04 -H 0 0
+caster_back_right_1_link caster_back_right_2_link -0.016 0 -0.04 -H 0 0
+caster_back_left_1_link caster_back_left_2_link -0.016 0 -0.04 -H 0 0
+base_link torso_fixed_link -0.062 0 0.193 0 0 0
+torso_fixed_link torso_lift_link 0 0 0.597 0 0 0
+torso_lift_link head_1_link 0.182 0 0 0 0 0
+head_1_link head_2_link 0.005 0 0.098 H 0 0
+head_2_link xtion_link 0.0908 0.08 0 -H 0 0
+torso_lift_link arm_1_link 0.15505 0.014 -0.151 0 0 -H
+arm_1_link arm_2_link 0.125 0.0195 -0.031 H 0 0
+arm_2_link arm_3_link 0.0895 0 -0.0015 -H 0 H
+arm_3_link arm_4_link -0.02 -0.027 -0.222 -H -H 0
+arm_4_link arm_5_link -0.162 0.02 0.027 H -H -H
+arm_5_link arm_6_link 0 0 0.15 0 -H -H
+arm_6_link arm_7_link 0 0 0 H 0 H
+arm_7_link arm_tool_link 0 0 0.046 H -H P
+arm_tool_link wrist_ft_link 0.00785 0 0 H 0 H
+wrist_ft_link wrist_ft_tool_link 0 0 0.012725 -H -H 0
+wrist_ft_tool_link gripper_link 0.01 0 0 H H -H
+gripper_link gripper_right_finger_link 0 0 0 0 0 0
+gripper_link gripper_left_finger_link 0 0 0 0 0 0
+gripper_link gripper_base_link 0 0 0 0 3.1416 1.5707
+gripper_base_link gripper_grasping_frame 0 0 0.12 0 -H 0
+"""
+
+# Joint: lower, upper [rad, m] (None: turns for ever), velocity [rad/s, m/s], effort [N m, N].
+PUBLISHED_LIMITS = {
+    "torso_lift_joint": (0.0, 0.35, 0.07, 2000.0),
+    "head_1_joint": (-5 * math.pi / 12, 5 * math.pi / 12, 3.0, 5.197),
+    "head_2_joint": (-math.pi / 3, math.pi / 4, 3.0, 2.77),
+    "arm_1_joint": (0.0, 7 * math.pi / 8, 1.95, 43.0),
+    "arm_2_joint": (-HALF_PI, 1.090830782496456, 1.95, 43.0),
+    "arm_3_joint": (-3.5342917352885173, HALF_PI, 2.35, 26.0),
+    "arm_4_joint": (-math.pi / 8, 3 * math.pi / 4, 2.35, 26.0),
+    "arm_5_joint": (-2 * math.pi / 3, 2 * math.pi / 3, 1.95, 3.0),
+    "arm_6_joint": (-1.413716694115407, 1.413716694115407, 1.76, 6.6),
+    "arm_7_joint": (-2 * math.pi / 3, 2 * math.pi / 3, 1.76, 6.6),
+    "gripper_right_finger_joint": (0.0, 0.045, 0.05, 64.0),
+    "gripper_left_finger_joint": (0.0, 0.045, 0.05, 64.0),
+    "wheel_right_joint": (None, None, 1.0 / 0.0985, 6.0),
+    "wheel_left_joint": (None, None, 1.0 / 0.0985, 6.0),
+}
+ARM = [f"arm_{k}_joint" for k in range(1, 8)]
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return mjcf.spec().compile()
+
+
+@pytest.fixture(scope="module")
+def pin_model() -> pin.Model:
+    return pin.buildModelFromXML(mjcf.urdf(), pin.JointModelFreeFlyer())
+
+
+def joints(model):
+    """Return the moving joints other than the root, in MuJoCo's order."""
+    return [model.joint(i) for i in range(model.njnt) if model.joint(i).name != "root"]
+
+
+def robot_bodies(model):
+    """Return the bodies under base_footprint, itself included."""
+    root = model.body(mjcf.ROOT).id
+    return [model.body(i) for i in range(model.nbody) if model.body_rootid[i] == root]
+
+
+def random_configuration(rng, model, pin_model):
+    """Return the same random configuration for both: root pose anywhere, every joint within its range."""
+    qpos, q = np.zeros(model.nq), pin.neutral(pin_model)
+    quat_xyzw = rng.normal(size=4)
+    quat_xyzw /= np.linalg.norm(quat_xyzw)
+    qpos[:3] = q[:3] = rng.uniform(-2.0, 2.0, 3)
+    qpos[3:7], q[3:7] = np.roll(quat_xyzw, 1), quat_xyzw
+    for joint in joints(model):
+        low, high = joint.range if model.jnt_limited[joint.id] else (-math.pi, math.pi)
+        angle = rng.uniform(low, high)
+        qpos[joint.qposadr] = angle
+        pin_joint = pin_model.joints[pin_model.getJointId(joint.name)]
+        turns_for_ever = pin_joint.nq == 2
+        q[pin_joint.idx_q : pin_joint.idx_q + pin_joint.nq] = (
+            [math.cos(angle), math.sin(angle)] if turns_for_ever else angle
+        )
+    return qpos, q
+
+
+def velocity_map(model, pin_model, R_world_base):
+    """Return G with v_mujoco = G v_pinocchio: other joint order, root's linear velocity in the world's axes."""
+    G = np.zeros((model.nv, pin_model.nv))
+    G[:3, :3], G[3:6, 3:6] = R_world_base, np.eye(3)
+    for joint in joints(model):
+        G[joint.dofadr[0], pin_model.joints[pin_model.getJointId(joint.name)].idx_v] = 1.0
+    return G
+
+
+@pytest.fixture(scope="module")
+def parity(model, pin_model):
+    """Worst differences between the two engines over 1,000 random configurations."""
+    rng = np.random.default_rng(7)
+    data, pin_data = mujoco.MjData(model), pin_model.createData()
+    body_ids = [body.id for body in robot_bodies(model)]
+    frame_ids = [pin_model.getFrameId(model.body(i).name) for i in body_ids]
+    M = np.zeros((model.nv, model.nv))
+    worst = {"position": 0.0, "rotation": 0.0, "inertia": 0.0, "gravity": 0.0}
+    for _ in range(1000):
+        qpos, q = random_configuration(rng, model, pin_model)
+        data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fullM(model, data, M)
+        pin.framesForwardKinematics(pin_model, pin_data, q)
+        poses = [pin_data.oMf[i] for i in frame_ids]
+        G = velocity_map(model, pin_model, data.body(mjcf.ROOT).xmat.reshape(3, 3))
+        M_pin = np.triu(pin.crba(pin_model, pin_data, q))
+        M_pin = M_pin + np.triu(M_pin, 1).T
+        scale = np.sqrt(np.diag(M_pin))
+        gravity = pin.computeGeneralizedGravity(pin_model, pin_data, q)
+        found = {
+            "position": data.xpos[body_ids] - [pose.translation for pose in poses],
+            "rotation": data.xmat[body_ids].reshape(-1, 3, 3) - [pose.rotation for pose in poses],
+            "inertia": (G.T @ M @ G - M_pin) / np.outer(scale, scale),
+            "gravity": (G.T @ data.qfrc_bias - gravity) / (np.linalg.norm(pin_model.gravity.linear) * scale[0] ** 2),
+        }
+        for name, difference in found.items():
+            worst[name] = max(worst[name], float(np.abs(difference).max()))
+    return worst
+
+
+def test_every_frame_is_where_pinocchio_puts_it(parity):
+    assert parity["position"] <= 1e-9
+    assert parity["rotation"] <= 1e-9
+
+
+def test_joint_space_inertia_is_pinocchios(parity):
+    assert parity["inertia"] <= 1e-9
+
+
+def test_gravity_torques_are_pinocchios(parity):
+    assert parity["gravity"] <= 1e-9
+
+
+def test_pinocchio_reads_the_same_mass_joints_and_links(model, pin_model):
+    assert abs(pin.computeTotalMass(pin_model) - model.body_subtreemass[model.body(mjcf.ROOT).id]) <= 1e-9
+    assert set(pin_model.names) == {"universe", "root_joint"} | {joint.name for joint in joints(model)}
+    links = {frame.name for frame in pin_model.frames if frame.type == pin.FrameType.BODY}
+    assert links == {body.name for body in robot_bodies(model)}
+
+
+@pytest.mark.parametrize("path", ["scene.xml", "tiago.xml"])
+def test_the_files_open_as_they_are(path):
+    model = mujoco.MjModel.from_xml_path(str(mjcf.scene_path().with_name(path)))
+    assert model.nv == 28
+
+
+def test_the_robot_weighs_what_the_plate_read(model):
+    mass = model.body_subtreemass[model.body(mjcf.ROOT).id]
+    assert 73.0 < mass < 74.5
+    assert model.body_mass.sum() == pytest.approx(mass, abs=1e-12), "the laboratory must weigh nothing"
+    assert mass + 0.437 == pytest.approx(74.4, abs=0.05)
+
+
+def test_placements_are_the_published_ones(model):
+    lines = PUBLISHED_PLACEMENTS.split("\n")[1:-1]
+    for line in lines:
+        parent, child, *numbers = line.split()
+        values = [float(in_pi(word)) for word in numbers]
+        body = model.body(child)
+        assert model.body(body.parentid[0]).name == parent
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, body.quat)
+        np.testing.assert_allclose(body.pos, values[:3], rtol=0, atol=1e-15, err_msg=child)
+        np.testing.assert_allclose(
+            R.reshape(3, 3), mjcf.matrix_from_rpy(*values[3:]), rtol=0, atol=5e-15, err_msg=child
+        )
+    assert len(lines) == len(robot_bodies(model)) - 1
+
+
+def in_pi(word: str) -> float:
+    """Return a number of the table, H standing for pi/2 and P for pi."""
+    sign, letter = (-1.0, word[1:]) if word.startswith("-") else (1.0, word)
+    return sign * {"H": HALF_PI, "P": math.pi}[letter] if letter in "HP" else float(word)
+
+
+def test_limits_are_the_published_ones_everywhere(model, pin_model):
+    in_urdf = {joint.get("name"): joint.find("limit") for joint in ET.fromstring(mjcf.urdf()).iter("joint")}
+    for name, (lower, upper, velocity, effort) in PUBLISHED_LIMITS.items():
+        joint, pin_joint = model.joint(name), pin_model.joints[pin_model.getJointId(name)]
+        bounds = () if lower is None else (lower, upper)
+        assert tuple(float(in_urdf[name].get(key)) for key in ("velocity", "effort")) == (velocity, effort), name
+        assert (joint.user[0], *model.jnt_actfrcrange[joint.id]) == (velocity, -effort, effort), name
+        assert (pin_model.velocityLimit[pin_joint.idx_v], pin_model.effortLimit[pin_joint.idx_v]) == (velocity, effort)
+        assert bool(model.jnt_limited[joint.id]) == bool(bounds), name
+        if bounds:
+            at = pin_joint.idx_q
+            np.testing.assert_allclose(joint.range, bounds, rtol=0, atol=1e-15, err_msg=name)
+            assert tuple(joint.range) == (pin_model.lowerPositionLimit[at], pin_model.upperPositionLimit[at]), name
+    unlimited = [joint.name for joint in joints(model) if joint.name not in PUBLISHED_LIMITS]
+    assert len(unlimited) == 8 and all(name.startswith("caster") and in_urdf[name] is None for name in unlimited)
+
+
+def test_axes_go_through_the_link_origins(model):
+    assert not np.any([joint.pos for joint in joints(model)])
+    axes = {tuple(joint.axis) for joint in joints(model) if "finger" not in joint.name}
+    assert axes == {(0.0, 0.0, 1.0)}
+
+
+def test_the_nominal_robot_has_no_rotor_inertia(model):
+    assert not np.any(model.dof_armature)
+
+
+def test_every_inertia_could_be_that_of_a_real_body(model):
+    for body in robot_bodies(model):
+        if body.mass[0] > 0.0:
+            principal = body.inertia
+            spread = principal.sum() / 2 - principal
+            assert principal.min() > 0.0, body.name
+            assert spread.min() > 1e-3 * principal.max(), f"{body.name}: {principal} breaks the triangle inequality"
+        else:
+            assert model.body_weldid[body.id] != body.id or body.name == mjcf.ROOT, f"{body.name} moves without mass"
+
+
+def test_urdf_inertias_are_the_written_ones(model):
+    links = {link.get("name"): link for link in ET.fromstring(mjcf.urdf()).iter("link")}
+    for body in mjcf.spec().bodies:
+        inertial = links[body.name].find("inertial") if body.name in links else None
+        if inertial is None:
+            continue
+        found = [float(inertial.find("inertia").get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")]
+        np.testing.assert_allclose(found, body.fullinertia, rtol=0, atol=1e-14 * max(found), err_msg=body.name)
+        assert [float(x) for x in inertial.find("origin").get("xyz").split()] == list(body.ipos)
+        assert float(inertial.find("mass").get("value")) == body.mass
+
+
+def test_centres_of_mass_lie_between_their_joints(model):
+    """The published signs put the masses of arm_1 and arm_5 on the side their links do not extend to."""
+    for body, child in (("arm_1_link", "arm_2_link"), ("arm_5_link", "arm_6_link"), ("arm_4_link", "arm_5_link")):
+        assert np.dot(model.body(body).ipos, model.body(child).pos) > 0.0
+    assert model.body("arm_1_link").ipos[1] > 0.0
+
+
+def test_fingers_are_one_part_turned_by_half_a_turn(model):
+    half_turn = np.diag([-1.0, -1.0, 1.0])
+    right, left = (model.body(f"gripper_{side}_finger_link") for side in ("right", "left"))
+    np.testing.assert_array_equal(half_turn @ right.ipos, left.ipos)
+    tensors = []
+    for body in (right, left):
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, body.iquat)
+        tensors.append(R.reshape(3, 3) @ np.diag(body.inertia) @ R.reshape(3, 3).T)
+    np.testing.assert_allclose(half_turn @ tensors[0] @ half_turn, tensors[1], atol=1e-17)
+
+
+def arm_torques_and_reach(model, n):
+    """Return the largest gravity torque of each arm joint [N m] and the reach arm_1 -> wrist_ft_tool [m]."""
+    rng, data = np.random.default_rng(0), mujoco.MjData(model)
+    arm = [model.joint(name) for name in ARM]
+    torque, reach = np.zeros(7), 0.0
+    for _ in range(n):
+        for joint in arm:
+            data.qpos[joint.qposadr] = rng.uniform(*joint.range)
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        torque = np.maximum(torque, np.abs([data.qfrc_bias[joint.dofadr[0]] for joint in arm]))
+        reach = max(reach, np.linalg.norm(data.body("wrist_ft_tool_link").xpos - data.body("arm_1_link").xpos))
+    return torque, reach
+
+
+def test_statics_are_those_computed_from_the_published_urdf():
+    """With the published centres of mass put back, the published URDF's gravity torques come out."""
+    spec = mjcf.spec()
+    spec.body("arm_5_link").ipos[2] *= -1.0
+    spec.body("gripper_left_finger_link").ipos = spec.body("gripper_right_finger_link").ipos
+    torque, reach = arm_torques_and_reach(spec.compile(), 4000)
+    assert torque[0] < 1e-9
+    np.testing.assert_allclose(torque[1:4], [24.4, 8.7, 8.0], rtol=0.03)
+    np.testing.assert_allclose(torque[4:], [1.2, 1.2, 0.03], rtol=0.1)
+    assert reach == pytest.approx(0.82, abs=0.005)
+
+
+def test_grasping_frame_is_straight_ahead_of_the_wrist(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    wrist, grasp = data.body("arm_7_link"), data.body("gripper_grasping_frame")
+    p = wrist.xmat.reshape(3, 3).T @ (grasp.xpos - wrist.xpos)
+    np.testing.assert_allclose(p, [0.0, 0.0, 0.196575], atol=2e-6)
+
+
+@pytest.mark.parametrize("pitch", [0.3, HALF_PI, -HALF_PI, HALF_PI - 1e-9, -HALF_PI + 1e-8, HALF_PI - 1e-15, 2.0])
+def test_rpy_round_trip_is_exact_at_the_singularity_too(pitch):
+    rng = np.random.default_rng(3)
+    for roll, yaw in [(0.0, 0.0), (HALF_PI, -HALF_PI), (math.pi, 1.0), *rng.uniform(-math.pi, math.pi, (200, 2))]:
+        R = mjcf.matrix_from_rpy(roll, pitch, yaw)
+        again = mjcf.matrix_from_rpy(*mjcf.rpy_from_matrix(R))
+        np.testing.assert_allclose(again, R, rtol=0, atol=5e-15)
+
+
+def test_rpy_follows_the_urdf_convention():
+    roll, pitch, yaw = 0.4, -0.9, 2.2
+    np.testing.assert_allclose(
+        mjcf.matrix_from_rpy(roll, pitch, yaw), pin.rpy.rpyToMatrix(roll, pitch, yaw), atol=1e-15
+    )
+    np.testing.assert_allclose(mjcf.rpy_from_matrix(pin.rpy.rpyToMatrix(roll, pitch, yaw)), (roll, pitch, yaw))
+    with pytest.raises(ValueError, match=r"\(3, 3\)"):
+        mjcf.rpy_from_matrix(np.eye(4))
+
+
+def ground_force(model, data):
+    """Return the sum of the wheels' normal forces [N] and the ground geoms touched."""
+    force, total, touched = np.zeros(6), 0.0, set()
+    for i in range(data.ncon):
+        mujoco.mj_contactForce(model, data, i, force)
+        total += force[0]
+        touched |= {model.geom(g).name for g in data.contact[i].geom}
+    return total, touched
+
+
+@pytest.mark.parametrize("keyframe", [None, "home"])
+def test_the_robot_settles_on_the_plate_and_holds_its_posture(model, keyframe):
+    data = mujoco.MjData(model)
+    if keyframe:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
+    start = data.qpos.copy()
+    mujoco.mj_step(model, data, nstep=2000)
+    force, touched = ground_force(model, data)
+    base = data.body(mjcf.ROOT)
+    assert force == pytest.approx(model.body_mass.sum() * 9.81, rel=0.01)
+    assert {name for name in touched if not name.endswith("_contact")} == {"plate"}
+    np.testing.assert_allclose(base.xpos, [0.9, 0.45, 0.0], atol=3e-3)
+    np.testing.assert_allclose(base.xquat, [1.0, 0.0, 0.0, 0.0], atol=3e-3)
+    for joint in joints(model):
+        if "caster" not in joint.name:
+            assert data.qpos[joint.qposadr] == pytest.approx(start[joint.qposadr], abs=0.03), joint.name
+
+
+def test_home_is_inside_the_limits(model):
+    home = model.key("home")
+    for joint in joints(model):
+        if model.jnt_limited[joint.id]:
+            assert joint.range[0] <= home.qpos[joint.qposadr[0]] <= joint.range[1], joint.name
+    for actuator_id in range(model.nu):
+        joint = model.joint(int(model.actuator_trnid[actuator_id, 0]))
+        assert home.ctrl[actuator_id] == home.qpos[joint.qposadr[0]], joint.name
+
+
+def test_plate_is_flush_with_the_floor(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    plate, site = data.geom("plate"), data.site("plate")
+    np.testing.assert_allclose(plate.xpos + [0.0, 0.0, model.geom("plate").size[2]], [0.9, 0.45, 0.0], atol=1e-15)
+    np.testing.assert_allclose(2 * model.geom("plate").size[:2], [0.9, 0.9])
+    np.testing.assert_array_equal(site.xpos, [0.9, 0.45, 0.0])
+    np.testing.assert_array_equal(site.xmat, np.eye(3).ravel())
+    for name in ("floor_front", "floor_back", "floor_left", "floor_right"):
+        top = data.geom(name).xpos[2] + model.geom(name).size[2]
+        apart = np.abs(data.geom(name).xpos - plate.xpos)[:2] - model.geom(name).size[:2] - model.geom("plate").size[:2]
+        assert top == pytest.approx(0.0, abs=1e-15)
+        assert apart.max() == pytest.approx(0.0, abs=1e-12), f"{name} must end where the plate begins"
+
+
+def test_wheels_are_where_the_datasheet_says():
+    wheels = {wheel.name: wheel for wheel in mjcf.wheels()}
+    assert [wheel.type for wheel in mjcf.wheels()] == ["drive"] * 2 + ["caster"] * 4
+    assert wheels["wheel_left"].centre == (0.0, 0.2022, 0.0985)
+    assert wheels["wheel_right"].contact == (0.0, -0.2022, 0.0)
+    assert wheels["caster_front_left"].centre == pytest.approx((0.1535, 0.102, 0.025))
+    assert wheels["caster_back_right"].contact == pytest.approx((-0.1895, -0.102, 0.0))
+    assert wheels["caster_back_left"].body == "caster_back_left_2_link"
+
+
+def test_only_wheels_touch_only_the_ground(model):
+    touching = [model.geom(i).name for i in range(model.ngeom) if model.geom_conaffinity[i]]
+    assert sorted(touching) == sorted(f"{wheel.name}_contact" for wheel in mjcf.wheels())
+    assert not np.any(model.geom_contype[[model.geom(name).id for name in touching]])
+
+
+def test_spec_is_fresh_each_time():
+    first, second = mjcf.spec(), mjcf.spec()
+    assert first.to_xml() == second.to_xml()
+    first.body("arm_1_link").pos[0] += 1.0
+    first.delete(first.key("home"))
+    assert second.to_xml() == mjcf.spec().to_xml() != first.to_xml()
+
+
+def test_urdf_is_the_same_each_time_and_of_the_model_given():
+    assert mjcf.urdf() == mjcf.urdf()
+    spec = mjcf.spec()
+    spec.body("arm_3_link").pos[0] += 0.1 / 3.0
+    arm_3 = next(
+        joint for joint in ET.fromstring(mjcf.urdf(spec.compile())).iter("joint") if joint.get("name") == "arm_3_joint"
+    )
+    assert float(arm_3.find("origin").get("xyz").split()[0]) == 0.0895 + 0.1 / 3.0
+
+
+@pytest.mark.parametrize(
+    ("joint", "reason"),
+    [
+        ('<joint pos="0 0 .1"/>', "about a point"),
+        ('<joint type="ball"/>', "ball"),
+        ("<joint/><joint axis='1 0 0'/>", "2 joints"),
+    ],
+)
+def test_what_a_urdf_cannot_say_is_refused(joint, reason):
+    text = f"""<mujoco><worldbody><body name="base_footprint"><geom size="1"/>
+        <body name="arm">{joint}<geom size="1"/></body></body></worldbody></mujoco>"""
+    with pytest.raises(mjcf.NotAUrdfTree, match=reason) as refusal:
+        mjcf.urdf(mujoco.MjModel.from_xml_string(text))
+    assert refusal.value.body_name == "arm"
