@@ -1,0 +1,152 @@
+"""From pydantic's errors to the lines a person reads: where in the file, what is possible, what was found."""
+
+import difflib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic.errors import PydanticInvalidForJsonSchema
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from scenarios.override import Override
+
+UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
+"""What pydantic calls these two in models and in dataclasses."""
+
+LONGEST_VALUE = 60
+"""Characters of a found value that are shown."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What was validated, and where it came from.
+
+    Attributes:
+        file: The file's name.
+        tree: The file as loaded, with the line and column of every value.
+        values: The plain values validated, overrides included.
+        overrides: What was put in beside the file.
+    """
+
+    file: str
+    tree: CommentedMap
+    values: dict[str, Any]
+    overrides: Sequence[Override] = ()
+
+    def findings(self, error: ValidationError, adapter: TypeAdapter[Any], above: tuple[str, ...] = ()) -> list[str]:
+        """Return one line per finding, in the order of the file, those about overrides last.
+
+        Args:
+            error: What pydantic found.
+            adapter: What it validated against; it knows the names that are possible.
+            above: Path of what was validated within `values`.
+        """
+        placed = []
+        for detail in error.errors(include_url=False):
+            path = _path(self.values, (*above, *detail["loc"]), detail["type"])
+            known = _fields(adapter, self.values, above, path[:-1]) if detail["type"] in UNKNOWN else []
+            text = ": ".join(part for part in (".".join(path), _message(detail, path, known)) if part)
+            line, column, whole = _place(self.tree, path, of_key=detail["type"] in UNKNOWN + MISSING)
+            in_file = whole or detail["type"] in MISSING
+            if any(override.explains(path, in_file) for override in self.overrides):
+                placed.append((1, 0, 0, f"--set {text}"))
+            else:
+                placed.append((0, line, column, f"{self.file}:{line + 1}:{column + 1}: {text}"))
+        return [text for *_, text in sorted(placed, key=lambda found: found[:3])]
+
+
+def _path(values: Any, location: Sequence[str | int], kind: str) -> tuple[str, ...]:
+    """Return a location without the names of union members, which pydantic adds and no file holds."""
+    path: list[str] = []
+    node: Any = values
+    for depth, step in enumerate(location):
+        last = depth == len(location) - 1
+        if (isinstance(node, dict) and step in node) or (isinstance(node, list) and isinstance(step, int)):
+            path.append(str(step))
+            node = node[step]  # type: ignore[index]
+        elif last and kind in MISSING:
+            path.append(str(step))
+    return tuple(path)
+
+
+def _place(tree: CommentedMap, path: Sequence[str], of_key: bool) -> tuple[int, int, bool]:
+    """Return line and column, from 0, of the last part of `path` the file holds, and whether it holds all."""
+    node: Any = tree
+    line, column = 0, 0
+    for step in path:
+        if isinstance(node, CommentedSeq) and step.isdecimal() and int(step) < len(node):
+            line, column = node.lc.item(int(step))
+            node = node[int(step)]
+        elif isinstance(node, CommentedMap) and (key := next((k for k in node if str(k) == step), None)) is not None:
+            if key in (node.lc.data or {}):  # a merged key (`<<`) has no place of its own
+                line, column = node.lc.key(key) if of_key or node[key] is None else node.lc.value(key)
+            node = node[key]
+        else:
+            return line, column, False
+    return line, column, True
+
+
+def _message(detail: Mapping[str, Any], path: Sequence[str], known: Sequence[str]) -> str:
+    """Say what is wrong and, for a wrong name, what is possible."""
+    if detail["type"] in MISSING:
+        return "missing"
+    if detail["type"] in UNKNOWN:
+        close = difflib.get_close_matches(path[-1], known, n=1)
+        hint = f"; did you mean {close[0]}?" if close else ""
+        return f"unknown field{hint}" + (f" (known here: {', '.join(known)})" if known else "")
+    message = detail["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    return f"{message} (got {_shown(detail['input'])})"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "a mapping"
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
+
+
+def _fields(adapter: TypeAdapter[Any], values: Any, above: Sequence[str], path: Sequence[str]) -> list[str]:
+    """Return the field names possible in the mapping at `path`, as far as the types tell."""
+    try:
+        root = adapter.json_schema()
+    except PydanticInvalidForJsonSchema:
+        return []
+    node = values
+    for step in above:
+        node = node[step]
+    schemas = list(_members(root, root, node))
+    for step in path[len(above) :]:
+        node = node[int(step)] if isinstance(node, list) else node[step]
+        schemas = [
+            member for schema in schemas for inner in _inner(schema, step) for member in _members(inner, root, node)
+        ]
+    return sorted({name for schema in schemas for name in schema.get("properties", {})})
+
+
+def _inner(schema: Mapping[str, Any], step: str) -> Iterator[Mapping[str, Any]]:
+    """Schemas of one field, or of one item, of what `schema` describes."""
+    prefix = schema.get("prefixItems", [])
+    if step in schema.get("properties", {}):
+        yield schema["properties"][step]
+    elif step.isdecimal() and int(step) < len(prefix):
+        yield prefix[int(step)]
+    else:
+        yield from (schema[rest] for rest in ("items", "additionalProperties") if isinstance(schema.get(rest), Mapping))
+
+
+def _members(schema: Mapping[str, Any], root: Mapping[str, Any], node: Any) -> Iterator[Mapping[str, Any]]:
+    """The schemas a schema stands for: references and unions resolved, members of another kind than `node` left out."""
+    if "$ref" in schema:
+        yield from _members(root["$defs"][schema["$ref"].rsplit("/", 1)[-1]], root, node)
+        return
+    for union in ("anyOf", "oneOf", "allOf"):
+        for member in schema.get(union, []):
+            yield from _members(member, root, node)
+    kinds = {name: field["const"] for name, field in schema.get("properties", {}).items() if "const" in field}
+    if isinstance(node, Mapping) and all(node.get(name, kind) == kind for name, kind in kinds.items()):
+        yield schema
+    elif not isinstance(node, Mapping):
+        yield schema
