@@ -32,7 +32,6 @@ def test_a_new_folder_appears_with_its_parents_when_the_block_ends(tmp_path):
     with replacing(out, RUN) as new:
         (new / "scenario.yaml").write_text("x")
         assert not out.exists()
-        assert not list(new.iterdir())
     assert tree(tmp_path / "a" / "b") == {"run": "", "run/scenario.yaml": "x"}
 
 
