@@ -340,7 +340,7 @@ def ground_force(model, data):
     return total, touched
 
 
-@pytest.mark.parametrize("keyframe", [None, "home"])
+@pytest.mark.parametrize("keyframe", [None, "home", "reach"])
 def test_the_robot_settles_on_the_plate_and_holds_its_posture(model, keyframe):
     data = mujoco.MjData(model)
     if keyframe:
@@ -352,20 +352,21 @@ def test_the_robot_settles_on_the_plate_and_holds_its_posture(model, keyframe):
     assert force == pytest.approx(model.body_mass.sum() * 9.81, rel=0.01)
     assert {name for name in touched if not name.endswith("_contact")} == {"plate"}
     np.testing.assert_allclose(base.xpos, [0.9, 0.45, 0.0], atol=3e-3)
-    np.testing.assert_allclose(base.xquat, [1.0, 0.0, 0.0, 0.0], atol=3e-3)
+    np.testing.assert_allclose(base.xquat, [1.0, 0.0, 0.0, 0.0], atol=5e-3)  # 10 mrad
     for joint in joints(model):
         if "caster" not in joint.name:
             assert data.qpos[joint.qposadr] == pytest.approx(start[joint.qposadr], abs=0.03), joint.name
 
 
-def test_home_is_inside_the_limits(model):
-    home = model.key("home")
+@pytest.mark.parametrize("name", ["home", "reach"])
+def test_keyframes_are_inside_the_limits_and_commanded(model, name):
+    key = model.key(name)
     for joint in joints(model):
         if model.jnt_limited[joint.id]:
-            assert joint.range[0] <= home.qpos[joint.qposadr[0]] <= joint.range[1], joint.name
+            assert joint.range[0] <= key.qpos[joint.qposadr[0]] <= joint.range[1], joint.name
     for actuator_id in range(model.nu):
         joint = model.joint(int(model.actuator_trnid[actuator_id, 0]))
-        assert home.ctrl[actuator_id] == home.qpos[joint.qposadr[0]], joint.name
+        assert key.ctrl[actuator_id] == key.qpos[joint.qposadr[0]], joint.name
 
 
 def test_plate_is_flush_with_the_floor(model):
