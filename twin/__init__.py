@@ -1,1 +1,8 @@
-"""Placeholder."""
+"""A robot whose truth is known, the motions it makes and the instruments that watch it."""
+
+from twin.build import Twin, build
+from twin.campaign import record
+from twin.config import TwinConfig
+from twin.simulate import States, simulate
+
+__all__ = ["States", "Twin", "TwinConfig", "build", "record", "simulate"]

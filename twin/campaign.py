@@ -1,0 +1,189 @@
+"""A whole campaign: one robot of the series, every trial simulated, measured and written.
+
+    OUT/dataset/{dataset.json, nominal.urdf, trials/*.nc}      what a laboratory has
+    OUT/truth/{truth.json, trials/*.nc}                        what nobody has
+
+Trials run in parallel threads (the simulation holds no interpreter lock); random streams are named after the trial
+and the instrument, so that the files do not depend on the number of threads.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import mjcf
+from calibration.recording import Trial, write_trial
+from calibration.schema import TrialEntry
+from twin import truth
+from twin.build import Twin, build
+from twin.config import TwinConfig
+from twin.conventions import exp6
+from twin.declare import declaration
+from twin.defects.base import Parameter
+from twin.defects.ground import spatial_stiffness
+from twin.draw import BASE, Robot, draw
+from twin.instruments import mocap, plate, robot_log
+from twin.instruments.clock import Clock
+from twin.instruments.sampling import averaged, interpolate, interpolate_poses
+from twin.motions import JOINTS, Motion
+from twin.randomness import generator
+from twin.schedule import schedule
+from twin.simulate import States, simulate
+from twin.truth import TruthTrial
+
+Progress = Callable[[str, float], None]
+_EPOCH = 100.0  # [s] on the mocap clock when the first trial starts
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """One robot in its laboratory.
+
+    Attributes:
+        config: What the scenario says.
+        seed: Root of every random stream.
+        robot: The drawn robot.
+        twin: Its model.
+        T_lab_base: Where it is put down (4, 4).
+    """
+
+    config: TwinConfig
+    seed: int
+    robot: Robot
+    twin: Twin
+    T_lab_base: np.ndarray
+
+
+def laboratory(config: TwinConfig, seed: int) -> Laboratory:
+    """Draw a robot and put it on its plate."""
+    spec = mjcf.spec()
+    robot = draw(config, spec.compile(), seed)
+    twin = build(spec, robot.defects, sorted({c.link for c in robot.clusters} | {BASE}), config.timestep)
+    x, y, yaw = config.base.pose
+    T_lab_base = exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, yaw]))
+    T_lab_base[:2, 3] = x, y
+    return Laboratory(config, seed, robot, twin, T_lab_base)
+
+
+def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None = None) -> None:
+    """Simulate a campaign and write OUT/dataset and OUT/truth.
+
+    Args:
+        config: Robot and laboratory.
+        seed: Root of every random stream.
+        out: Folder to write into.
+        progress: Called with a text and the fraction done.
+
+    Raises:
+        TwinError: The simulation failed; said where.
+    """
+    lab = laboratory(config, seed)
+    for folder in ("dataset/trials", "truth/trials"):
+        (out / folder).mkdir(parents=True, exist_ok=True)
+    motions = schedule(config.campaign, mjcf.spec().compile(), seed)
+    starts = _EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
+    entries, done, total = [], 0.0, sum(m.duration for m in motions)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = [pool.submit(_one, lab, m, float(t), out) for m, t in zip(motions, starts, strict=True)]
+        try:
+            for motion, job in zip(motions, jobs, strict=True):
+                entries.append(job.result())
+                done += motion.duration
+                if progress:
+                    progress(f"simulated {motion.id}, {motion.duration:.0f} s", done / total)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    description = declaration(config, tuple(entries))
+    (out / "dataset/dataset.json").write_text(description.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    (out / "dataset/nominal.urdf").write_text(mjcf.urdf(), encoding="utf-8")
+    _write_truth(lab, out / "truth")
+
+
+def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry:
+    states = simulate(lab.twin, motion, lab.T_lab_base)
+    trial, true = measure(lab, motion, states, start)
+    file = f"trials/{motion.id}.nc"
+    digest = write_trial(out / "dataset" / file, trial)
+    truth.write_trial(out / "truth" / file, true)
+    return TrialEntry(id=motion.id, role=motion.role, kind=motion.kind, motion=motion.name, file=file, sha256=digest)
+
+
+def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tuple[Trial, TruthTrial]:
+    """What the instruments say of a trial that starts at `start` [s, mocap clock], and what was true."""
+    i, joints = lab.config.instruments, JOINTS
+    t = states.t + start
+    robot, force, camera = _clocks(lab.config)
+    stop = float(t[-1])
+    t_robot, true_robot = robot.ticks(start, stop, i.robot_rate)
+    t_plate, true_plate = force.ticks(start, stop, i.plate_rate)
+    t_mocap, _ = camera.ticks(start, stop, i.mocap_rate)
+    true = _true(lab, states, t_mocap, start)
+    log = robot_log.measured(true_robot - start, states, lab.robot.encoders, lab.config)
+    sigma = np.repeat([i.plate_force_noise, i.plate_moment_noise], 3)
+    wrench = plate.measured(true_plate, t, states.wrench, i.plate_rate, sigma, generator(lab.seed, motion.id, "plate"))
+    trial = Trial(
+        id=motion.id,
+        joint=joints,
+        t_robot=t_robot,
+        **asdict(log),
+        marker=true.marker,
+        marker_body=tuple(c.name for c in lab.robot.clusters for _ in c.marker_names),
+        t_mocap=t_mocap,
+        marker_position=mocap.measured(true.marker_position, i.marker_noise, generator(lab.seed, motion.id, "mocap")),
+        plate=("plate",),
+        t_plate=t_plate,
+        plate_wrench=wrench[:, None],
+        plate_centre=_plate_centre(lab.twin.model)[None],
+        dwell_start=motion.dwells[:, 0] + start,
+        dwell_stop=motion.dwells[:, 1] + start,
+        approach=motion.approach,
+    )
+    return trial, true
+
+
+def _clocks(config: TwinConfig) -> tuple[Clock, Clock, Clock]:
+    i = config.instruments
+    robot = Clock("robot", i.robot_clock.offset, i.robot_clock.drift)
+    return robot, Clock("plate", i.plate_clock.offset, i.plate_clock.drift), Clock("mocap")
+
+
+def _true(lab: Laboratory, states: States, t_mocap: np.ndarray, start: float) -> TruthTrial:
+    t, clusters = t_mocap - start, lab.robot.clusters
+    poses = {name: interpolate_poses(t, states.t, T) for name, T in states.poses.items()}
+    hand = next(c for c in clusters if c.name == "gripper")
+    return TruthTrial(
+        joint=JOINTS,
+        marker=tuple(m for c in clusters for m in c.marker_names),
+        t_mocap=t_mocap,
+        q_motor_true=interpolate(t, states.t, states.motor),
+        q_link_true=interpolate(t, states.t, states.link),
+        base_pose=poses[BASE],
+        hand_pose=poses[hand.link] @ hand.T_link_body,
+        marker_position=np.concatenate([mocap.marker_positions(poses[c.link], c) for c in clusters], axis=1),
+        plate_wrench=averaged(t, states.t, states.wrench, 1.0 / lab.config.instruments.mocap_rate),
+    )
+
+
+def _plate_centre(model: mujoco.MjModel) -> np.ndarray:
+    """Surface centre of the plate in the lab (3,) [m]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return data.site("plate").xpos.copy()
+
+
+def _write_truth(lab: Laboratory, folder: Path) -> None:
+    robot = lab.robot
+    contacts = {w.name: w.contact for w in mjcf.wheels()}
+    K, C = spatial_stiffness(robot.wheels, np.array([contacts[w.name] for w in robot.wheels]))
+    parameters: list[Parameter] = list(lab.twin.truth)
+    for source in (*robot.encoders, *robot.clusters, *_clocks(lab.config)[:2]):
+        parameters += source.parameters()
+    derived = {"K": K, "C": C, "T_lab_base": lab.T_lab_base, "plate_centre": _plate_centre(lab.twin.model)}
+    derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}
+    truth.write_parameters(folder / "truth.json", parameters, derived)

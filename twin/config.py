@@ -1,0 +1,286 @@
+"""What a scenario says about a robot and its laboratory: magnitudes, widths, motions and instruments.
+
+SI units. Every field is validated here once; nothing downstream checks it again. Magnitudes of one robot are values,
+what differs between robots is drawn: placements from zero-mean normals, offsets and gaps within +-spread of theirs.
+"""
+
+from dataclasses import field
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Angle = Annotated[float, Field(ge=-0.5, le=0.5)]
+Count = Annotated[int, Field(ge=1)]
+Vector3 = tuple[float, float, float]
+_strict = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, config=_strict)
+class ArmJoint:
+    """Drive train and encoders of one arm joint.
+
+    Attributes:
+        offset: Motor encoder's reading at true zero [rad].
+        gap: Total play [rad].
+        stiffness: Mesh [N.m/rad].
+        damping: Mesh [N.m.s/rad].
+        coulomb: Link-side friction [N.m].
+        viscous: Link-side friction [N.m.s/rad].
+        rotor_inertia: Reflected to the joint [kg.m2].
+        servo_stiffness: Position gain [N.m/rad].
+        quantum: Of the motor encoder, at the joint [rad].
+        torque_per_ampere: Of the drive, at the joint [N.m/A].
+    """
+
+    offset: Angle
+    gap: Annotated[float, Field(ge=0.0, le=0.1)]
+    stiffness: Annotated[float, Field(ge=100.0, le=50e3)]
+    damping: NonNegative
+    coulomb: NonNegative
+    viscous: NonNegative
+    rotor_inertia: Annotated[float, Field(ge=0.01)]
+    servo_stiffness: Positive
+    quantum: Positive
+    torque_per_ampere: Positive
+
+
+@dataclass(frozen=True, config=_strict)
+class LinkEncoders:
+    """Absolute encoders on the link side, standard deviations of what is drawn.
+
+    Attributes:
+        offset: Zero [rad].
+        once: Amplitude once per turn [rad].
+        twice: Amplitude twice per turn [rad].
+        quantum: Step of the reading [rad].
+    """
+
+    offset: NonNegative
+    once: NonNegative
+    twice: NonNegative
+    quantum: Positive
+
+
+@dataclass(frozen=True, config=_strict)
+class Torso:
+    """The torso lift, driven without play, and its column's bending.
+
+    Attributes:
+        quantum: Of the motor encoder [m].
+        force_per_ampere: [N/A].
+        servo_stiffness: [N/m].
+        rotor_inertia: Reflected [kg].
+        bending_stiffness: About x and y [N.m/rad].
+        bending_damping: [N.m.s/rad].
+    """
+
+    quantum: Positive
+    force_per_ampere: Positive
+    servo_stiffness: Positive
+    rotor_inertia: Positive
+    bending_stiffness: Annotated[float, Field(ge=1e3)]
+    bending_damping: NonNegative
+
+
+@dataclass(frozen=True, config=_strict)
+class WheelType:
+    """How one type of wheel stands.
+
+    Attributes:
+        stiffness: Bushing kx, ky, kz [N/m].
+        damping: Bushing cx, cy, cz [N.s/m].
+        contact_stiffness: Normal, on the floor [N/m].
+        contact_damping: Normal, on the floor [N.s/m].
+        friction: Coefficient mu [-].
+    """
+
+    stiffness: tuple[Positive, Positive, Positive]
+    damping: tuple[NonNegative, NonNegative, NonNegative]
+    contact_stiffness: Positive
+    contact_damping: NonNegative
+    friction: NonNegative
+
+
+@dataclass(frozen=True, config=_strict)
+class Base:
+    """How the base stands.
+
+    Attributes:
+        drive: The two driven wheels, braked.
+        caster_front: The two casters in front.
+        caster_back: The two casters behind; each pair stands as the last drive has turned it.
+        pose: x, y [m] and yaw [rad] of the base in the lab.
+    """
+
+    drive: WheelType
+    caster_front: WheelType
+    caster_back: WheelType
+    pose: Vector3
+
+
+@dataclass(frozen=True, config=_strict)
+class Load:
+    """The payload, declared to the laboratory as it stands here.
+
+    Attributes:
+        mass: [kg].
+        com: In the tool frame [m].
+        size: Edge lengths [m].
+        com_error: Standard deviation of the true centre of mass, per axis [m].
+    """
+
+    mass: Annotated[float, Field(ge=0.0, le=3.0)]
+    com: Vector3
+    size: tuple[Positive, Positive, Positive]
+    com_error: NonNegative
+
+
+@dataclass(frozen=True, config=_strict)
+class Widths:
+    """What differs from one robot of the series to the next, standard deviations unless said.
+
+    Attributes:
+        placement_translation: Each joint placement, per axis [m].
+        placement_rotation: Each joint placement, per axis [rad].
+        link_mass: Relative [-].
+        link_com: Per axis [m].
+        spread: Half width of the uniform factor on offsets and gaps [-]; 0 leaves them as written.
+    """
+
+    placement_translation: NonNegative
+    placement_rotation: NonNegative
+    link_mass: Annotated[float, Field(ge=0.0, le=0.3)]
+    link_com: NonNegative
+    spread: Annotated[float, Field(ge=0.0, le=0.9)] = 0.0
+
+
+@dataclass(frozen=True, config=_strict)
+class MarkerBody:
+    """A marker cluster: where it should be, and how far off it is mounted.
+
+    Attributes:
+        link: The link that carries it; the body's frame is nominally the link's.
+        markers: Nominal position of each marker in that frame [m].
+        translation: Standard deviation of the cluster's placement, per axis [m].
+        rotation: [rad].
+        marker: Standard deviation of each marker within its cluster, per axis [m].
+    """
+
+    link: str
+    markers: dict[str, Vector3]
+    translation: NonNegative
+    rotation: NonNegative
+    marker: NonNegative
+
+
+@dataclass(frozen=True, config=_strict)
+class ClockSetting:
+    """t_mocap = t (1 + drift) + offset: offset [s], drift [-]."""
+
+    offset: float
+    drift: Annotated[float, Field(ge=-1e-3, le=1e-3)]
+
+
+@dataclass(frozen=True, config=_strict)
+class Instruments:
+    """Rates [Hz], noises per sample and clocks.
+
+    Attributes:
+        bodies: Marker clusters by name.
+        mocap_rate: [Hz].
+        marker_noise: Per axis [m].
+        plate_rate: [Hz].
+        plate_force_noise: Per axis [N].
+        plate_moment_noise: Per axis [N.m].
+        robot_rate: [Hz].
+        current_quantum: [A].
+        link_encoders: Absolute encoders.
+        robot_clock: The robot's.
+        plate_clock: The plate's.
+    """
+
+    bodies: dict[Literal["base", "shoulder", "gripper"], MarkerBody]
+    mocap_rate: Positive
+    marker_noise: Positive
+    plate_rate: Positive
+    plate_force_noise: Positive
+    plate_moment_noise: Positive
+    robot_rate: Positive
+    current_quantum: Positive
+    link_encoders: LinkEncoders
+    robot_clock: ClockSetting
+    plate_clock: ClockSetting
+
+
+@dataclass(frozen=True, config=_strict)
+class Campaign:
+    """How much is recorded.
+
+    Attributes:
+        ramp: Duration of the velocity ramp that starts and stops a motion [s].
+        rest: Rest at the start and end of each trial [s].
+        speed: Of moves between postures [rad/s].
+        dwell: Rest in each static posture [s].
+        calibration_postures: Number of.
+        validation_postures: Number of.
+        sweep: Duration of each one-joint sweep [s].
+        calibration_swing: Duration of each calibration swing [s].
+        validation_swing: Duration of each validation swing [s].
+        pause: Between trials, on every clock [s].
+    """
+
+    ramp: Annotated[float, Field(gt=0.0, le=3.0)]
+    rest: Annotated[float, Field(ge=1.0, le=10.0)]
+    speed: Annotated[float, Field(gt=0.0, le=1.76)]
+    dwell: Annotated[float, Field(ge=0.8, le=10.0)]
+    calibration_postures: Count
+    validation_postures: Count
+    sweep: Positive
+    calibration_swing: Positive
+    validation_swing: Positive
+    pause: NonNegative
+
+
+@dataclass(frozen=True, config=_strict)
+class Datasheet:
+    """Tolerances declared to the laboratory, standard deviations; see `calibration.schema.Tolerances`."""
+
+    joint_translation: Positive
+    joint_rotation: Positive
+    encoder_offset: Positive
+    joint_play: Positive
+    body_translation: Positive
+    body_rotation: Positive
+    link_mass: Positive
+    link_com: Positive
+    payload_mass: NonNegative
+
+
+@dataclass(frozen=True, config=_strict)
+class TwinConfig:
+    """Everything `record` needs beside a seed.
+
+    Attributes:
+        arm: Arm joints by name, base to tip.
+        torso: The lift and its column.
+        base: Wheels and floor.
+        payload: In the hand.
+        widths: What is drawn.
+        instruments: The laboratory.
+        campaign: What is recorded.
+        datasheet: What is declared.
+        timestep: Of the simulation [s].
+    """
+
+    arm: dict[str, ArmJoint]
+    torso: Torso
+    base: Base
+    payload: Load
+    widths: Widths
+    instruments: Instruments
+    campaign: Campaign
+    datasheet: Datasheet
+    timestep: Annotated[float, Field(gt=0.0, le=0.002)] = field(default=0.001)

@@ -1,0 +1,124 @@
+"""A drive train with play: rotor, mesh with a dead zone, link.
+
+    rotor: J_m dd q_m = kp (u - q_m) - kv d q_m - tau        motor side; the motor encoder reads q_m
+    mesh:  tau = K dz(q_m - q_l; gap) + D d/dt(...)          in contact only, dz the dead zone of TOTAL width gap
+    link:  ... dd q_l = tau - f_c sign(d q_l) - f_v d q_l    the link encoder reads q_l
+
+The rotor is a sibling body of the link on the same axis, so that the reaction acts on the parent; the mesh is a fixed
+tendon q_l - q_m limited to +-gap/2 whose soft limit is the spring. With constant impedance d the limit's stiffness is
+K = S / ((1 - d) iw) with iw the tendon's inverse weight in the compiled model: S is set from it after each compile.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from twin.defects.base import Defect, Parameter, joint
+
+_IMPEDANCE = 0.02
+_ROTOR_MASS = 1e-4  # [kg] a moving body must have some
+_ROTOR_INERTIA = 1e-8  # [kg.m2] of the body itself; the rotor's real inertia is its armature
+_OPEN = 1e-9  # [rad] half width that stands for no play at all
+
+
+def rotor_joint(joint_name: str) -> str:
+    """Name of the motor-side joint of a geared joint."""
+    return f"{joint_name}.motor"
+
+
+@dataclass(frozen=True)
+class Gear(Defect):
+    """Gear of one joint.
+
+    Attributes:
+        joint_name: The joint.
+        gap: Total play [rad].
+        stiffness: Of the mesh in contact [N.m/rad].
+        damping: Of the mesh in contact [N.m.s/rad].
+        coulomb: Friction of the link side [N.m].
+        viscous: Friction of the link side [N.m.s/rad].
+        rotor_inertia: Reflected to the joint [kg.m2].
+        link_inertia: Of the output gear, fixed to the link [kg.m2].
+        servo_stiffness: Position gain on the motor side [N.m/rad].
+        servo_damping: Velocity gain on the motor side [N.m.s/rad].
+    """
+
+    joint_name: str
+    gap: float
+    stiffness: float
+    damping: float
+    coulomb: float
+    viscous: float
+    rotor_inertia: float
+    link_inertia: float
+    servo_stiffness: float
+    servo_damping: float
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add the rotor, the mesh and the servo."""
+        link_joint = joint(spec, self.joint_name)
+        link_joint.frictionloss = self.coulomb
+        link_joint.damping = np.array([self.viscous, 0.0, 0.0])
+        link_joint.armature = self.link_inertia
+        link = link_joint.parent
+        rotor = link.parent.add_body(name=f"{self.joint_name}.rotor", pos=link.pos, quat=link.quat)
+        rotor.mass, rotor.inertia, rotor.explicitinertial = _ROTOR_MASS, np.full(3, _ROTOR_INERTIA), True
+        rotor.ipos, rotor.iquat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        name = rotor_joint(self.joint_name)
+        rotor.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=link_joint.axis, armature=self.rotor_inertia)
+        mesh = spec.add_tendon(name=f"{self.joint_name}.mesh", limited=True)
+        mesh.wrap_joint(self.joint_name, 1.0)
+        mesh.wrap_joint(name, -1.0)
+        mesh.range = np.array([-0.5, 0.5]) * max(self.gap, 2.0 * _OPEN)
+        mesh.solimp_limit = np.array([_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0])
+        add_servo(spec, name, self.servo_stiffness, self.servo_damping)
+
+    def tune(self, model: mujoco.MjModel) -> None:
+        """Turn stiffness and damping into the limit's reference parameters."""
+        i = model.tendon(f"{self.joint_name}.mesh").id
+        scale = (1.0 - _IMPEDANCE) * model.tendon_invweight0[i]
+        model.tendon_solref_lim[i] = -self.stiffness * scale, -self.damping * scale
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Play, compliance and friction."""
+        j = self.joint_name
+        return (
+            Parameter(f"backlash.{j}.gap", "rad", self.gap),
+            Parameter(f"gear.{j}.compliance", "rad/(N.m)", 1.0 / self.stiffness),
+            Parameter(f"gear.{j}.damping", "N.m.s/rad", self.damping),
+            Parameter(f"gear.{j}.rotor_inertia", "kg.m2", self.rotor_inertia),
+            Parameter(f"gear.{j}.link_inertia", "kg.m2", self.link_inertia),
+            Parameter(f"friction.{j}.coulomb", "N.m", self.coulomb),
+            Parameter(f"friction.{j}.viscous", "N.m.s/rad", self.viscous),
+        )
+
+
+@dataclass(frozen=True)
+class DirectDrive(Defect):
+    """A joint whose motor is fixed to it without play: the torso's spindle.
+
+    Attributes:
+        joint_name: The joint.
+        rotor_inertia: Reflected [kg or kg.m2].
+        servo_stiffness: Position gain [N/m or N.m/rad].
+        servo_damping: Velocity gain [N.s/m or N.m.s/rad].
+    """
+
+    joint_name: str
+    rotor_inertia: float
+    servo_stiffness: float
+    servo_damping: float
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add rotor inertia and servo."""
+        joint(spec, self.joint_name).armature = self.rotor_inertia
+        add_servo(spec, self.joint_name, self.servo_stiffness, self.servo_damping)
+
+
+def add_servo(spec: mujoco.MjSpec, joint_name: str, stiffness: float, damping: float) -> None:
+    """Position servo: force = kp (u - q) - kv dq, named after the joint it drives."""
+    servo = spec.add_actuator(name=joint_name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint_name)
+    servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    servo.gainprm = np.array([stiffness, *np.zeros(9)])
+    servo.biasprm = np.array([0.0, -stiffness, -damping, *np.zeros(7)])

@@ -1,0 +1,151 @@
+"""From what a scenario says to one robot: every stochastic defect drawn from a stream of its own name."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from twin.config import MarkerBody, TwinConfig
+from twin.defects.base import Defect
+from twin.defects.gear import DirectDrive, Gear
+from twin.defects.ground import Wheel
+from twin.defects.loads import Flexibility, LinkMass, Payload
+from twin.defects.placements import Placement
+from twin.defects.sensing import Cluster, Encoder
+from twin.randomness import generator
+
+TORSO = "torso_lift_joint"
+TOOL = "gripper_grasping_frame"
+BASE = "base_footprint"
+_LINK_INERTIA = 0.004  # [kg.m2] output gear of an arm joint
+_DAMPING_RATIO = 1.2  # servo velocity gain over sqrt(kp J)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One drawn robot with its sensors and targets.
+
+    Attributes:
+        defects: What changes the body, in the order it is applied.
+        encoders: Motor and link encoders.
+        clusters: Marker bodies.
+        wheels: Its wheels, also among the defects.
+    """
+
+    defects: tuple[Defect, ...]
+    encoders: tuple[Encoder, ...]
+    clusters: tuple[Cluster, ...]
+    wheels: tuple[Wheel, ...]
+
+
+def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
+    """Draw one robot of the series; the same seed gives the same robot."""
+    wheels = _wheels(config)
+    return Robot(
+        defects=(
+            *_placements(config, seed),
+            *_masses(config, nominal, seed),
+            *_gears(config, seed),
+            _torso_drive(config),
+            Flexibility("torso_lift_link", config.torso.bending_stiffness, config.torso.bending_damping),
+            *wheels,
+            _payload(config, seed),
+        ),
+        encoders=_encoders(config, seed),
+        clusters=tuple(_cluster(name, body, seed) for name, body in config.instruments.bodies.items()),
+        wheels=wheels,
+    )
+
+
+def _placements(config: TwinConfig, seed: int) -> tuple[Placement, ...]:
+    w = config.widths
+    widths = np.repeat([w.placement_translation, w.placement_rotation], 3)
+    names = (TORSO, *config.arm)
+    return tuple(Placement(n, generator(seed, "placement", n).normal(size=6) * widths) for n in names)
+
+
+def _masses(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> tuple[LinkMass, ...]:
+    """Links of the upper body with a mass of their own; the base's never moves against the plate."""
+    links = [nominal.body(i).name for i in range(nominal.nbody)]
+    heavy = [
+        n for n in links if nominal.body(n).mass[0] > 0 and n.startswith(("torso", "head", "arm", "wrist", "gripper"))
+    ]
+    w = config.widths
+
+    def one(link: str) -> LinkMass:
+        rng = generator(seed, "mass", link)
+        return LinkMass(link, 1.0 + w.link_mass * float(rng.uniform(-1.7, 1.7)), w.link_com * rng.normal(size=3))
+
+    return tuple(one(link) for link in heavy)
+
+
+def _factor(config: TwinConfig, seed: int, *names: str) -> float:
+    return 1.0 + config.widths.spread * float(generator(seed, "spread", *names).uniform(-1.0, 1.0))
+
+
+def _gears(config: TwinConfig, seed: int) -> tuple[Gear, ...]:
+    return tuple(
+        Gear(
+            joint_name=name,
+            gap=j.gap * _factor(config, seed, "gap", name),
+            stiffness=j.stiffness,
+            damping=j.damping,
+            coulomb=j.coulomb,
+            viscous=j.viscous,
+            rotor_inertia=j.rotor_inertia,
+            link_inertia=_LINK_INERTIA,
+            servo_stiffness=j.servo_stiffness,
+            servo_damping=_DAMPING_RATIO * float(np.sqrt(j.servo_stiffness * j.rotor_inertia)),
+        )
+        for name, j in config.arm.items()
+    )
+
+
+def _torso_drive(config: TwinConfig) -> DirectDrive:
+    t = config.torso
+    damping = _DAMPING_RATIO * float(np.sqrt(t.servo_stiffness * t.rotor_inertia))
+    return DirectDrive(TORSO, t.rotor_inertia, t.servo_stiffness, damping)
+
+
+def _wheels(config: TwinConfig) -> tuple[Wheel, ...]:
+    b = config.base
+    drive = [(f"wheel_{s}", f"wheel_{s}_link", b.drive) for s in ("left", "right")]
+    pairs = (("front", b.caster_front), ("back", b.caster_back))
+    casters = [(f"caster_{end}_{s}", f"caster_{end}_{s}_1_link", k) for end, k in pairs for s in ("left", "right")]
+    return tuple(
+        Wheel(n, link, f"{n}_contact", k.stiffness, k.damping, k.contact_stiffness, k.contact_damping, k.friction)
+        for n, link, k in (*drive, *casters)
+    )
+
+
+def _payload(config: TwinConfig, seed: int) -> Payload:
+    p = config.payload
+    shift = p.com_error * generator(seed, "payload").normal(size=3)
+    return Payload(TOOL, p.mass, np.array(p.com) + shift, np.array(p.size))
+
+
+def _encoders(config: TwinConfig, seed: int) -> tuple[Encoder, ...]:
+    still = (0.0, 0.0, 0.0, 0.0)
+    link = config.instruments.link_encoders
+    found = [Encoder(TORSO, "motor", 0.0, still, config.torso.quantum)]
+    for name, j in config.arm.items():
+        found.append(Encoder(name, "motor", j.offset * _factor(config, seed, "offset", name), still, j.quantum))
+        rng = generator(seed, "link encoder", name)
+        offset, *waves = rng.normal(size=5) * [link.offset, *np.repeat([link.once, link.twice], 2) / np.sqrt(2.0)]
+        found.append(Encoder(name, "link", float(offset), (waves[0], waves[1], waves[2], waves[3]), link.quantum))
+    return tuple(found)
+
+
+def _cluster(name: str, body: MarkerBody, seed: int) -> Cluster:
+    rng = generator(seed, "cluster", name)
+    nominal = np.array(list(body.markers.values()))
+    frames = {BASE: f"base.{name}", TOOL: "tool.hand"}.get(body.link, f"{body.link}.{name}")
+    return Cluster(
+        name=name,
+        link=body.link,
+        frames=frames,
+        xi=rng.normal(size=6) * np.repeat([body.translation, body.rotation], 3),
+        marker_names=tuple(body.markers),
+        nominal=nominal,
+        shift=rng.normal(size=nominal.shape) * body.marker,
+    )

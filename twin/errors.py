@@ -1,0 +1,40 @@
+"""What can go wrong in a simulation."""
+
+from collections.abc import Iterable
+
+
+class TwinError(Exception):
+    """Root of every error of this package."""
+
+
+class UnknownElement(TwinError):
+    """A name that is not in the model."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        self.name = name
+        super().__init__(f"no {kind} named {name!r}; the model has {sorted(known)}")
+
+
+class Diverged(TwinError):
+    """A simulation that left the numbers.
+
+    Attributes:
+        trial: The trial concerned.
+        time: When it happened [s from the start of the simulation].
+        joint: The first joint whose state is not finite.
+    """
+
+    def __init__(self, trial: str, time: float, joint: str) -> None:
+        self.trial, self.time, self.joint = trial, time, joint
+        super().__init__(
+            f"trial {trial!r} diverged at {time:.3f} s in joint {joint!r}; "
+            "lower the stiffness named by that joint or the time step"
+        )
+
+
+class NotStanding(TwinError):
+    """A robot that tipped over or left its plate."""
+
+
+class Unreachable(TwinError):
+    """A motion that the robot cannot make."""

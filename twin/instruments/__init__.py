@@ -1,0 +1,1 @@
+"""What a laboratory and a robot measure; one file an instrument."""

@@ -1,0 +1,40 @@
+"""Clocks: each instrument reads its own.
+
+t_mocap = t (1 + drift) + offset        true time of the campaign is the mocap clock's
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.defects.base import Parameter
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The clock of one instrument.
+
+    Attributes:
+        instrument: Its name.
+        offset: [s].
+        drift: [-].
+    """
+
+    instrument: str
+    offset: float = 0.0
+    drift: float = 0.0
+
+    def reading(self, true: np.ndarray) -> np.ndarray:
+        """What the clock shows at true times (n,) [s]."""
+        return (np.asarray(true) - self.offset) / (1.0 + self.drift)
+
+    def ticks(self, start: float, stop: float, rate: float) -> tuple[np.ndarray, np.ndarray]:
+        """Regular samples of this clock within true times start..stop: readings (n,) and true times (n,) [s]."""
+        first, last = np.ceil(self.reading(np.array([start, stop])) * rate - [1e-9, 0.0])
+        shown = np.arange(int(first), int(last)) / rate
+        return shown, shown * (1.0 + self.drift) + self.offset
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Offset and drift."""
+        name = f"clock.{self.instrument}"
+        return Parameter(f"{name}.offset", "s", self.offset), Parameter(f"{name}.drift", "-", self.drift)

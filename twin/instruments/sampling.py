@@ -1,0 +1,27 @@
+"""From dense states at the simulation's steps to samples at an instrument's times."""
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+
+
+def interpolate(t: np.ndarray, grid: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Linear interpolation (n, ...) of dense values (m, ...) at times t; exact to a dt^2 / 8: 1 um at 10 m/s^2 and 1 ms."""
+    i = np.clip(np.searchsorted(grid, t, side="right") - 1, 0, len(grid) - 2)
+    w = ((t - grid[i]) / (grid[i + 1] - grid[i])).reshape(-1, *(1,) * (values.ndim - 1))
+    return (1.0 - w) * values[i] + w * values[i + 1]
+
+
+def interpolate_poses(t: np.ndarray, grid: np.ndarray, T: np.ndarray) -> np.ndarray:
+    """Poses (n, 4, 4) at times t from dense poses (m, 4, 4): linear in position, great arcs in rotation."""
+    rotation = Slerp(grid, Rotation.from_matrix(T[:, :3, :3]))(np.clip(t, grid[0], grid[-1]))
+    return RigidTransform.from_components(interpolate(t, grid, T[:, :3, 3]), rotation).as_matrix()
+
+
+def averaged(t: np.ndarray, grid: np.ndarray, values: np.ndarray, width: float) -> np.ndarray:
+    """Mean of dense values over [t - width/2, t + width/2], as an integrating instrument samples (n, ...)."""
+    step = grid[1] - grid[0]
+    integral = np.zeros_like(values)
+    integral[1:] = np.cumsum(0.5 * step * (values[1:] + values[:-1]), axis=0)
+    low, high = np.clip(t - width / 2, grid[0], grid[-1]), np.clip(t + width / 2, grid[0], grid[-1])
+    span = (high - low).reshape(-1, *(1,) * (values.ndim - 1))
+    return (interpolate(high, grid, integral) - interpolate(low, grid, integral)) / span

@@ -1,0 +1,39 @@
+"""The trials of a campaign, in the order they are recorded."""
+
+import mujoco
+
+from calibration.schema import Role
+from twin import motions, postures
+from twin.config import Campaign
+from twin.motions import Motion
+from twin.randomness import generator
+
+
+def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
+    """Calibration first (statics, sweeps, swings), then validation (swings, other statics)."""
+    return (
+        _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign),
+        *_sweeps(campaign),
+        *_swings("calibration", campaign.calibration_swing, motions.CALIBRATION_SWINGS, campaign),
+        *_swings("validation", campaign.validation_swing, motions.VALIDATION_SWINGS, campaign),
+        _statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
+    )
+
+
+def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> Motion:
+    """The first posture is where the trial starts, the n that follow are dwelt in."""
+    q = postures.draw(nominal, n + 1, generator(seed, "postures", role))
+    return motions.postures(id, role, q, campaign)
+
+
+def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:
+    return tuple(
+        motions.swing(
+            f"sweep_{j}", "calibration", "sweep", motions.sweep_path(j, campaign.sweep), campaign.sweep, campaign
+        )
+        for j in motions.JOINTS[1:]
+    )
+
+
+def _swings(role: Role, duration: float, paths: dict[str, motions.Swing], campaign: Campaign) -> tuple[Motion, ...]:
+    return tuple(motions.swing(name, role, "swing", path, duration, campaign) for name, path in paths.items())
