@@ -1,1 +1,5 @@
-"""Placeholder."""
+"""Campaigns described in a file: simulate, calibrate, evaluate, report."""
+
+from scenarios.steps import RunResult, load, run
+
+__all__ = ["RunResult", "load", "run"]

@@ -1,0 +1,176 @@
+"""The command `tiago-twin`.
+
+Exit code 0: done. 1: the simulation or the fit failed, or its result must not be used. 2: wrong input.
+"""
+
+import logging
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from scenarios.errors import ScenarioError
+
+FAILED = 1
+WRONG_INPUT = 2
+TERMINATED = 128 + signal.SIGTERM
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="A robot whose truth is known, measured, calibrated and judged.",
+)
+
+ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.")]
+Out = Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, metavar="N", help="Root of all randomness, instead of the scenario's.")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="The scenario's short variant.")]
+Overrides = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="A value instead of the scenario's; repeatable.")
+]
+
+
+@app.callback()
+def options(verbose: Annotated[bool, typer.Option("--verbose", help="Say more on stderr.")] = False) -> None:
+    """Set up logging."""
+    level = logging.INFO if verbose else logging.WARNING
+    logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
+
+
+@app.command("list")
+def list_scenarios() -> None:
+    """List the scenarios."""
+    from scenarios import registry, steps
+
+    for name in registry.names():
+        typer.echo(f"{name}  {steps.load(name).description}")
+
+
+@app.command()
+def run(
+    scenario: ScenarioName,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The run folder; runs/NAME unless given.")] = None,
+    seed: Seed = None,
+    quick: Quick = False,
+    overrides: Overrides = None,
+) -> None:
+    """Simulate, calibrate, evaluate and report."""
+    from scenarios import console, steps
+
+    loaded = steps.load(scenario, _overrides(overrides, seed))
+    out = out or Path("runs") / loaded.name
+    with console.progress() as progress:
+        result = steps.run(loaded, out, quick=quick, progress=progress)
+    console.show(console.ladder(out))
+    typer.echo(f"\nReport: {out / 'report.html'}")
+    _require_usable(result.estimate.status)
+
+
+@app.command()
+def simulate(
+    scenario: ScenarioName, out: Out, seed: Seed = None, quick: Quick = False, overrides: Overrides = None
+) -> None:
+    """Write dataset/ and truth/ of a scenario."""
+    from scenarios import console, steps
+
+    loaded = steps.load(scenario, _overrides(overrides, seed))
+    with console.progress() as progress:
+        steps.simulate(loaded.quick() if quick else loaded, out, progress)
+    typer.echo(f"Dataset: {out / 'dataset'}\nTruth: {out / 'truth'}")
+
+
+@app.command()
+def calibrate(
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder, the twin's or a real one.")],
+    out: Out,
+    stages: Annotated[str | None, typer.Option(metavar="A,B,...", help="Only these stages, in this order.")] = None,
+) -> None:
+    """Write an estimate from a dataset folder alone."""
+    from scenarios import console, steps
+
+    chosen = None if stages is None else [stage.strip() for stage in stages.split(",")]
+    with console.progress() as progress:
+        estimate = steps.calibrate(dataset, out, chosen, progress)
+    console.show(console.verdicts(estimate.verdicts))
+    typer.echo(f"\nEstimate: {out}")
+    _require_usable(estimate.status)
+
+
+@app.command()
+def evaluate(
+    estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE", help="An estimate folder or file.")],
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder.")],
+    out: Out,
+    truth: Annotated[Path | None, typer.Option(metavar="TRUTH", help="A truth folder: adds score.json.")] = None,
+) -> None:
+    """Write the held-out error of an estimate."""
+    from scenarios import console, steps
+
+    with console.progress() as progress:
+        steps.evaluate(estimate, dataset, out, truth, progress)
+    console.show(console.ladder(out))
+
+
+@app.command()
+def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
+    """Write report.html from what a run folder holds."""
+    from scenarios import console, steps
+
+    with console.progress() as progress:
+        page = steps.report(run_folder, progress)
+    typer.echo(f"Report: {page}")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command and exit with its code; what a user can mend or must know is told without a traceback."""
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        app(args=arguments, prog_name="tiago-twin")
+    except SystemExit:
+        raise
+    except ScenarioError as error:
+        _fail(error, WRONG_INPUT)
+    except OSError as error:
+        _fail(error, FAILED)
+    except _domain_errors() as error:
+        from calibration.errors import InputError
+
+        _fail(error, WRONG_INPUT if isinstance(error, InputError) else FAILED)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _domain_errors() -> tuple[type[Exception], ...]:
+    """Return the roots of the engines' errors; asked only when there is one, since the engines import slowly."""
+    from calibration.errors import CalibrationError
+    from twin.errors import TwinError
+
+    return CalibrationError, TwinError
+
+
+def _overrides(given: Sequence[str] | None, seed: int | None) -> list[str]:
+    return [*(given or ()), *(() if seed is None else (f"seed={seed}",))]
+
+
+def _require_usable(status: str) -> None:
+    if status != "calibrated":
+        typer.echo(f"The estimate must not be used: {status}", err=True)
+        raise typer.Exit(FAILED)
+
+
+def _fail(error: Exception, code: int) -> None:
+    typer.echo(str(error), err=True)
+    sys.exit(code)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    """Leave through the same clean-up as on Ctrl-C."""
+    sys.exit(TERMINATED)

@@ -1,0 +1,120 @@
+"""What the command line shows: progress on stderr, tables on stdout."""
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from scenarios.steps import Progress
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+PLAIN_WIDTH = 120
+"""Width of a table where there is no terminal [characters]."""
+
+PLAIN_PERIOD = 5.0
+"""Time between two progress lines of one step where there is no terminal [s]."""
+
+
+@contextmanager
+def progress() -> Iterator[Progress]:
+    """Yield what shows the progress of the steps: a bar each on a terminal, a line now and then elsewhere."""
+    console = Console(stderr=True)
+    if console.is_terminal:
+        with _bars(console) as show:
+            yield show
+    else:
+        yield _lines(console)
+
+
+@contextmanager
+def _bars(console: Console) -> Iterator[Progress]:
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    steps: dict[str, TaskID] = {}
+    step_name, at_what = (TextColumn(text, markup=False) for text in ("{task.description:<10}", "{task.fields[at]}"))
+    with Bars(step_name, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), at_what, console=console) as bars:
+
+        def show(step: str, at: str, fraction: float) -> None:
+            if step not in steps:
+                _finish(bars, steps)
+                steps[step] = bars.add_task(step, total=1.0, at=at)
+            bars.update(steps[step], completed=fraction, at=at)
+
+        yield show
+        _finish(bars, steps)
+
+
+def _finish(bars: Any, steps: dict[str, "TaskID"]) -> None:
+    for task in steps.values():
+        bars.update(task, completed=1.0, at="")
+        bars.stop_task(task)
+
+
+def _lines(console: Console) -> Progress:
+    last_step, last_time = "", 0.0
+
+    def show(step: str, at: str, fraction: float) -> None:
+        nonlocal last_step, last_time
+        now = time.monotonic()
+        if step != last_step or now - last_time > PLAIN_PERIOD:
+            line = f"{step} {fraction:4.0%} {at}" if fraction or at else step
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+            last_step, last_time = step, now
+
+    return show
+
+
+def show(table: Table) -> None:
+    """Print a table on stdout."""
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=PLAIN_WIDTH)
+    console.print(table)
+
+
+def ladder(results: Path) -> Table:
+    """Return the table of a folder's evaluation: against the truth where score.json has it, else against mocap."""
+    path = results / "score.json"
+    rows = _rows(path if path.is_file() else results / "evaluation.json")
+    against = ", ".join(sorted({row["against"] for row in rows}))
+    table = Table(
+        title=f"Held-out error of the hand, against {against}", title_justify="left", box=None, pad_edge=False
+    )
+    for name in ("row", "base", "encoder", "trials"):
+        table.add_column(name)
+    for name in ("position RMSE\nper component [mm]", "position RMSE\nnorm [mm]", "orientation\nRMSE [deg]"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        table.add_row(
+            row["model"],
+            row["base"],
+            row["encoder"],
+            row["trials"],
+            f"{row['position_rmse_component_mm']:.2f}",
+            f"{row['position_rmse_norm_mm']:.2f}",
+            f"{row['orientation_rmse_deg']:.3f}",
+        )
+    return table
+
+
+def verdicts(found: Sequence[Any]) -> Table:
+    """Return the table of what each stage says of its own result."""
+    table = Table(box=None, pad_edge=False)
+    for name in ("stage", "verdict", "message"):
+        table.add_column(name, overflow="fold")
+    for verdict in found:
+        table.add_row(verdict.stage, verdict.verdict, verdict.message)
+    return table
+
+
+def _rows(path: Path) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    return rows

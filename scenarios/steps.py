@@ -1,0 +1,188 @@
+"""The steps of a campaign, each from a scenario or from files to files.
+
+    simulate: a scenario -> dataset/, truth/        calibrate: dataset/ -> estimate/
+    evaluate: estimate/, dataset/ -> evaluation.json, and score.json with truth/        report: all of it -> report.html
+
+Only dataset/ crosses from the simulation to the calibration. What a step writes is there whole or not at all.
+Importing this module is cheap: the engines are imported by the step that needs them.
+"""
+
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenarios import folder
+from scenarios.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from calibration import Estimate, Evaluation
+    from scenarios.schema import Scenario
+    from scenarios.score import Score
+
+Progress = Callable[[str, str, float], None]
+"""Called with the step, what it is at, and the fraction of the step that is done [-]."""
+
+PACKAGES = ("tiago-twin", "mujoco", "pin", "numpy", "scipy")
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A run that was written.
+
+    Attributes:
+        folder: The run folder.
+        scenario: What was run, as resolved.
+        estimate: What the calibration found.
+        evaluation: Its held-out error against the recordings.
+        score: Its error against the truth.
+    """
+
+    folder: Path
+    scenario: "Scenario"
+    estimate: "Estimate"
+    evaluation: "Evaluation"
+    score: "Score"
+
+
+def silent(step: str, at: str, fraction: float) -> None:
+    """Show no progress."""
+
+
+def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
+    """Read a scenario, one of ours by its name or any by its path; `path.to.field=value` overrides its values.
+
+    A run's scenario.yaml is a scenario: the versions noted in it are read and not used.
+
+    Raises:
+        ScenarioError: There is none, or something in it is wrong; all findings at once.
+    """
+    from scenarios import registry
+
+    path = registry.find(name_or_path)  # an unknown name is told before the engines are imported
+
+    from scenarios import yaml_file
+    from scenarios.schema import Scenario
+
+    return yaml_file.read(path, Scenario, overrides, beside={"versions": dict[str, str]})
+
+
+def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress: Progress = silent) -> RunResult:
+    """Simulate, calibrate, evaluate and report into the run folder `out`.
+
+    Args:
+        scenario: What to run.
+        out: The run folder; an earlier run there is replaced once this one is complete.
+        quick: Run the scenario's short variant.
+        progress: Told how far each step is.
+
+    Raises:
+        ScenarioError: `out` must not be overwritten.
+        TwinError: The simulation failed.
+        CalibrationError: The data do not allow a result.
+    """
+    scenario = scenario.quick() if quick else scenario
+    with folder.replacing(out, folder.RUN) as new:
+        _simulate(scenario, new, progress)
+        estimate = _calibrate(new / "dataset", new / "estimate", None, progress)
+        evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
+        score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation)
+        _report(new, progress)
+    return RunResult(Path(out), scenario, estimate, evaluation, score)
+
+
+def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent) -> None:
+    """Write dataset/, truth/ and scenario.yaml into the run folder `out`."""
+    with folder.replacing(out, folder.RUN) as new:
+        _simulate(scenario, new, progress)
+
+
+def calibrate(
+    dataset: Path | str, out: Path | str, stages: Sequence[str] | None = None, progress: Progress = silent
+) -> "Estimate":
+    """Write the estimate folder `out` from a dataset folder alone; None runs every stage the data allow."""
+    with folder.replacing(out, folder.ESTIMATE) as new:
+        return _calibrate(Path(dataset), new, stages, progress)
+
+
+def evaluate(
+    estimate: Path | str,
+    dataset: Path | str,
+    out: Path | str,
+    truth: Path | str | None = None,
+    progress: Progress = silent,
+) -> tuple["Evaluation", "Score | None"]:
+    """Write evaluation.json into the folder `out`, and score.json where a truth is given; the rest of `out` stays."""
+    with folder.updating(out, folder.EVALUATION) as new:
+        evaluation = _evaluate(Path(estimate), Path(dataset), new, progress)
+        score = None if truth is None else _score(Path(estimate), Path(dataset), new, Path(truth), evaluation)
+    return evaluation, score
+
+
+def report(run_folder: Path | str, progress: Progress = silent) -> Path:
+    """Write report.html of a run folder from what is saved there; return its path.
+
+    Raises:
+        ScenarioError: The folder is not a run with an evaluation.
+    """
+    for name, maker in (("scenario.yaml", "tiago-twin run"), ("evaluation.json", "tiago-twin evaluate")):
+        if not (Path(run_folder) / name).is_file():
+            raise ScenarioError(f"{run_folder}: holds no {name}; a report is made of a run folder, see {maker} --help")
+    _report(Path(run_folder), progress)
+    return Path(run_folder) / "report.html"
+
+
+def versions() -> dict[str, str]:
+    """Versions of what decides the figures of a run."""
+    return {"python": platform.python_version(), **{package: version(package) for package in PACKAGES}}
+
+
+def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
+    import twin
+    from scenarios import yaml_file
+
+    progress("simulate", "", 0.0)
+    yaml_file.write(out / "scenario.yaml", scenario, beside={"versions": versions()})
+    twin.record(scenario.twin, scenario.seed, out, lambda at, fraction: progress("simulate", at, fraction))
+
+
+def _calibrate(dataset: Path, out: Path, stages: Sequence[str] | None, progress: Progress) -> "Estimate":
+    import calibration
+
+    progress("calibrate", "", 0.0)
+    estimate = calibration.calibrate(
+        calibration.load(dataset), stages, lambda at, fraction: progress("calibrate", at, fraction)
+    )
+    estimate.save(out)
+    return estimate
+
+
+def _evaluate(estimate: Path, dataset: Path, out: Path, progress: Progress) -> "Evaluation":
+    import calibration
+
+    progress("evaluate", "", 0.0)
+    evaluation = calibration.evaluate(
+        calibration.load_estimate(estimate),
+        calibration.load(dataset),
+        lambda at, fraction: progress("evaluate", at, fraction),
+    )
+    evaluation.save(out)
+    return evaluation
+
+
+def _score(estimate: Path, dataset: Path, out: Path, truth: Path, evaluation: "Evaluation") -> "Score":
+    import calibration
+    from scenarios.score import score
+
+    scored = score(calibration.load_estimate(estimate), calibration.load(dataset), truth, evaluation)
+    scored.save(out)
+    return scored
+
+
+def _report(run_folder: Path, progress: Progress) -> None:
+    from scenarios import report as page
+
+    progress("report", "", 0.0)
+    page.write(run_folder)
