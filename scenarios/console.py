@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from scenarios.steps import Progress
@@ -85,33 +86,31 @@ def ladder(results: Path) -> Table:
     path = results / "score.json"
     rows = _rows(path if path.is_file() else results / "evaluation.json")
     against = ", ".join(sorted({row["against"] for row in rows}))
-    table = Table(
-        title=f"Held-out error of the hand, against {against}", title_justify="left", box=None, pad_edge=False
-    )
-    for name in ("row", "base", "encoder", "trials"):
-        table.add_column(name)
-    for name in ("position RMSE\nper component [mm]", "position RMSE\nnorm [mm]", "orientation\nRMSE [deg]"):
-        table.add_column(name, justify="right")
+    columns = ("position RMSE\nper component [mm]", "position RMSE\nnorm [mm]", "orientation\nRMSE [deg]")
+    table = _table("row", "base", "encoder", "trials", *columns)
+    table.title, table.title_justify = f"Held-out error of the hand, against {against}", "left"
+    for column in table.columns[4:]:
+        column.justify = "right"
     for row in rows:
-        table.add_row(
-            row["model"],
-            row["base"],
-            row["encoder"],
-            row["trials"],
-            f"{row['position_rmse_component_mm']:.2f}",
-            f"{row['position_rmse_norm_mm']:.2f}",
-            f"{row['orientation_rmse_deg']:.3f}",
-        )
+        position = (f"{row[key]:.2f}" for key in ("position_rmse_component_mm", "position_rmse_norm_mm"))
+        names = (str(row[key]) for key in ("model", "base", "encoder", "trials"))
+        table.add_row(*names, *position, f"{row['orientation_rmse_deg']:.3f}")
     return table
 
 
 def verdicts(found: Sequence[Any]) -> Table:
     """Return the table of what each stage says of its own result."""
-    table = Table(box=None, pad_edge=False)
-    for name in ("stage", "verdict", "message"):
-        table.add_column(name, overflow="fold")
+    table = _table("stage", "verdict", "message")
     for verdict in found:
-        table.add_row(verdict.stage, verdict.verdict, verdict.message)
+        table.add_row(*(escape(str(text)) for text in (verdict.stage, verdict.verdict, verdict.message)))
+    return table
+
+
+def _table(*columns: str) -> Table:
+    """Return an empty table without lines; a unit in brackets is no markup."""
+    table = Table(box=None, pad_edge=False)
+    for name in columns:
+        table.add_column(escape(name), overflow="fold")
     return table
 
 
