@@ -76,5 +76,5 @@ def test_steps_are_bars_on_a_terminal(fails):
             work()
     else:
         work()
-    last = {step: re.findall(rf"{step}.*? (\d+)%", stream.getvalue())[-1] for step in ("simulate", "calibrate")}
+    last = {step: re.findall(rf"{step}.*?m *(\d+)%", stream.getvalue())[-1] for step in ("simulate", "calibrate")}
     assert last == {"simulate": "100", "calibrate": "25" if fails else "100"}
