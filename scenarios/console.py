@@ -27,7 +27,7 @@ PLAIN_PERIOD = 5.0
 def progress() -> Iterator[Progress]:
     """Yield what shows the progress of the steps: a bar each on a terminal, a line now and then elsewhere."""
     console = Console(stderr=True)
-    if console.is_terminal:
+    if console.is_terminal and not console.is_dumb_terminal:
         with _bars(console) as show:
             yield show
     else:

@@ -109,6 +109,8 @@ class Engines:
 @pytest.fixture
 def engines(monkeypatch, tmp_path):
     """Replace every engine, offer one scenario `small`, and work in an empty folder."""
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
+        monkeypatch.delenv(name, raising=False)
     fakes = Engines()
     for package, name in (
         (twin, "record"),
