@@ -49,9 +49,10 @@ class Source:
             path = _path(self.values, (*above, *detail["loc"]), detail["type"])
             known = _fields(adapter, self.values, above, path[:-1]) if detail["type"] in UNKNOWN else []
             text = ": ".join(part for part in (".".join(path), _message(detail, path, known)) if part)
-            line, column, whole = _place(self.tree, path, of_key=detail["type"] in UNKNOWN + MISSING)
-            in_file = whole or detail["type"] in MISSING
-            if any(override.explains(path, in_file) for override in self.overrides):
+            line, column, _ = _place(self.tree, path, of_key=detail["type"] in UNKNOWN + MISSING)
+            holder = path[:-1] if detail["type"] in MISSING else path
+            *_, in_file = _place(self.tree, holder, of_key=False)
+            if any(override.explains(holder, in_file) for override in self.overrides):
                 placed.append((1, 0, 0, f"--set {text}"))
             else:
                 placed.append((0, line, column, f"{self.file}:{line + 1}:{column + 1}: {text}"))

@@ -34,6 +34,12 @@ class Robot(BaseModel):
     size: tuple[float, float] = (0.5, 0.4)
 
 
+class Spare(BaseModel):
+    model_config = STRICT
+    mass: float
+    size: float
+
+
 class Example(BaseModel):
     model_config = STRICT
     name: str
@@ -41,6 +47,7 @@ class Example(BaseModel):
     robot: Robot = Robot(mass=70.0)
     defects: tuple[Annotated[Gear | Tyre, Field(discriminator="type")], ...] = ()
     rates: dict[str, float] = {}
+    spare: dict[str, Spare] = {}
 
 
 GOOD = """\
@@ -172,9 +179,11 @@ def test_an_override_within_a_default_keeps_the_rest_of_that_default(tmp_path):
     [
         ("robot.mass=-2", "--set robot.mass: Input should be greater than 0 (got -2)"),
         ("robot.mas=2", "--set robot.mas: unknown field; did you mean mass? (known here: mass, size)"),
-        ("robt.mass=2", "did you mean robot? (known here: defects, name, rates, robot, seed)"),
+        ("robt.mass=2", "did you mean robot? (known here: defects, name, rates, robot, seed, spare)"),
         ("robot=5", "--set robot: "),
         ("robot={mas: 5}", "--set robot.mas: unknown field"),
+        ("defects.0={type: tyre}", "--set defects.0.stiffness: missing"),
+        ("spare.left.mass=1", "--set spare.left.size: missing"),
         ("seed.x=2", "--set seed.x: seed is a single value, it has no field 'x'"),
         ("defects.7.gap=0", "--set defects.7.gap: '7' is not a position, counted from 0, in a list of 2"),
         ("seed", "--set seed: write path.to.field=value"),
