@@ -1,0 +1,39 @@
+"""A scenario: a robot, its laboratory and a seed, as typed and validated values."""
+
+from dataclasses import replace
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from twin import TwinConfig
+
+
+class Scenario(BaseModel):
+    """What a scenario file says.
+
+    Attributes:
+        name: Its name.
+        description: One line.
+        seed: Root of all randomness.
+        twin: Robot and laboratory.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    description: str
+    seed: Annotated[int, Field(ge=0)] = 0
+    twin: TwinConfig
+
+    def quick(self) -> "Scenario":
+        """The same robot and laboratory, a campaign of about 180 s: for tests, its figures are of less data."""
+        short = replace(
+            self.twin.campaign,
+            calibration_postures=24,
+            validation_postures=6,
+            dwell=0.9,
+            sweep=3.0,
+            calibration_swing=6.0,
+            validation_swing=8.0,
+        )
+        return self.model_copy(update={"twin": replace(self.twin, campaign=short)})
