@@ -37,3 +37,15 @@ class NoSuchElement(CalibrationError):
 
 class NotEnoughData(CalibrationError):
     """Recordings that cannot answer the question asked, with what would."""
+
+
+class NotCalibrated(CalibrationError):
+    """An estimate whose status forbids its use.
+
+    Attributes:
+        reasons: What its verdicts say.
+    """
+
+    def __init__(self, reasons: Sequence[str]) -> None:
+        self.reasons = tuple(reasons)
+        super().__init__(f"the estimate is not calibrated and must not be used: {'; '.join(reasons) or 'no model'}")

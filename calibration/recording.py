@@ -127,7 +127,7 @@ def write_trial(path: Path, trial: Trial) -> str:
         for label in ("joint", "marker", "plate"):
             file.dimensions[label] = len(getattr(trial, label))
         for label in _LABELS:
-            dims = ("marker" if label == "marker_body" else label,)
+            dims: tuple[str, ...] = ("marker" if label == "marker_body" else label,)
             names = np.array(getattr(trial, label), dtype=object)
             file.create_variable(label, dims, dtype=h5py.string_dtype(), data=names if len(names) else None)
         for name, (dims, units, meaning, frame) in _LAYOUT.items():

@@ -1,0 +1,87 @@
+"""Pose of a rigid marker cluster: weighted Kabsch, one SVD for all times.
+
+    minimise sum_m w_m |p_m - (R x_m + t)|^2        p measured [m, lab], x nominal [m, body]
+    R = V diag(1, 1, det) U'   of   sum_m w_m (x_m - x0)(p_m - p0)' = U S V'
+
+With noise sigma per axis and marker, the local twist (linear, angular) of the pose has covariance
+
+    sigma^2 (sum_m A_m' A_m)^-1,   A_m = [I, -[x_m]x]            [m, rad]
+
+Reference: Arun, Huang, Blostein, IEEE PAMI 1987; Umeyama, IEEE PAMI 1991.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.errors import NotEnoughData, ShapeError
+from calibration.recording import Trial
+from calibration.schema import Body
+from calibration.se3 import compose, skew
+
+_FLAT = 1e-6  # second singular value of a cluster over its first [-] below which it is a line
+
+
+@dataclass(frozen=True)
+class BodyPoses:
+    """Poses of a marker body.
+
+    Attributes:
+        T: (n, 4, 4) T_lab_body, NaN where fewer than 3 markers were seen.
+        residual: (n, m, 3) measured minus fitted marker positions [m, lab], NaN where occluded.
+        covariance: (n, 6, 6) of the local twist for 1 m of noise per axis; times sigma^2 [m, rad].
+    """
+
+    T: np.ndarray
+    residual: np.ndarray
+    covariance: np.ndarray
+
+
+def body_poses(xyz: np.ndarray, positions: np.ndarray) -> BodyPoses:
+    """Poses of a cluster with nominal markers xyz (m, 3) [m] from positions (n, m, 3) [m, lab], NaN = occluded."""
+    if positions.ndim != 3 or positions.shape[1:] != xyz.shape:
+        raise ShapeError("positions", positions.shape, ("n", *xyz.shape))
+    seen = np.isfinite(positions).all(axis=2)
+    w = seen.astype(float)[..., None]
+    count = np.maximum(w.sum(axis=1), 1.0)
+    p = np.where(seen[..., None], positions, 0.0)
+    x0, p0 = (w * xyz).sum(axis=1) / count, p.sum(axis=1) / count
+    x_c, p_c = w * (xyz - x0[:, None]), w * (p - p0[:, None])
+    U, _, Vt = np.linalg.svd(np.swapaxes(x_c, 1, 2) @ p_c)
+    V, Ut = np.swapaxes(Vt, 1, 2), np.swapaxes(U, 1, 2)
+    sign = np.ones((len(p), 3))
+    sign[:, 2] = np.linalg.det(V @ Ut)
+    R = (V * sign[:, None]) @ Ut
+    T = compose(R, p0 - np.einsum("nij,nj->ni", R, x0))
+    covariance, usable = _covariances(xyz, seen)
+    T[~usable] = np.nan
+    fitted = np.einsum("nij,mj->nmi", T[:, :3, :3], xyz) + T[:, None, :3, 3]
+    return BodyPoses(T, np.where(seen[..., None], positions, np.nan) - fitted, covariance)
+
+
+def poses_of(body: Body, trial: Trial) -> BodyPoses:
+    """Poses of a marker body throughout a trial, at its `t_mocap`.
+
+    Raises:
+        NotEnoughData: The trial does not record three of its markers.
+    """
+    recorded = {name: i for i, name in enumerate(trial.marker)}
+    markers = [m for m in body.markers if m.name in recorded]
+    if len(markers) < 3:
+        raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {[m.name for m in markers]} are recorded")
+    columns = [recorded[m.name] for m in markers]
+    return body_poses(np.array([m.xyz for m in markers]), trial.marker_position[:, columns])
+
+
+def _covariances(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit covariance (n, 6, 6) and whether the visible markers fix a pose (n,), once per visibility pattern."""
+    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    covariance = np.full((len(patterns), 6, 6), np.nan)
+    for k, pattern in enumerate(patterns):
+        x = xyz[pattern]
+        spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False) if len(x) >= 3 else np.zeros(2)
+        if spread[1] > _FLAT * max(spread[0], np.finfo(float).tiny):
+            A = np.concatenate([np.broadcast_to(np.eye(3), (len(x), 3, 3)), -skew(x)], axis=2)
+            covariance[k] = np.linalg.inv(np.einsum("mij,mik->jk", A, A))
+    which = which.reshape(len(seen))
+    return covariance[which], np.isfinite(covariance[:, 0, 0])[which]

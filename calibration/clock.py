@@ -1,0 +1,113 @@
+"""Epoch of an instrument on the motion-capture clock, from lags of several trials.
+
+    t_mocap = s (1 + drift) + offset                      s on the instrument's clock [s]
+    lag_k = offset + drift s_k + trial_k + noise_k        s_k the middle of trial k
+
+trial_k is a random effect (model error of a whole trial), its variance the one that makes chi2 equal its degrees of
+freedom. A trial far off the median line is left out and named. Times are centred before the line is fitted.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import theilslopes
+
+from calibration.errors import NotEnoughData
+from calibration.lag import Lag
+
+_DRIFT = 1e-4  # prior standard deviation of a clock's drift [-]: 100 ppm
+_FAR = 5.0  # robust standard deviations
+_FLOOR = 1e-4  # [s] deviations below this never make a trial an outlier
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock: t_mocap = t (1 + drift) + offset.
+
+    Attributes:
+        instrument: `robot` or `plate`.
+        offset: At t = 0 [s].
+        drift: [-].
+        covariance: (2, 2) of (offset, drift) [s, -].
+        epoch: Time on the instrument's clock [s] at which offset and drift are uncorrelated.
+        sigma: Standard deviation of t_mocap at `epoch` [s].
+    """
+
+    instrument: str
+    offset: float
+    drift: float
+    covariance: np.ndarray
+    epoch: float
+    sigma: float
+
+    def to_mocap(self, t: np.ndarray) -> np.ndarray:
+        """Times t [s] of the instrument on the motion-capture clock [s]."""
+        return t + (self.offset + self.drift * t)
+
+    def from_mocap(self, t: np.ndarray) -> np.ndarray:
+        """Times t [s] of the motion-capture clock on the instrument's clock [s]."""
+        return (t - self.offset) / (1.0 + self.drift)
+
+
+@dataclass(frozen=True)
+class TrialLag:
+    """Lag of one trial, at time s [s] of the instrument's clock."""
+
+    trial_id: str
+    s: float
+    lag: Lag
+
+
+def fit_clock(instrument: str, trials: list[TrialLag]) -> tuple[Clock, tuple[str, ...]]:
+    """The clock, and the ids of the trials left out.
+
+    Raises:
+        NotEnoughData: No trial gave a lag.
+    """
+    if not trials:
+        raise NotEnoughData(
+            f"no calibration trial tells the {instrument} clock from the motion-capture clock: record one with 10 s "
+            "of arm motion"
+        )
+    s = np.array([t.s for t in trials])
+    lag = np.array([t.lag.value for t in trials])
+    sigma = np.array([max(t.lag.sigma, 1e-7) for t in trials])
+    kept = _inliers(s, lag, sigma)
+    fit = _line(s[kept], lag[kept], sigma[kept])
+    (offset, drift), (var_lag, var_drift), centre = fit
+    J = np.array([[1.0, -centre], [0.0, 1.0]])
+    covariance = J @ np.diag([var_lag, var_drift]) @ J.T
+    clock = Clock(instrument, float(offset - drift * centre), float(drift), covariance, centre, float(np.sqrt(var_lag)))
+    return clock, tuple(t.trial_id for t, k in zip(trials, kept, strict=True) if not k)
+
+
+def _inliers(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Trials near the Theil-Sen line; all of them when there are fewer than four."""
+    if len(s) < 4:
+        return np.ones(len(s), dtype=bool)
+    slope = float(np.clip(theilslopes(lag, s)[0], -5.0 * _DRIFT, 5.0 * _DRIFT))
+    r = lag - slope * s
+    r = r - np.median(r)
+    spread = 1.4826 * np.median(np.abs(r))
+    return np.abs(r) <= np.maximum(_FAR * np.hypot(spread, sigma), _FLOOR)
+
+
+def _line(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> tuple[tuple[float, float], tuple[float, float], float]:
+    """(lag at the centre, drift), their variances, and the centre, with the random effect of trials included."""
+
+    def solve(extra: float) -> tuple[tuple[float, float], tuple[float, float], float, float]:
+        w = 1.0 / (sigma**2 + extra**2)
+        centre = float(w @ s / w.sum())
+        d, reference = s - centre, float(w @ lag / w.sum())
+        information = float(w @ d**2) + _DRIFT**-2
+        drift = float(w @ (d * (lag - reference))) / information
+        r = lag - reference - drift * d
+        return (reference, drift), (1.0 / float(w.sum()), 1.0 / information), centre, float(w @ r**2)
+
+    dof = len(s) - 2
+    extra = 0.0
+    if dof > 0 and solve(0.0)[3] > dof:
+        extra = float(brentq(lambda e: solve(e)[3] - dof, 0.0, 10.0 * max(np.ptp(lag), 1e-6), xtol=1e-9))
+    values, variances, centre, _ = solve(extra)
+    return values, variances, centre

@@ -1,0 +1,190 @@
+"""Stage `clocks`: each instrument's epoch on the motion-capture clock, from calibration trials.
+
+Robot: angular velocity of the hand in the base, turned onto the tool's axes by the rotation that fits best,
+
+    R w_mocap(t)  =  g w(q, dq)(t - lag) + b + sum a_jk J_j d(play_k(q_j) - q_j)/dt + sum c_j w_before_j x J_j
+
+w from the nominal chain at the motor-side readings, J_j the axis of joint j. The play terms keep a gear's backlash,
+which lags the link behind the motor by 4 gap / (pi amplitude omega), from passing as a clock error; the last ones
+are the zeros of the readings, to first order.
+Plate: its moments Mx, My against those of the nominal floating-base inverse dynamics, see `inverse_dynamics`.
+"""
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+import pinocchio as pin
+
+from calibration.bodies import poses_of
+from calibration.clock import Clock, TrialLag, fit_clock
+from calibration.errors import NotEnoughData
+from calibration.inverse_dynamics import base_moments, floating_model, plate_moments
+from calibration.lag import coarse_lag, fit_lag
+from calibration.markers import base_body, hand_body
+from calibration.play import play
+from calibration.recording import Trial
+from calibration.robot import Chain, chain_of
+from calibration.schema import Description
+from calibration.se3 import inverse
+from calibration.signals import Signal, body_rates, even, low_passed
+from calibration.verdict import Verdict
+
+_CUTOFF = 6.0  # robot [Hz]
+_HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
+_MOVES = 8.0  # a joint whose range exceeds this many half gaps gets that play term
+_log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What two clocks are compared by.
+
+    Attributes:
+        trial_id: The trial.
+        y: The noisier of the two, whose residual is minimised.
+        x: The other.
+        nuisance: (n, k, c) of the instant of x.
+        sign: 1 where y is on the mocap clock, -1 where it is on the instrument's.
+    """
+
+    trial_id: str
+    y: Signal
+    x: Signal
+    nuisance: np.ndarray
+    sign: int
+
+
+def synchronise(
+    urdf: str, description: Description, trials: Sequence[Trial]
+) -> tuple[tuple[Clock, ...], tuple[Verdict, ...]]:
+    """Clocks of the instruments recorded in these trials, the robot's first.
+
+    Raises:
+        NotEnoughData: The robot's clock cannot be told from the motion capture's.
+    """
+    robot, verdicts = _clock("robot", _robot_motions(description, chain_of(urdf, description), trials))
+    if not any(len(trial.t_plate) for trial in trials):
+        return (robot,), (*verdicts, Verdict("clocks", "missing", "no force plate: no plate clock, no plate wrench"))
+    try:
+        plate, more = _clock("plate", _plate_motions(urdf, description, trials, robot))
+    except NotEnoughData as error:
+        return (robot,), (*verdicts, Verdict("clocks", "missing", f"no plate clock: {error}"))
+    return (robot, plate), (*verdicts, *more)
+
+
+def _clock(instrument: str, motions: Iterator[Motion]) -> tuple[Clock, tuple[Verdict, ...]]:
+    """Two passes: the second knows the drift within a trial."""
+    kept = list(motions)
+    starts = _each(kept, lambda m: m.sign * coarse_lag(m.y, m.x))
+    lags = _each(kept, lambda m: _trial_lag(m, starts[m.trial_id], 0.0))
+    first, _ = fit_clock(instrument, list(lags.values()))
+    lags = _each(
+        [m for m in kept if m.trial_id in lags], lambda m: _trial_lag(m, lags[m.trial_id].lag.value, first.drift)
+    )
+    clock, outliers = fit_clock(instrument, list(lags.values()))
+    message = (
+        f"{instrument}: offset {clock.offset:.6f} s, drift {1e6 * clock.drift:.1f} ppm, "
+        f"{1e3 * clock.sigma:.3f} ms at its middle, {len(lags) - len(outliers)} trials"
+    )
+    found = [Verdict("clocks", "ok", message)]
+    if outliers:
+        found.append(Verdict("clocks", "warning", f"{instrument}: trials off the others' clock left out: {outliers}"))
+    return clock, tuple(found)
+
+
+def _each(motions: list[Motion], function: Callable[[Motion], T]) -> dict[str, T]:
+    """Results by trial, without the trials that cannot answer."""
+    results = {}
+    for motion in motions:
+        try:
+            results[motion.trial_id] = function(motion)
+        except NotEnoughData as error:
+            _log.info("%s: %s", motion.trial_id, error)
+    return results
+
+
+def _trial_lag(motion: Motion, start: float, drift: float) -> TrialLag:
+    lag = fit_lag(motion.y, motion.x, motion.nuisance, motion.sign * start, motion.sign * drift)
+    middle = 0.5 * (motion.y.t[0] + motion.y.t[-1])
+    s = middle - lag.value if motion.sign > 0 else middle
+    return TrialLag(motion.trial_id, s, replace(lag, value=motion.sign * lag.value))
+
+
+def _robot_motions(description: Description, chain: Chain, trials: Sequence[Trial]) -> Iterator[Motion]:
+    """Angular velocity of the hand in the base, of every trial that shows one."""
+    base, hand = base_body(description), hand_body(description)
+    for trial in trials:
+        try:
+            T_base_hand = inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
+            y = low_passed(even(*body_rates(trial.t_mocap, T_base_hand[:, :3, :3])), _CUTOFF)
+            x, nuisance = _robot_rates(chain, trial)
+        except NotEnoughData as error:
+            _log.info("%s: %s", trial.id, error)
+            continue
+        yield Motion(trial.id, _aligned(y, x), x, nuisance, 1)
+
+
+def _speed(signal: Signal) -> Signal:
+    return replace(signal, x=np.linalg.norm(signal.x, axis=1, keepdims=True))
+
+
+def _aligned(y: Signal, x: Signal) -> Signal:
+    """Vectors y (n, 3) turned by the one rotation that brings it closest to x (n, 3), each on its own clock.
+
+    The speeds alone, which need no rotation, give the lag for it. They are not compared further: noise only ever
+    adds to a speed near zero, which is where backlash shows.
+    """
+    s = y.t - coarse_lag(_speed(y), _speed(x))
+    at = np.stack([np.interp(s, x.t, column, left=0.0, right=0.0) for column in x.x.T], axis=1)
+    U, _, Vt = np.linalg.svd(y.x.T @ at)
+    return replace(y, x=y.x @ U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
+
+
+def _robot_rates(chain: Chain, trial: Trial) -> tuple[Signal, np.ndarray]:
+    """Angular velocity of the tool (n, 3) [rad/s, tool] by the nominal chain, and its nuisance terms (n, k, 3)."""
+    t, q = trial.t_robot, trial.q_motor[:, chain.columns]
+    half_gaps = np.array([_half_gaps(chain, name) for name in chain.joints])
+    joint, width = np.nonzero(np.ptp(q, axis=0)[:, None] > _MOVES * half_gaps)
+    lost = play(q[:, joint], half_gaps[joint, width]) - q[:, joint]
+    axes = _rotation_axes(chain, 0.5 * (trial.q_motor[1:] + trial.q_motor[:-1]))
+    dt = np.diff(t)[:, None]
+    parts = axes * (np.diff(q, axis=0) / dt)[:, None]
+    before = np.cumsum(parts, axis=2) - parts
+    turned = np.cross(before, axes, axis=1)[:, :, np.ptp(q, axis=0) > _MOVES * half_gaps[:, 0]]
+    terms = axes[:, :, joint] * (np.diff(lost, axis=0) / dt)[:, None]
+    both = np.concatenate([parts.sum(axis=2)[..., None], terms, turned], axis=2).reshape(len(parts), -1)
+    signal = low_passed(even(0.5 * (t[1:] + t[:-1]), both), _CUTOFF)
+    x = signal.x.reshape(len(signal.t), 3, -1)
+    return replace(signal, x=x[:, :, 0]), np.swapaxes(x[:, :, 1:], 1, 2)
+
+
+def _half_gaps(chain: Chain, joint: str) -> np.ndarray:
+    return np.array(_HALF_GAPS) * (0.1 if chain.is_prismatic(joint) else 1.0)
+
+
+def _rotation_axes(chain: Chain, q: np.ndarray) -> np.ndarray:
+    """Angular part of the tool's Jacobian, its own axes, (n, 3, k)."""
+    model, data = chain.model, chain.model.createData()
+    tool = model.getFrameId(chain.tool_frame)
+    columns = [model.joints[model.getJointId(name)].idx_v for name in chain.joints]
+    return np.array(
+        [pin.computeFrameJacobian(model, data, row, tool, pin.LOCAL)[3:, columns] for row in chain.configurations(q)]
+    )
+
+
+def _plate_motions(urdf: str, description: Description, trials: Sequence[Trial], robot: Clock) -> Iterator[Motion]:
+    """Moments Mx, My of the plate and of the model, of every trial with a plate."""
+    model = floating_model(urdf, description)
+    for trial in trials:
+        if len(trial.t_plate) == 0:
+            continue
+        try:
+            y, (x, nuisance) = plate_moments(trial), base_moments(model, description, trial, robot)
+        except NotEnoughData as error:
+            _log.info("%s: %s", trial.id, error)
+            continue
+        yield Motion(trial.id, y, x, nuisance, -1)

@@ -1,0 +1,123 @@
+"""An estimate as files.
+
+    estimate.json            parameters, combinations, verdicts, clocks
+    estimate.nc              covariances, one group a model
+    nominal.urdf             what the placement twists are relative to
+    calibrated.urdf          joint placements of the main model        } only if the result
+    master_calibration.yaml  zeros of the readings of the main model   } may be used
+
+The same estimate gives the same bytes. `load_estimate` also reads somebody else's estimate.json, or a bare URDF.
+"""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import h5py
+import numpy as np
+from pydantic import ValidationError
+
+from calibration.errors import InputError
+from calibration.estimate import Estimate, Model
+from calibration.estimate_schema import EstimateFile, to_estimate, to_file
+from calibration.robot import chain_of_frames
+from calibration.urdf_export import calibrated_urdf
+
+JSON, COVARIANCES, NOMINAL = "estimate.json", "estimate.nc", "nominal.urdf"
+CALIBRATED, ZEROS = "calibrated.urdf", "master_calibration.yaml"
+
+
+def save_estimate(estimate: Estimate, folder: Path | str) -> None:
+    """Write the files of an estimate into a folder, made where it is missing."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    _replace_text(folder / JSON, json.dumps(to_file(estimate).model_dump(by_alias=True, exclude_none=True), indent=1))
+    _write_covariances(folder / COVARIANCES, estimate)
+    if estimate.urdf is not None:
+        _replace_text(folder / NOMINAL, estimate.urdf)
+    for name in (CALIBRATED, ZEROS):
+        (folder / name).unlink(missing_ok=True)
+    if estimate.calibrated and estimate.urdf is not None and estimate.robot is not None:
+        chain = chain_of_frames(
+            estimate.urdf, estimate.robot.joints, estimate.robot.base_frame, estimate.robot.tool_frame
+        )
+        hand = estimate.model(estimate.main).hand(chain, np.zeros(12))
+        _replace_text(folder / CALIBRATED, calibrated_urdf(estimate.urdf, hand.chain))
+        _replace_text(folder / ZEROS, _zeros(chain.joints, hand.offset))
+
+
+def load_estimate(path: Path | str) -> Estimate:
+    """Read an estimate: a folder written by `save_estimate`, an estimate.json, or a calibrated URDF.
+
+    Of a URDF the geometry is taken, zeros of readings are 0 and the marker bodies are where the datasheet has them.
+
+    Raises:
+        InputError: There is nothing there that can be read.
+    """
+    path = Path(path)
+    file = path / JSON if path.is_dir() else path
+    text = _text(file)
+    if file.suffix.lower() in (".urdf", ".xml"):
+        return Estimate("calibrated", (), (), (Model("model_2", ()),), "model_2", text)
+    try:
+        found = EstimateFile.model_validate(json.loads(text))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{file}:{error.lineno}:{error.colno}", f"broken JSON: {error.msg}") from error
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc'])) or 'estimate'}: {e['msg']}" for e in error.errors()]
+        raise InputError(file, "; ".join(lines)) from error
+    nominal = file.parent / NOMINAL
+    urdf = _text(nominal) if nominal.is_file() else None
+    return to_estimate(found, urdf, _read_covariances(file.parent / COVARIANCES))
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise InputError(path, "no such file; an estimate is a folder with estimate.json, or a URDF") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, f"cannot be read ({error})") from error
+
+
+def _replace_text(path: Path, text: str) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8", newline="\n")
+    os.replace(part, path)
+
+
+def _zeros(joints: tuple[str, ...], offsets: np.ndarray) -> str:
+    lines = [
+        "# Zeros of the motor-side readings: angle = reading - offset [rad; m for prismatic joints].",
+        "# To be used with calibrated.urdf, whose joint positions are these angles.",
+        *(f"- joint: {name}\n  offset: {float(x)!r}" for name, x in zip(joints, offsets, strict=True)),
+    ]
+    return "\n".join(lines)
+
+
+def _write_covariances(path: Path, estimate: Estimate) -> None:
+    part = path.with_name(path.name + ".part")
+    with h5netcdf.File(part, "w") as file:
+        file.attrs["title"] = "covariance of the parameters of each model, units of the parameters"
+        for model in estimate.models:
+            group: Any = file.create_group(model.name)
+            group.dimensions = {"parameter": len(model.parameters)}
+            names = np.array([p.name for p in model.parameters], dtype=object)
+            group.create_variable("parameter", ("parameter",), dtype=h5py.string_dtype(), data=names)
+            variable = group.create_variable(
+                "covariance", ("parameter", "parameter"), dtype="f8", data=model.covariance
+            )
+            variable.attrs["units"] = "product of the two parameters' units"
+    os.replace(part, path)
+
+
+def _read_covariances(path: Path) -> dict[str, np.ndarray]:
+    if not path.is_file():
+        return {}
+    try:
+        with h5netcdf.File(path, "r") as file:
+            return {name: np.asarray(group.variables["covariance"][...]) for name, group in file.groups.items()}
+    except (OSError, RuntimeError, KeyError) as error:
+        raise InputError(path, f"not a readable netCDF4 file ({error}); write the estimate again") from error

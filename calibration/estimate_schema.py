@@ -1,0 +1,178 @@
+"""estimate.json: its fields, and the way between it and an `Estimate`."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from calibration.clock import Clock
+from calibration.estimate import Estimate, Model, Parameter, RobotNames
+from calibration.identifiability import Combination, Status
+from calibration.verdict import Verdict
+
+
+class Entry(BaseModel):
+    """Frozen; no NaN. Unknown fields of other programs are ignored."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore")
+
+
+class ParameterEntry(Entry):
+    """A parameter, as in the contract."""
+
+    name: str
+    unit: str = ""
+    nominal: float = 0.0
+    value: float
+    sigma: float | None = None
+    status: Status = "estimated"
+
+
+class CombinationEntry(Entry):
+    """An identifiable combination: coefficients by parameter name."""
+
+    name: str
+    coefficients: dict[str, float]
+    value: float
+    sigma: float
+
+
+class PlayEntry(Entry):
+    """Random reading error of a joint [rad, m], standard deviation."""
+
+    joint: str
+    sigma: float
+
+
+class ModelEntry(Entry):
+    """A model of the ladder."""
+
+    parameters: tuple[ParameterEntry, ...]
+    combinations: tuple[CombinationEntry, ...] = ()
+    reading_error: tuple[PlayEntry, ...] = ()
+    rank: int = 0
+    condition: float = 0.0
+
+
+class VerdictEntry(Entry):
+    """A finding of a stage."""
+
+    stage: str
+    verdict: Literal["ok", "warning", "missing", "refused"]
+    message: str
+
+
+class ClockEntry(Entry):
+    """t_mocap = t (1 + drift) + offset; see `clock.Clock`."""
+
+    instrument: str
+    offset: float
+    drift: float
+    covariance: tuple[tuple[float, float], tuple[float, float]]
+    epoch: float
+    sigma: float
+
+
+class RobotEntry(Entry):
+    """Measured joints and the two frames."""
+
+    joints: tuple[str, ...]
+    base_frame: str
+    tool_frame: str
+
+
+class EstimateFile(Entry):
+    """The whole of estimate.json."""
+
+    schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
+    status: Literal["calibrated", "not_calibrated"] = "calibrated"
+    verdicts: tuple[VerdictEntry, ...] = ()
+    models: dict[str, ModelEntry]
+    main: str = ""
+    clocks: tuple[ClockEntry, ...] = ()
+    robot: RobotEntry | None = None
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore", validate_by_name=True)
+
+
+def to_file(estimate: Estimate) -> EstimateFile:
+    """An estimate as the contents of estimate.json."""
+    return EstimateFile(
+        status=estimate.status,
+        verdicts=tuple(VerdictEntry(stage=v.stage, verdict=v.verdict, message=v.message) for v in estimate.verdicts),
+        models={model.name: _model_entry(model) for model in estimate.models},
+        main=estimate.main,
+        clocks=tuple(
+            ClockEntry(
+                instrument=c.instrument,
+                offset=c.offset,
+                drift=c.drift,
+                covariance=((c.covariance[0, 0], c.covariance[0, 1]), (c.covariance[1, 0], c.covariance[1, 1])),
+                epoch=c.epoch,
+                sigma=c.sigma,
+            )
+            for c in estimate.clocks
+        ),
+        robot=None
+        if estimate.robot is None
+        else RobotEntry(
+            joints=estimate.robot.joints, base_frame=estimate.robot.base_frame, tool_frame=estimate.robot.tool_frame
+        ),
+    )
+
+
+def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, np.ndarray]) -> Estimate:
+    """The contents of estimate.json, with the covariances of the models that have one, as an estimate."""
+    robot = file.robot
+    return Estimate(
+        file.status,
+        tuple(Verdict(v.stage, v.verdict, v.message) for v in file.verdicts),
+        tuple(Clock(c.instrument, c.offset, c.drift, np.array(c.covariance), c.epoch, c.sigma) for c in file.clocks),
+        tuple(_model(name, entry, covariances.get(name)) for name, entry in file.models.items()),
+        file.main or (list(file.models)[-1] if file.models else ""),
+        urdf,
+        None if robot is None else RobotNames(robot.joints, robot.base_frame, robot.tool_frame),
+    )
+
+
+def _model_entry(model: Model) -> ModelEntry:
+    names = [p.name for p in model.parameters]
+    return ModelEntry(
+        parameters=tuple(
+            ParameterEntry(name=p.name, unit=p.unit, nominal=p.nominal, value=p.value, sigma=p.sigma, status=p.status)
+            for p in model.parameters
+        ),
+        combinations=tuple(
+            CombinationEntry(
+                name=c.name,
+                coefficients={n: float(x) for n, x in zip(names, c.coefficients, strict=True) if x != 0.0},
+                value=c.value,
+                sigma=c.sigma,
+            )
+            for c in model.combinations
+        ),
+        reading_error=tuple(
+            PlayEntry(joint=joint, sigma=float(s)) for joint, s in zip(model.joints, model.play, strict=True)
+        ),
+        rank=model.rank,
+        condition=model.condition,
+    )
+
+
+def _model(name: str, entry: ModelEntry, covariance: np.ndarray | None) -> Model:
+    names = [p.name for p in entry.parameters]
+    sigma = np.array([p.sigma or 0.0 for p in entry.parameters])
+    return Model(
+        name,
+        tuple(Parameter(p.name, p.unit, p.nominal, p.value, p.sigma or 0.0, p.status) for p in entry.parameters),
+        tuple(
+            Combination(c.name, np.array([c.coefficients.get(n, 0.0) for n in names]), c.value, c.sigma)
+            for c in entry.combinations
+        ),
+        np.diag(sigma**2) if covariance is None else covariance,
+        tuple(p.joint for p in entry.reading_error),
+        np.array([p.sigma for p in entry.reading_error]),
+        entry.rank,
+        entry.condition,
+    )

@@ -1,0 +1,182 @@
+"""Score every model's held-out predictions against the motion capture.
+
+Dynamic trials sample by sample, static ones by the mean error over each dwell; `all` is both together. A trial's first
+second is the base's reference and is not scored. The reference is the hand cluster's measured pose: its own noise
+counts.
+"""
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import h5netcdf
+import numpy as np
+
+from calibration.bodies import poses_of
+from calibration.dataset import Dataset
+from calibration.errors import NotEnoughData
+from calibration.estimate import Estimate
+from calibration.markers import hand_body
+from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics
+from calibration.postures import dwell_windows
+from calibration.predict import REFERENCE, Prediction, predictor
+from calibration.recording import Trial
+from calibration.schema import Role
+
+Trials = Literal["dynamic", "static", "all"]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Errors of one row in one trial.
+
+    Attributes:
+        model: Row of the ladder.
+        base: `fixed` or `measured`.
+        encoder: `motor`.
+        trial_id: The trial.
+        kind: Its kind.
+        t: (n,) [s, mocap clock].
+        errors: n poses over time, NaN where nothing can be compared.
+        scored: The errors that count: dwell means of a static trial, else the samples after the first second.
+    """
+
+    model: str
+    base: str
+    encoder: str
+    trial_id: str
+    kind: str
+    t: np.ndarray
+    errors: PoseErrors
+    scored: PoseErrors
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the ladder."""
+
+    model: str
+    trials: Trials
+    base: str
+    encoder: str
+    against: str
+    metrics: RowMetrics
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The ladder, and the errors it is made of."""
+
+    rows: tuple[Row, ...]
+    traces: tuple[Trace, ...]
+
+    def row(self, model: str, trials: Trials = "dynamic", base: str = "fixed", encoder: str = "motor") -> Row:
+        """One line.
+
+        Raises:
+            NotEnoughData: There is no such line.
+        """
+        wanted = (model, trials, base, encoder)
+        for row in self.rows:
+            if (row.model, row.trials, row.base, row.encoder) == wanted:
+                return row
+        raise NotEnoughData(f"no row {wanted}; there are {[(r.model, r.trials, r.base, r.encoder) for r in self.rows]}")
+
+    def save(self, folder: Path | str) -> None:
+        """Write evaluation.json and evaluation.nc into a folder, made where it is missing."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        part = folder / "evaluation.json.part"
+        part.write_text(json.dumps({"schema": 1, "rows": [row_entry(r) for r in self.rows]}, indent=1) + "\n", "utf-8")
+        os.replace(part, folder / "evaluation.json")
+        _write_traces(folder / "evaluation.nc", self.traces)
+
+
+def evaluate(
+    estimate: Estimate,
+    dataset: Dataset,
+    progress: Callable[[str, float], None] | None = None,
+    role: Role = "validation",
+) -> Evaluation:
+    """Score an estimate on the trials of a role.
+
+    Raises:
+        NotEnoughData: There is no trial of that role.
+        NotCalibrated: The estimate must not be used.
+    """
+    entries = dataset.entries(role)
+    if not entries:
+        raise NotEnoughData(f"no {role} trial to score on")
+    predict, body, traces = predictor(estimate, dataset), hand_body(dataset.description), []
+    for k, entry in enumerate(entries):
+        if progress is not None:
+            progress(f"evaluating {entry.id}", k / len(entries))
+        trial = dataset.read(entry)
+        T_measured = poses_of(body, trial).T
+        traces += [_trace(p, trial, pose_errors(p.T_lab_hand, T_measured)) for p in predict(entry, trial)]
+    return Evaluation(tuple(ladder(traces, "mocap")), tuple(traces))
+
+
+def scored_errors(t: np.ndarray, errors: PoseErrors, trial: Trial, static: bool) -> PoseErrors:
+    """The errors at t (n,) [s, mocap clock] that count."""
+    if static:
+        return dwell_means(t, errors, dwell_windows(trial))
+    after = t > trial.t_mocap[0] + REFERENCE
+    return PoseErrors(errors.position[after], errors.rotation[after])
+
+
+def ladder(traces: list[Trace], against: str) -> Iterator[Row]:
+    """Rows of dynamic, static and all trials, in the traces' order of models."""
+    keys = dict.fromkeys((t.model, t.base, t.encoder) for t in traces)
+    groups: tuple[tuple[Trials, Callable[[Trace], bool]], ...] = (
+        ("dynamic", lambda t: t.kind != "static"),
+        ("static", lambda t: t.kind == "static"),
+        ("all", lambda t: True),
+    )
+    for model, base, encoder in keys:
+        mine = [t for t in traces if (t.model, t.base, t.encoder) == (model, base, encoder)]
+        for name, belongs in groups:
+            parts = [t.scored for t in mine if belongs(t)]
+            if parts:
+                errors = PoseErrors(
+                    np.concatenate([p.position for p in parts]), np.concatenate([p.rotation for p in parts])
+                )
+                yield Row(model, name, base, encoder, against, row_metrics(errors))
+
+
+def row_entry(row: Row) -> dict[str, Any]:
+    """A row as evaluation.json and score.json have it."""
+    figures = asdict(row.metrics)
+    figures["per_axis_mm"] = dict(zip("xyz", row.metrics.per_axis_mm, strict=True))
+    names = {"model": row.model, "trials": row.trials, "base": row.base, "encoder": row.encoder}
+    return names | {"against": row.against} | figures
+
+
+def _trace(p: Prediction, trial: Trial, errors: PoseErrors) -> Trace:
+    scored = scored_errors(p.t, errors, trial, p.kind == "static")
+    return Trace(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
+
+
+def _write_traces(path: Path, traces: tuple[Trace, ...]) -> None:
+    """One group a row and trial: model/base/encoder/trial."""
+    part = path.with_name(path.name + ".part")
+    with h5netcdf.File(part, "w") as file:
+        file.attrs["title"] = "errors of predicted hand poses, predicted minus measured, lab axes"
+        for trace in traces:
+            group: Any = file.create_group(f"{trace.model}/{trace.base}/{trace.encoder}/{trace.trial_id}")
+            group.attrs["kind"] = trace.kind
+            group.dimensions = {"t": len(trace.t), "scored": len(trace.scored), "axis": 3}
+            for name, dims, units, data in (
+                ("t", ("t",), "s", trace.t),
+                ("position_error", ("t", "axis"), "m", trace.errors.position),
+                ("rotation_error", ("t", "axis"), "rad", trace.errors.rotation),
+                ("scored_position_error", ("scored", "axis"), "m", trace.scored.position),
+                ("scored_rotation_error", ("scored", "axis"), "rad", trace.scored.rotation),
+            ):
+                kind = "f8" if name == "t" else "f4"
+                variable = group.create_variable(name, dims, dtype=kind, data=data.astype(kind))
+                variable.attrs["units"] = units
+    os.replace(part, path)

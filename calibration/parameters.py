@@ -1,0 +1,108 @@
+"""Names, units, nominal values and tolerances of what is estimated, in one fixed order.
+
+    frame.<a>.<b>         translation [m] and rotation vector [rad] of T_a_b
+    geometry.<joint>      exp6 twist on the right of the joint placement [m, rad]
+    encoder.<joint>.motor.offset      reading = angle + offset [rad, m]
+
+A joint's offset and the twist along its axis move the hand alike: the data speak of their combination, their
+tolerances divide it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.markers import BASE, base_body, hand_body
+from calibration.robot import Chain
+from calibration.schema import Description
+from calibration.se3 import to_vector
+
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+METRES_PER_RAD = 0.1  # a prismatic joint's tolerances are an angle's times this
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """Parameters of a model.
+
+    Attributes:
+        names: As in the contract, length p.
+        units: `m` or `rad`, length p.
+        nominal: (p,) datasheet values.
+        tolerance: (p,) standard deviations of the prior; inf where there is none.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    nominal: np.ndarray
+    tolerance: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(p,) finite scale of each parameter: its tolerance, else 1 mm or 1 mrad [m, rad]."""
+        return np.where(np.isfinite(self.tolerance), self.tolerance, 1e-3)
+
+
+def frame_names() -> tuple[str, str]:
+    """Prefixes of the two registrations: base body in the base frame, hand body in the tool frame."""
+    return f"frame.base.{BASE}", "frame.tool.hand"
+
+
+def parameter_names(chain: Chain) -> tuple[str, ...]:
+    """Names of the two frames, the placements and the zeros of a chain, in the order of `HandModel.theta`."""
+    return (
+        *(f"{prefix}.{axis}" for prefix in frame_names() for axis in AXES),
+        *(f"geometry.{joint}.{axis}" for joint in chain.joints for axis in AXES),
+        *(f"encoder.{joint}.motor.offset" for joint in chain.joints),
+    )
+
+
+def registration_parameters(chain: Chain, description: Description) -> ParameterSet:
+    """The two frames alone, without a prior."""
+    frames = nominal_frames(chain, description)
+    return ParameterSet(
+        parameter_names(chain)[:12], ("m", "m", "m", "rad", "rad", "rad") * 2, frames, np.full(12, np.inf)
+    )
+
+
+def geometry_parameters(chain: Chain, description: Description) -> ParameterSet:
+    """The two frames, the placement of every joint of the chain and the zero of its encoder."""
+    frames, tol = registration_parameters(chain, description), description.tolerances
+    k = len(chain.joints)
+    lengths = np.array([METRES_PER_RAD if chain.is_prismatic(j) else 1.0 for j in chain.joints])
+    return ParameterSet(
+        parameter_names(chain),
+        frames.units
+        + ("m", "m", "m", "rad", "rad", "rad") * k
+        + tuple("m" if chain.is_prismatic(j) else "rad" for j in chain.joints),
+        np.concatenate([frames.nominal, np.zeros(7 * k)]),
+        np.concatenate(
+            [
+                ([tol.body_translation] * 3 + [tol.body_rotation] * 3) * 2,
+                ([tol.joint_translation] * 3 + [tol.joint_rotation] * 3) * k,
+                tol.encoder_offset * lengths,
+            ]
+        ),
+    )
+
+
+def nominal_frames(chain: Chain, description: Description) -> np.ndarray:
+    """T_base_B and T_tool_H with every marker body on its link as drawn, (12,) [m, rad]."""
+    q = np.zeros((1, len(chain.measured)))
+    base, hand = base_body(description).link, hand_body(description).link
+    T_base_tool, T_base_hand = chain.poses(q)[0], chain.poses(q, hand)[0]
+    return np.concatenate([to_vector(chain.poses(q, base)[0]), to_vector(np.linalg.solve(T_base_tool, T_base_hand))])
+
+
+def play_start(chain: Chain, description: Description) -> np.ndarray:
+    """Datasheet play of each joint of the chain, (k,) [rad, m]."""
+    lengths = [METRES_PER_RAD if chain.is_prismatic(j) else 1.0 for j in chain.joints]
+    return description.tolerances.joint_play * np.array(lengths)
+
+
+def play_floor(chain: Chain, description: Description) -> np.ndarray:
+    """Smallest random reading error of each joint, (k,) [rad, m]: its encoder's noise, 1/500 of the datasheet play."""
+    return np.maximum(description.sigmas.encoder, 2e-3 * play_start(chain, description))

@@ -1,0 +1,113 @@
+"""Static postures: what the encoders read and where the hand was in the base, with covariance.
+
+Means over each dwell, shrunk on both sides; robot samples are taken at the mocap clock. The hand's pose in the base is
+that of the two clusters' averaged markers. Its local twist has covariance
+
+    S = f (C_hand + Ad(T_H_B) C_base Ad(T_H_B)') sigma^2 / n
+
+f >= 1 says how much more the means of quarter dwells scatter than independent samples of sigma would: noise that is
+correlated in time, and motion that has not died out.
+"""
+
+import logging
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.bodies import BodyPoses, body_poses
+from calibration.clock import Clock
+from calibration.errors import NotEnoughData
+from calibration.markers import base_body, hand_body
+from calibration.recording import Trial
+from calibration.schema import Body, Description
+from calibration.se3 import adjoint, inverse, to_vector
+
+_MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
+_BLOCKS = 4
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Postures:
+    """Static postures of a dataset.
+
+    Attributes:
+        q: (n, n_measured) mean motor-side readings [rad, m].
+        T_base_hand: (n, 4, 4) measured pose of the hand body in the base body.
+        covariance: (n, 6, 6) of its local twist [m, rad].
+        misfit: (n,) rms distance of markers from their nominal places in their cluster [m].
+    """
+
+    q: np.ndarray
+    T_base_hand: np.ndarray
+    covariance: np.ndarray
+    misfit: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+def dwell_windows(trial: Trial) -> np.ndarray:
+    """Start and stop of each dwell without its margins, (n, 2) [s, mocap clock]."""
+    margin = np.minimum(_MARGIN, 0.25 * (trial.dwell_stop - trial.dwell_start))
+    return np.stack([trial.dwell_start + margin, trial.dwell_stop - margin], axis=1)
+
+
+def read_postures(description: Description, trials: Iterable[Trial], robot: Clock) -> Postures:
+    """Postures of all dwells of these trials.
+
+    Raises:
+        NotEnoughData: There is none with both clusters visible.
+    """
+    found = [p for trial in trials for p in _of_trial(description, trial, robot)]
+    if not found:
+        raise NotEnoughData("no static calibration posture shows base and hand; record a static trial with dwells")
+    q, T, quarters, unit, misfit = (np.array(x) for x in zip(*found, strict=True))
+    unit = unit * description.sigmas.marker**2
+    factor = _inflation(quarters, unit)
+    _log.info("%d postures, noise of their means %.1f times that of independent samples", len(q), np.sqrt(factor))
+    return Postures(q, T, factor * unit, misfit)
+
+
+def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray, ...]]:
+    t_robot = robot.to_mocap(trial.t_robot)
+    bodies = (base_body(description), hand_body(description))
+    for k, (start, stop) in enumerate(dwell_windows(trial)):
+        rows = (t_robot >= start) & (t_robot <= stop)
+        seen = np.flatnonzero((trial.t_mocap >= start) & (trial.t_mocap <= stop))
+        if not rows.any() or len(seen) < _BLOCKS:
+            _log.info("%s: dwell %d has no samples", trial.id, k)
+            continue
+        whole, blocks = [seen], np.array_split(seen, _BLOCKS)
+        base, hand = (_mean_poses(body, trial, whole + blocks) for body in bodies)
+        T = inverse(base.T) @ hand.T
+        if not np.isfinite(T).all():
+            _log.info("%s: base or hand not seen throughout dwell %d", trial.id, k)
+            continue
+        Ad = adjoint(inverse(T[0]))
+        covariance = (hand.covariance[0] + Ad @ base.covariance[0] @ Ad.T) / len(seen)
+        misfit = np.sqrt(np.nanmean(np.concatenate([base.residual[0], hand.residual[0]]) ** 2) * 3.0)
+        yield trial.q_motor[rows].mean(axis=0), T[0], to_vector(inverse(T[:1]) @ T[1:]), covariance, misfit
+
+
+def _mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
+    """Poses of a body from its markers averaged over each group of samples."""
+    names = [m.name for m in body.markers if m.name in trial.marker]
+    xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
+    if len(names) < 3:
+        raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {names} are recorded")
+    p = trial.marker_position[:, [trial.marker.index(name) for name in names]]
+    seen = np.isfinite(p).all(axis=2)
+    means = np.full((len(groups), *xyz.shape), np.nan)
+    for k, rows in enumerate(groups):
+        often = seen[rows].sum(axis=0) > 0.5 * len(rows)
+        means[k, often] = np.nanmean(p[rows][:, often], axis=0)
+    return body_poses(xyz, means)
+
+
+def _inflation(quarters: np.ndarray, unit: np.ndarray) -> float:
+    """Mean squared Mahalanobis distance, per degree of freedom, of quarter means (n, 4, 6) about their mean."""
+    d = quarters - quarters.mean(axis=1, keepdims=True)
+    squared = np.einsum("nki,nij,nkj->n", d, np.linalg.inv(unit * _BLOCKS), d)
+    return max(1.0, float(squared.mean()) / (6 * (_BLOCKS - 1)))

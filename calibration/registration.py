@@ -1,0 +1,45 @@
+"""Stage `registration`: nominal geometry, the two marker bodies placed where the data say.
+
+    log6(T_measured^-1 T_base_B^-1 T_base_tool(q_motor) T_tool_H),    12 parameters, no prior
+
+The honest baseline: what is left after it is geometry, zeros, play and the base. With the arm alone moving, all twelve
+are identifiable once it turns about two directions; where the base stands in the lab is not asked.
+"""
+
+import numpy as np
+
+from calibration.estimate import Model
+from calibration.hand import nominal_hand
+from calibration.map_fit import fit
+from calibration.parameters import play_floor, play_start, registration_parameters
+from calibration.postures import Postures
+from calibration.result import model_of
+from calibration.robot import Chain
+from calibration.schema import Description
+from calibration.verdict import Verdict
+
+STAGE = "registration"
+
+
+def register(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
+    """The two frames, and what is to be said of them."""
+    parameters = registration_parameters(chain, description)
+    found = fit(
+        nominal_hand(chain, parameters.nominal),
+        parameters,
+        postures,
+        play_start(chain, description),
+        play_floor(chain, description),
+    )
+    model = model_of(STAGE, chain, parameters, found)
+    if not found.converged:
+        return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not come to rest"),)
+    if model.rank < len(parameters):
+        message = (
+            f"{len(parameters) - model.rank} of 12 directions are not identified: the arm turned about one direction "
+            "only, so a turn of both frames about it cannot be told apart; move another joint"
+        )
+        return model, (Verdict(STAGE, "warning", message),)
+    shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
+    message = f"marker frames from {len(postures)} postures; hand {shift:.1f} mm from its drawing"
+    return model, (Verdict(STAGE, "ok", message),)
