@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+from scipy.interpolate import CubicSpline
 
 from calibration.bodies import poses_of
 from calibration.clock import Clock
@@ -27,6 +28,7 @@ _CUTOFF = 3.0  # [Hz] below the base's resonance
 _DECIMATED = 0.01  # [s] plate samples averaged together
 _HALF_GAPS = (1e-3, 4e-3)  # [rad, m] of the play terms of each joint
 _MOVES = 20.0  # half gaps a joint must move to get its terms
+_STRIDE = 4  # the dynamics are evaluated every so many samples: 25 Hz for signals below 3 Hz
 _REST = 1.0  # [s] at the start of every trial
 
 
@@ -81,17 +83,18 @@ def _root_in_lab(description: Description, trial: Trial, model: pin.Model) -> np
 
 def _root_wrenches(model: pin.Model, T_lab_root: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """RNEA's root wrench (n, 6) along x[:, 0] (n, k), and its change by x[:, w] joint by joint (n, 6, w - 1, k)."""
-    data = model.createData()
-    start = pin.SE3ToXYZQUAT(pin.SE3(T_lab_root))
+    data, rows = model.createData(), np.append(np.arange(0, len(x) - 1, _STRIDE), len(x) - 1)
     rates = np.gradient(x, 1.0 / RATE, axis=0)
     accelerations = np.gradient(rates, 1.0 / RATE, axis=0)
     neutral = pin.neutral(model)
-    neutral[:7] = start
-    v, wrench, change = np.zeros(model.nv), np.empty((len(x), 6)), np.empty((len(x), 6, x.shape[1] - 1, x.shape[2]))
-    a, step = v.copy(), v.copy()
-    for row in range(len(x)):
-        step[6:], v[6:], a[6:] = x[row, 0], rates[row, 0], accelerations[row, 0]
-        dq, _, da = pin.computeRNEADerivatives(model, data, pin.integrate(model, neutral, step), v, a)
-        wrench[row] = data.tau[:6]
-        change[row] = dq[:6, None, 6:] * x[row, 1:] + da[:6, None, 6:] * accelerations[row, 1:]
-    return wrench, change
+    neutral[:7] = pin.SE3ToXYZQUAT(pin.SE3(T_lab_root))
+    still = np.zeros(6)
+    wrench, change = np.empty((len(rows), 6)), np.empty((len(rows), 6, x.shape[1] - 1, x.shape[2]))
+    for k, row in enumerate(rows):
+        q = pin.integrate(model, neutral, np.append(still, x[row, 0]))
+        v, a = np.append(still, rates[row, 0]), np.append(still, accelerations[row, 0])
+        dq, _, da = pin.computeRNEADerivatives(model, data, q, v, a)
+        wrench[k] = data.tau[:6]
+        change[k] = dq[:6, None, 6:] * x[row, 1:] + da[:6, None, 6:] * accelerations[row, 1:]
+    every = np.arange(len(x))
+    return CubicSpline(rows, wrench)(every), CubicSpline(rows, change)(every)

@@ -23,6 +23,7 @@ from calibration.postures import Postures
 
 _OUTER, _NEWTON = 25, 50
 _PROMISE = 1e-10  # Gauss-Newton stops when a step promises a smaller decrease of the cost [-]: 1e-5 sigma
+_LARGEST = 1.0  # of s [rad, m]: data that ask for more do not belong to the model
 _SAME = 1e-3  # outer iterations stop below this change of log s [-]
 _log = logging.getLogger(__name__)
 
@@ -151,7 +152,7 @@ def _evidence(
     at: Linearised, parameters: ParameterSet, postures: Postures, s: np.ndarray, floor: np.ndarray
 ) -> np.ndarray:
     """The s (k,) of highest evidence for the problem linearised at theta: quasi-Newton in log s, down to `floor`."""
-    bounds = [(low, None) for low in np.log(floor)]
+    bounds = [(low, np.log(_LARGEST)) for low in np.log(floor)]
     found = minimize(
         _minus_log_evidence, np.log(s), (at, parameters, postures), "L-BFGS-B", jac=True, bounds=bounds,
         options={"maxiter": 200, "ftol": 1e-13, "gtol": 1e-7},

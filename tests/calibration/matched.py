@@ -13,6 +13,7 @@ import pinocchio as pin
 
 import mjcf
 from calibration.play import play
+from calibration.postures import Postures
 from calibration.recording import Trial, write_trial
 from calibration.schema import Description
 
@@ -144,7 +145,10 @@ def record(
     )
     position = position + truth.marker_sigma * rng.normal(size=position.shape)
     t_plate = np.arange(int(t[-1] * 200.0)) / 200.0 + 0.5 / 200.0
-    wrench = plate_wrench(truth, link, T_lab_base)
+    coarse = np.arange(0, len(link), 5)
+    wrench = np.stack(
+        [np.interp(t_plate, t[coarse], w) for w in plate_wrench(truth, link[coarse], T_lab_base, GRID / 5.0).T], axis=1
+    )
     dwells = np.zeros((0, 2)) if dwells is None else dwells
     zeros = np.zeros((n, 8))
 
@@ -156,17 +160,17 @@ def record(
         tuple(f"{b}{i}" for b, (_, x) in BODIES.items() for i in range(len(x))),
         tuple(b for b, (_, x) in BODIES.items() for _ in x),
         t_mocap + start, position, ("plate",), clock(t_plate, truth.plate),
-        (at(wrench, t_plate) + rng.normal(size=(len(t_plate), 6)) * np.array([1.5] * 3 + [0.4] * 3))[:, None],
+        (wrench + rng.normal(size=(len(t_plate), 6)) * np.array([1.5] * 3 + [0.4] * 3))[:, None],
         np.zeros((1, 3)), dwells[:, 0] + start, dwells[:, 1] + start,
     )  # fmt: skip
 
 
-def plate_wrench(truth: Truth, q: np.ndarray, T_lab_base: np.ndarray) -> np.ndarray:
+def plate_wrench(truth: Truth, q: np.ndarray, T_lab_base: np.ndarray, rate: float) -> np.ndarray:
     """Action on the plate (n, 6) about the lab origin, base held still."""
     m = model(truth, pin.JointModelFreeFlyer())
     d = m.createData()
-    v = np.gradient(q, 1.0 / GRID, axis=0)
-    a = np.gradient(v, 1.0 / GRID, axis=0)
+    v = np.gradient(q, 1.0 / rate, axis=0)
+    a = np.gradient(v, 1.0 / rate, axis=0)
     root = pin.SE3(T_lab_base)
     start = pin.SE3ToXYZQUAT(root)
     out, zero = np.empty((len(q), 6)), np.zeros(6)
@@ -238,3 +242,10 @@ def campaign(folder: Path, truth: Truth, seed: int = 0, n_postures: int = 20, **
         trials.append((name, role, kind, record(truth, motor, start, rng, rests)))
         start += len(motor) / GRID + 20.0
     return write(folder, trials, **changes)
+
+
+def postures(truth: Truth, q: np.ndarray, sigma: float = 1e-9, seed: int = 0) -> Postures:
+    """Static postures at joint angles q (n, 8), pose noise sigma [m, rad] on every axis, no file between."""
+    rng = np.random.default_rng(seed)
+    T = np.array([T @ se3(sigma * rng.normal(size=6)) for T in hand_in_base(truth, q)])
+    return Postures(q + truth.offset, T, np.tile(sigma**2 * np.eye(6), (len(q), 1, 1)), np.zeros(len(q)))

@@ -1,0 +1,38 @@
+"""One small campaign and its estimate, made once for all tests of the pipeline."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration import Dataset, Estimate, calibrate, load
+from calibration.robot import Chain, chain_of
+from tests.calibration import matched
+
+
+@pytest.fixture(scope="session")
+def truth() -> matched.Truth:
+    return replace(matched.defects(1), half_gap=np.array([0.0, 1.0, 1.0, 1.5, 1.5, 3.0, 12.0, 10.0]) * 1e-3)
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory, truth: matched.Truth) -> Path:
+    """A dataset folder; copy it before changing anything."""
+    return matched.campaign(tmp_path_factory.mktemp("matched") / "dataset", truth)
+
+
+@pytest.fixture(scope="session")
+def dataset(folder: Path) -> Dataset:
+    return load(folder)
+
+
+@pytest.fixture(scope="session")
+def estimate(dataset: Dataset) -> Estimate:
+    return calibrate(dataset)
+
+
+@pytest.fixture(scope="session")
+def chain() -> Chain:
+    return chain_of(mjcf.urdf(), matched.described())

@@ -1,0 +1,163 @@
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration import calibrate, load, save_estimate
+from calibration.errors import InputError, NoSuchElement, NotEnoughData
+from tests.calibration import matched
+from tests.calibration.changes import rewritten
+
+CALIBRATION = ("postures", "sweep1", "sweep2", "sweep4", "swing")
+
+
+def saved(folder: Path, out: Path) -> dict[str, bytes]:
+    save_estimate(calibrate(load(folder)), out)
+    return {p.name: p.read_bytes() for p in sorted(out.iterdir())}
+
+
+def refused(folder: Path) -> str:
+    estimate = calibrate(load(folder))
+    assert estimate.status == "not_calibrated"
+    return " | ".join(v.message for v in estimate.verdicts if v.verdict == "refused")
+
+
+def test_the_estimate_is_a_function_of_the_dataset_folder_s_bytes_alone(folder, estimate, tmp_path):
+    """Copied alone, its held-out trials turned to garbage: the same bytes."""
+    alone = tmp_path / "elsewhere" / "dataset"
+    shutil.copytree(folder, alone)
+    for name in ("xyz", "others"):
+        (alone / "trials" / f"{name}.nc").write_bytes(b"not a recording")
+    save_estimate(estimate, tmp_path / "one")
+    here = {p.name: p.read_bytes() for p in sorted((tmp_path / "one").iterdir())}
+    assert saved(alone, tmp_path / "two") == here
+
+
+def test_the_estimate_says_what_it_is(estimate):
+    assert estimate.calibrated and estimate.main == "model_2"
+    assert [m.name for m in estimate.models] == ["registration", "model_2"]
+    assert estimate.model("model_2").rank == 36
+    assert estimate.model("registration").rank == 12
+    assert {v.stage for v in estimate.verdicts} == {"clocks", "registration", "geometry"}
+
+
+def test_the_calibrated_robot_is_the_true_one_within_its_play(estimate, truth, chain):
+    hand = estimate.model("model_2").hand(chain, np.zeros(12))
+    q = matched.near_postures(np.random.default_rng(9), 100)
+    error = hand.poses(q + truth.offset)[:, :3, 3] - matched.hand_in_base(truth, q)[:, :3, 3]
+    assert np.sqrt((error**2).mean()) < 1.5e-3  # 20 postures, each with up to 12 mrad of play in the wrist
+
+
+def test_stages_can_be_chosen_and_bring_what_they_need(dataset):
+    told = []
+    found = calibrate(dataset, ["registration"], lambda stage, share: told.append((stage, share)))
+    assert [m.name for m in found.models] == ["registration"] and found.main == "registration" and found.calibrated
+    assert [s for s, _ in told] == ["reading", "clocks", "postures", "registration", "done"]
+    assert [x for _, x in told] == sorted(x for _, x in told)
+    only = calibrate(dataset, ["clocks"])
+    assert len(only.clocks) == 2 and only.status == "not_calibrated"
+
+
+def test_an_unknown_stage_is_told_with_those_that_exist(dataset):
+    with pytest.raises(NoSuchElement, match=r"'magic'.*clocks.*geometry.*registration"):
+        calibrate(dataset, ["magic"])
+
+
+def test_without_a_plate_everything_else_works_and_it_is_said(folder, tmp_path):
+    def without(trial):
+        empty = {"plate": (), "t_plate": np.zeros(0), "plate_wrench": np.zeros((0, 0, 6))}
+        return replace(trial, **empty, plate_centre=np.zeros((0, 3)))
+
+    estimate = calibrate(load(rewritten(folder, tmp_path / "copy", dict.fromkeys(CALIBRATION, without))))
+    assert estimate.calibrated and [c.instrument for c in estimate.clocks] == ["robot"]
+    assert any(v.verdict == "missing" and "plate" in v.message for v in estimate.verdicts)
+
+
+def test_only_validation_trials_are_not_enough(folder, tmp_path):
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    listed = json.loads((copy / "dataset.json").read_text())
+    listed["trials"] = [t for t in listed["trials"] if t["role"] == "validation"]
+    (copy / "dataset.json").write_text(json.dumps(listed))
+    with pytest.raises(NotEnoughData, match="no calibration trial"):
+        calibrate(load(copy))
+
+
+def test_without_static_postures_it_says_what_to_record(folder, tmp_path):
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    listed = json.loads((copy / "dataset.json").read_text())
+    listed["trials"] = [t for t in listed["trials"] if t["id"] != "postures"]
+    (copy / "dataset.json").write_text(json.dumps(listed))
+    with pytest.raises(NotEnoughData, match="record a static trial"):
+        calibrate(load(copy))
+
+
+def test_markers_in_millimetres_are_refused_by_name(folder, tmp_path):
+    def in_mm(trial):
+        return replace(trial, marker_position=1e3 * trial.marker_position)
+
+    said = refused(rewritten(folder, tmp_path / "copy", dict.fromkeys(CALIBRATION, in_mm)))
+    assert "'gripper'" in said and "millimetres?" in said
+
+
+def test_joints_in_degrees_are_refused_by_name(folder, tmp_path):
+    def in_degrees(trial):
+        return replace(trial, q_motor=trial.q_motor * np.where(np.arange(8) > 0, 180.0 / np.pi, 1.0))
+
+    said = refused(rewritten(folder, tmp_path / "copy", dict.fromkeys(CALIBRATION, in_degrees)))
+    assert "'arm_1_joint'" in said and "degrees?" in said and "torso" not in said
+
+
+def test_five_postures_are_refused_and_nothing_is_exported(folder, tmp_path):
+    def five(trial):
+        return replace(trial, dwell_start=trial.dwell_start[:5], dwell_stop=trial.dwell_stop[:5],
+                       approach=trial.approach[:5])  # fmt: skip
+
+    copy = rewritten(folder, tmp_path / "copy", {"postures": five})
+    assert "5 distinct postures" in refused(copy)
+    assert "calibrated.urdf" not in saved(copy, tmp_path / "out")
+
+
+def test_a_truncated_recording_is_told_by_file(folder, tmp_path):
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    path = copy / "trials" / "sweep1.nc"
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(InputError, match=r"sweep1\.nc.*sha256"):
+        calibrate(load(copy))
+    listed = json.loads((copy / "dataset.json").read_text())
+    from calibration.recording import sha256
+
+    for entry in listed["trials"]:
+        entry["sha256"] = sha256(copy / entry["file"])
+    (copy / "dataset.json").write_text(json.dumps(listed))
+    with pytest.raises(InputError, match=r"sweep1\.nc.*netCDF4"):
+        calibrate(load(copy))
+
+
+@pytest.mark.parametrize(
+    "damage, said",
+    [
+        (lambda d: (d / "dataset.json").write_text('{"schema": 1,\n"robot" }'), r"dataset\.json:2:9: broken JSON"),
+        (lambda d: (d / "dataset.json").unlink(), r"dataset\.json: no such file"),
+        (lambda d: (d / "nominal.urdf").write_text("<robot>"), "not a URDF"),
+        (lambda d: (d / "trials" / "xyz.nc").unlink(), r"missing.*xyz\.nc"),
+    ],
+)
+def test_a_damaged_dataset_is_told_with_its_place(folder, tmp_path, damage, said):
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    damage(copy)
+    with pytest.raises(InputError, match=said):
+        load(copy)
+
+
+def test_all_findings_of_dataset_json_come_at_once(folder, tmp_path):
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    listed = json.loads((copy / "dataset.json").read_text())
+    listed["sigmas"]["marker"] = -1.0
+    listed["tolerances"]["speed"] = 1.0
+    del listed["tool_frame"]
+    (copy / "dataset.json").write_text(json.dumps(listed))
+    with pytest.raises(InputError, match=r"(?s)tool_frame.*sigmas\.marker.*tolerances\.speed"):
+        load(copy)
