@@ -36,7 +36,7 @@ RUN = Kind("run", "scenario.yaml", frozenset({"scenario.yaml", "dataset", "truth
 ESTIMATE = Kind(
     "estimate",
     "estimate.json",
-    frozenset({"estimate.json", "estimate.nc", "calibrated.urdf", "master_calibration.yaml"}),
+    frozenset({"estimate.json", "estimate.nc", "nominal.urdf", "calibrated.urdf", "master_calibration.yaml"}),
 )
 
 

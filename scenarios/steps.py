@@ -81,7 +81,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
     Raises:
         ScenarioError: `out` must not be overwritten.
         TwinError: The simulation failed.
-        CalibrationError: The data do not allow a result.
+        CalibrationError: The data do not allow a result that may be used; nothing is written.
     """
     scenario = scenario.quick() if quick else scenario
     with folder.replacing(out, folder.RUN) as new:
@@ -102,7 +102,25 @@ def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent)
 def calibrate(
     dataset: Path | str, out: Path | str, stages: Sequence[str] | None = None, progress: Progress = silent
 ) -> "Estimate":
-    """Write the estimate folder `out` from a dataset folder alone; None runs every stage the data allow."""
+    """Write the estimate folder `out` from a dataset folder alone.
+
+    The estimate says itself whether it may be used; it is written either way.
+
+    Args:
+        dataset: A dataset folder, the twin's or a real one.
+        out: The estimate folder; an earlier one there is replaced.
+        stages: Only these; None runs every stage.
+        progress: Told how far it is.
+
+    Raises:
+        ScenarioError: `out` must not be overwritten, or a stage does not exist.
+        CalibrationError: The dataset cannot be read, or does not allow a result.
+    """
+    from calibration.pipeline import STAGES
+
+    unknown = [name for name in stages or () if name not in STAGES]
+    if unknown:
+        raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
     with folder.replacing(out, folder.ESTIMATE) as new:
         return _calibrate(Path(dataset), new, stages, progress)
 
@@ -155,7 +173,7 @@ def _calibrate(dataset: Path, out: Path, stages: Sequence[str] | None, progress:
     estimate = calibration.calibrate(
         calibration.load(dataset), stages, lambda at, fraction: progress("calibrate", at, fraction)
     )
-    estimate.save(out)
+    calibration.save_estimate(estimate, out)
     return estimate
 
 

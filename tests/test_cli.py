@@ -59,7 +59,7 @@ class Engines:
 
     fail: dict[str, BaseException] = field(default_factory=dict)
     calls: dict[str, tuple] = field(default_factory=dict)
-    status: str = "calibrated"
+    calibrated: bool = True
 
     def step(self, name: str, *arguments: object) -> None:
         self.calls[name] = arguments
@@ -81,8 +81,11 @@ class Engines:
         return self.load_estimate(dataset)
 
     def load_estimate(self, path):
-        verdict = SimpleNamespace(stage="clocks", verdict="good", message="0.1 ms")
-        return SimpleNamespace(status=self.status, verdicts=[verdict], save=self.saves("estimate.json"))
+        verdict = SimpleNamespace(stage="clocks", verdict="ok", message="0.1 ms")
+        return SimpleNamespace(calibrated=self.calibrated, verdicts=[verdict])
+
+    def save_estimate(self, estimate, folder):
+        self.saves("estimate.json")(folder)
 
     def evaluate(self, estimate, dataset, progress=None):
         self.step("evaluate", dataset)
@@ -114,7 +117,7 @@ def engines(monkeypatch, tmp_path):
     fakes = Engines()
     for package, name in (
         (twin, "record"),
-        *((calibration, name) for name in ("load", "calibrate", "load_estimate", "evaluate")),
+        *((calibration, name) for name in ("load", "calibrate", "save_estimate", "load_estimate", "evaluate")),
     ):
         monkeypatch.setattr(package, name, getattr(fakes, name), raising=False)
     for name, content in (
@@ -236,10 +239,11 @@ def test_report_is_made_from_a_run_folder(engines, tiago_twin):
 
 
 def test_an_estimate_that_must_not_be_used_is_kept_and_ends_with_1(engines, tiago_twin):
-    engines.status = "geometry: rank 11 of 30"
-    code, out, err = tiago_twin("run", "small", "--out", "x")
-    assert code == 1 and "must not be used: geometry: rank 11 of 30" in err
-    assert Path("x/report.html").is_file()
+    tiago_twin("simulate", "small", "--out", "x")
+    engines.calibrated = False
+    code, out, err = tiago_twin("calibrate", "x/dataset", "--out", "x/estimate")
+    assert code == 1 and "must not be used" in err and "clocks" in out
+    assert Path("x/estimate/estimate.json").is_file()
 
 
 @pytest.mark.parametrize(
@@ -310,6 +314,8 @@ def test_a_bad_scenario_file_ends_with_2_and_every_place(engines, tiago_twin, co
         (["run", "small", "--seed", "one"], ["--seed"]),
         (["run", "small", "--sede", "1"], ["No such option"]),
         (["simulate", "small"], ["--out"]),
+        (["calibrate", "d", "--out", "x", "--stages", "clocks,geometri"], ["no stage 'geometri'", "clocks, regis"]),
+        (["calibrate", "d", "--out", "x", "--stages", ""], ["no stage ''"]),
         (["launch"], ["No such command"]),
     ],
 )
