@@ -1,4 +1,6 @@
-"""Static postures for calibration: reachable, clear of the robot's own body, hand in front of the cameras.
+"""Static postures for calibration: reachable, clear of the robot's own body, hand cluster in the cameras' sight.
+
+Cameras look down from around the robot: the hand's upper side, its -z, must face upwards within 78 deg.
 
 Drawn by rejection inside the joint limits and ordered into a short tour.
 """
@@ -11,7 +13,8 @@ from twin.motions import JOINTS
 
 _MARGIN = 0.10  # [rad, half in m for the torso] inside the hard limits
 _CHECKED = ("arm_4_link", "arm_5_link", "arm_6_link", "gripper_link", "gripper_grasping_frame")
-_ATTEMPTS = 400  # per posture asked for
+_UPWARDS = 0.2  # [-] least cosine between the hand's upper side and the vertical
+_ATTEMPTS = 1000  # per posture asked for
 
 
 def draw(model: mujoco.MjModel, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -44,7 +47,8 @@ def _admissible(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray) -> bo
     clear_of_torso = np.all(np.hypot(p[:, 0] + 0.05, p[:, 1]) > 0.36)
     hand = p[-1]
     in_sight = hand[0] > 0.15 and 0.35 < hand[2] < 1.5 and np.hypot(hand[0], hand[1]) > 0.45
-    return bool(clear_of_base and clear_of_torso and in_sight and np.all(p[:, 2] > 0.30))
+    upwards = -data.body(_CHECKED[-1]).xmat[8] > _UPWARDS
+    return bool(clear_of_base and clear_of_torso and in_sight and upwards and np.all(p[:, 2] > 0.30))
 
 
 def tour(q: np.ndarray) -> np.ndarray:

@@ -6,12 +6,14 @@ import pytest
 from twin.conventions import exp6, placement, states_with_their_sensors, transform
 
 
-def test_exp6_is_pinocchios(rng=np.random.default_rng(0)):
+def test_exp6_is_pinocchios():
+    rng = np.random.default_rng(0)
     for twist in rng.normal(size=(20, 6)):
         np.testing.assert_allclose(exp6(twist), pin.exp6(twist).homogeneous, atol=1e-13)
 
 
-def test_placement_and_transform_are_inverse(rng=np.random.default_rng(1)):
+def test_placement_and_transform_are_inverse():
+    rng = np.random.default_rng(1)
     T = exp6(rng.normal(size=6))
     np.testing.assert_allclose(transform(*placement(T)), T, atol=1e-14)
 
@@ -30,7 +32,8 @@ def test_sensors_belong_to_the_state_before_their_step():
     from mujoco import rollout
 
     model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><body><joint name='j' type='slide' axis='1 0 0'/><geom size='.1' mass='1'/></body></worldbody>"
+        "<mujoco><worldbody><body><joint name='j' type='slide' axis='1 0 0'/>"
+        "<geom size='.1' mass='1'/></body></worldbody>"
         "<actuator><motor joint='j'/></actuator><sensor><jointpos joint='j'/></sensor></mujoco>"
     )
     data = mujoco.MjData(model)

@@ -15,7 +15,8 @@ from twin.motions import JOINTS
 TOOL = "gripper_grasping_frame"
 
 
-def test_a_perturbed_twin_has_pinocchios_kinematics(lab, body_poses, rng=np.random.default_rng(2)):
+def test_a_perturbed_twin_has_pinocchios_kinematics(lab, body_poses):
+    rng = np.random.default_rng(2)
     placements = [d for d in lab.robot.defects if isinstance(d, Placement)]
     assert [d.joint_name for d in placements] == list(JOINTS)
     model = pin.buildModelFromXML(mjcf.urdf())

@@ -5,7 +5,7 @@ from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 
 def interpolate(t: np.ndarray, grid: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Linear interpolation (n, ...) of dense values (m, ...) at times t; exact to a dt^2 / 8: 1 um at 10 m/s^2 and 1 ms."""
+    """Linear interpolation (n, ...) of dense values (m, ...) at times t; within a dt^2 / 8, 1 um at 10 m/s^2, 1 ms."""
     i = np.clip(np.searchsorted(grid, t, side="right") - 1, 0, len(grid) - 2)
     w = ((t - grid[i]) / (grid[i + 1] - grid[i])).reshape(-1, *(1,) * (values.ndim - 1))
     return (1.0 - w) * values[i] + w * values[i + 1]
