@@ -82,9 +82,12 @@ def show(table: Table) -> None:
 
 
 def ladder(results: Path) -> Table:
-    """Return the table of a folder's evaluation: against the truth where score.json has it, else against mocap."""
+    """Return the table of a folder's evaluation: against the truth where score.json has it, else against mocap.
+
+    Dynamic and static trials apart; what is of both together stands in the file.
+    """
     path = results / "score.json"
-    rows = _rows(path if path.is_file() else results / "evaluation.json")
+    rows = [row for row in _rows(path if path.is_file() else results / "evaluation.json") if row["trials"] != "all"]
     against = ", ".join(sorted({row["against"] for row in rows}))
     columns = ("position RMSE\nper component [mm]", "position RMSE\nnorm [mm]", "orientation\nRMSE [deg]")
     table = _table("row", "base", "encoder", "trials", *columns)

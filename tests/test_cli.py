@@ -1,6 +1,6 @@
 """The command line: what it runs, what it tells, its exit codes, and that nothing half-written stays.
 
-The engines are replaced by small fakes here; the whole way with the real ones is in test_humanoids2024.py.
+The engines are replaced by small fakes, but for the tests of broken data at the end.
 """
 
 import json
@@ -333,3 +333,24 @@ def test_a_folder_that_is_not_ours_is_refused_before_any_work(engines, tiago_twi
     code, _, err = tiago_twin("run", "small", "--out", "thesis")
     assert code == 2 and "chapter.tex" in err and not engines.calls
     assert here() == {"thesis/chapter.tex": "mine"}
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ({}, "no such folder"),
+        ({"data/notes.txt": ""}, "dataset.json: no such file"),
+        ({"data/dataset.json": '{"schema": 1,'}, "dataset.json:1:14: broken JSON"),
+        ({"data/dataset.json": "{}"}, "trials: Field required"),
+    ],
+)
+def test_broken_data_end_with_2_and_leave_nothing(tmp_path, monkeypatch, tiago_twin, files, words):
+    monkeypatch.chdir(tmp_path)
+    for name, text in files.items():
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(text)
+    for command in (["calibrate", "data", "--out", "x"], ["evaluate", "data", "data", "--out", "x"]):
+        code, out, err = tiago_twin(*command)
+        assert (code, out) == (2, "") and here() == files
+    code, _, err = tiago_twin("calibrate", "data", "--out", "x")
+    assert words in err

@@ -29,7 +29,8 @@ def printed(table) -> str:
 
 
 def test_the_ladder_shows_rows_units_and_what_it_is_against(tmp_path):
-    (tmp_path / "evaluation.json").write_text(json.dumps({"rows": [{**ROW, "against": "mocap"}]}))
+    rows = [{**ROW, "trials": trials, "against": "mocap"} for trials in ("static", "all")]
+    (tmp_path / "evaluation.json").write_text(json.dumps({"rows": rows}))
     text = printed(console.ladder(tmp_path))
     assert "against mocap" in text
     for words in ("per component [mm]", "norm [mm]", "RMSE [deg]"):
