@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from twin.config import MarkerBody, TwinConfig
 from twin.defects.base import Defect
@@ -127,7 +128,7 @@ def _payload(config: TwinConfig, seed: int) -> Payload:
 def _encoders(config: TwinConfig, seed: int) -> tuple[Encoder, ...]:
     still = (0.0, 0.0, 0.0, 0.0)
     link = config.instruments.link_encoders
-    found = [Encoder(TORSO, "motor", 0.0, still, config.torso.quantum)]
+    found = [Encoder(TORSO, "motor", 0.0, still, config.torso.quantum, prismatic=True)]
     for name, j in config.arm.items():
         found.append(Encoder(name, "motor", j.offset * _factor(config, seed, "offset", name), still, j.quantum))
         rng = generator(seed, "link encoder", name)
@@ -139,13 +140,21 @@ def _encoders(config: TwinConfig, seed: int) -> tuple[Encoder, ...]:
 def _cluster(name: str, body: MarkerBody, seed: int) -> Cluster:
     rng = generator(seed, "cluster", name)
     nominal = np.array(list(body.markers.values()))
+    placement = rng.normal(size=6) * np.repeat([body.translation, body.rotation], 3)
+    scattered = nominal + rng.normal(size=nominal.shape) * body.marker
     frames = {BASE: f"base.{name}", TOOL: "tool.hand"}.get(body.link, f"{body.link}.{name}")
     return Cluster(
         name=name,
         link=body.link,
         frames=frames,
-        xi=rng.normal(size=6) * np.repeat([body.translation, body.rotation], 3),
+        xi=placement,
         marker_names=tuple(body.markers),
         nominal=nominal,
-        shift=rng.normal(size=nominal.shape) * body.marker,
+        shift=_without_rigid_part(scattered, nominal) - nominal,
     )
+
+
+def _without_rigid_part(points: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """Points (n, 3) moved onto `nominal` as one rigid body: a body's frame is where its nominal markers fit best."""
+    p, q = points.mean(axis=0), nominal.mean(axis=0)
+    return Rotation.align_vectors(nominal - q, points - p)[0].apply(points - p) + q

@@ -21,3 +21,14 @@ def test_placements_have_the_width_the_scenario_gives(config, nominal):
     xi = np.array([[d.xi for d in draw(config, nominal, s).defects[:8]] for s in range(100)])
     np.testing.assert_allclose(xi[..., :3].std(), config.widths.placement_translation, rtol=0.05)
     np.testing.assert_allclose(xi[..., 3:].std(), config.widths.placement_rotation, rtol=0.05)
+
+
+def test_marker_errors_do_not_move_their_clusters_frame(lab):
+    for cluster in lab.robot.clusters:
+        true = cluster.nominal + cluster.shift
+        p, q = cluster.nominal - cluster.nominal.mean(axis=0), true - true.mean(axis=0)
+        U, _, Vt = np.linalg.svd(q.T @ p)
+        R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+        np.testing.assert_allclose(R, np.eye(3), atol=1e-9)
+        np.testing.assert_allclose(true.mean(axis=0), cluster.nominal.mean(axis=0), atol=1e-15)
+        assert np.abs(cluster.shift).max() > 1e-5

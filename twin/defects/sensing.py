@@ -26,6 +26,7 @@ class Encoder(Defect):
         offset: Reading at true zero [rad, or m on a prismatic joint].
         harmonics: cos1, sin1, cos2, sin2 [rad], once and twice per turn of the joint.
         quantum: Step of the reading [rad or m].
+        prismatic: Whether the joint's position is a length.
     """
 
     joint_name: str
@@ -33,6 +34,7 @@ class Encoder(Defect):
     offset: float
     harmonics: tuple[float, float, float, float]
     quantum: float
+    prismatic: bool = False
 
     def read(self, q: np.ndarray) -> np.ndarray:
         """Readings (n,) of true angles (n,)."""
