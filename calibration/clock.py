@@ -4,7 +4,7 @@
     lag_k = offset + drift s_k + trial_k + noise_k        s_k the middle of trial k
 
 trial_k is a random effect (model error of a whole trial), its variance the one that makes chi2 equal its degrees of
-freedom. A trial far off the median line is left out and named. Times are centred before the line is fitted.
+freedom, on top of a floor; a floor common to all is added at the end. A trial far off the median line is left out and named. Times are centred before the line is fitted.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,8 @@ from calibration.lag import Lag
 
 _DRIFT = 1e-4  # prior standard deviation of a clock's drift [-]: 100 ppm
 _FAR = 5.0  # robust standard deviations
-_FLOOR = 1e-4  # [s] deviations below this never make a trial an outlier
+_TRIAL = 1e-4  # [s] no trial's lag is believed better than this
+_COMMON = 1.5e-4  # [s] what all trials share: dry friction winds up a gear, the link is always a little late
 
 
 @dataclass(frozen=True)
@@ -72,10 +73,11 @@ def fit_clock(instrument: str, trials: list[TrialLag]) -> tuple[Clock, tuple[str
         )
     s = np.array([t.s for t in trials])
     lag = np.array([t.lag.value for t in trials])
-    sigma = np.array([max(t.lag.sigma, 1e-7) for t in trials])
+    sigma = np.array([max(t.lag.sigma, _TRIAL) for t in trials])
     kept = _inliers(s, lag, sigma)
     fit = _line(s[kept], lag[kept], sigma[kept])
     (offset, drift), (var_lag, var_drift), centre = fit
+    var_lag += _COMMON**2
     J = np.array([[1.0, -centre], [0.0, 1.0]])
     covariance = J @ np.diag([var_lag, var_drift]) @ J.T
     clock = Clock(instrument, float(offset - drift * centre), float(drift), covariance, centre, float(np.sqrt(var_lag)))
@@ -90,7 +92,7 @@ def _inliers(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     r = lag - slope * s
     r = r - np.median(r)
     spread = 1.4826 * np.median(np.abs(r))
-    return np.abs(r) <= np.maximum(_FAR * np.hypot(spread, sigma), _FLOOR)
+    return np.abs(r) <= _FAR * np.hypot(spread, sigma)
 
 
 def _line(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> tuple[tuple[float, float], tuple[float, float], float]:

@@ -1,12 +1,13 @@
 """Stage `clocks`: each instrument's epoch on the motion-capture clock, from calibration trials.
 
-Robot: angular velocity of the hand in the base, turned onto the tool's axes by the rotation that fits best,
+Robot, first: angular velocity of the hand in the base, turned onto the tool's axes by the rotation that fits best,
 
     R w_mocap(t)  =  g w(q, dq)(t - lag) + b + sum a_jk J_j d(play_k(q_j) - q_j)/dt + sum c_j w_before_j x J_j
 
 w from the nominal chain at the motor-side readings, J_j the axis of joint j. The play terms keep a gear's backlash,
 which lags the link behind the motor by 4 gap / (pi amplitude omega), from passing as a clock error; the last ones
 are the zeros of the readings, to first order.
+Then from whole poses, where static postures allow: see `clock_refinement`.
 Plate: its moments Mx, My against those of the nominal floating-base inverse dynamics, see `inverse_dynamics`.
 """
 
@@ -16,10 +17,10 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-import pinocchio as pin
 
 from calibration.bodies import poses_of
 from calibration.clock import Clock, TrialLag, fit_clock
+from calibration.clock_refinement import refined
 from calibration.errors import NotEnoughData
 from calibration.inverse_dynamics import base_moments, floating_model, plate_moments
 from calibration.lag import coarse_lag, fit_lag
@@ -66,7 +67,12 @@ def synchronise(
     Raises:
         NotEnoughData: The robot's clock cannot be told from the motion capture's.
     """
-    robot, verdicts = _clock("robot", _robot_motions(description, chain_of(urdf, description), trials))
+    chain = chain_of(urdf, description)
+    robot, verdicts = _clock("robot", _robot_motions(description, chain, trials))
+    try:
+        robot, verdicts = _concluded("robot", list(refined(chain, description, trials, robot).values()))
+    except NotEnoughData as error:
+        verdicts = (*verdicts, Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}"))
     if not any(len(trial.t_plate) for trial in trials):
         return (robot,), (*verdicts, Verdict("clocks", "missing", "no force plate: no plate clock, no plate wrench"))
     try:
@@ -85,7 +91,12 @@ def _clock(instrument: str, motions: Iterator[Motion]) -> tuple[Clock, tuple[Ver
     lags = _each(
         [m for m in kept if m.trial_id in lags], lambda m: _trial_lag(m, lags[m.trial_id].lag.value, first.drift)
     )
-    clock, outliers = fit_clock(instrument, list(lags.values()))
+    return _concluded(instrument, list(lags.values()))
+
+
+def _concluded(instrument: str, lags: list[TrialLag]) -> tuple[Clock, tuple[Verdict, ...]]:
+    """The clock of these lags, and what is to be said of it."""
+    clock, outliers = fit_clock(instrument, lags)
     message = (
         f"{instrument}: offset {clock.offset:.6f} s, drift {1e6 * clock.drift:.1f} ppm, "
         f"{1e3 * clock.sigma:.3f} ms at its middle, {len(lags) - len(outliers)} trials"
@@ -150,7 +161,7 @@ def _robot_rates(chain: Chain, trial: Trial) -> tuple[Signal, np.ndarray]:
     half_gaps = np.array([_half_gaps(chain, name) for name in chain.joints])
     joint, width = np.nonzero(np.ptp(q, axis=0)[:, None] > _MOVES * half_gaps)
     lost = play(q[:, joint], half_gaps[joint, width]) - q[:, joint]
-    axes = _rotation_axes(chain, 0.5 * (trial.q_motor[1:] + trial.q_motor[:-1]))
+    axes = chain.joint_jacobians(0.5 * (trial.q_motor[1:] + trial.q_motor[:-1]))[:, 3:]
     dt = np.diff(t)[:, None]
     parts = axes * (np.diff(q, axis=0) / dt)[:, None]
     before = np.cumsum(parts, axis=2) - parts
@@ -164,16 +175,6 @@ def _robot_rates(chain: Chain, trial: Trial) -> tuple[Signal, np.ndarray]:
 
 def _half_gaps(chain: Chain, joint: str) -> np.ndarray:
     return np.array(_HALF_GAPS) * (0.1 if chain.is_prismatic(joint) else 1.0)
-
-
-def _rotation_axes(chain: Chain, q: np.ndarray) -> np.ndarray:
-    """Angular part of the tool's Jacobian, its own axes, (n, 3, k)."""
-    model, data = chain.model, chain.model.createData()
-    tool = model.getFrameId(chain.tool_frame)
-    columns = [model.joints[model.getJointId(name)].idx_v for name in chain.joints]
-    return np.array(
-        [pin.computeFrameJacobian(model, data, row, tool, pin.LOCAL)[3:, columns] for row in chain.configurations(q)]
-    )
 
 
 def _plate_motions(urdf: str, description: Description, trials: Sequence[Trial], robot: Clock) -> Iterator[Motion]:

@@ -77,6 +77,10 @@ class HandModel:
         """T_B_H (n, 4, 4) at readings q, in the base marker body."""
         return inverse(from_vector(self.base)) @ self.in_base_frame(q)
 
+    def joint_jacobians(self, q: np.ndarray) -> np.ndarray:
+        """Derivatives of T_B_H by joint position (n, 6, k), local twists of the hand, at readings q."""
+        return adjoint(inverse(from_vector(self.hand))) @ self.chain.joint_jacobians(self.angles(q))
+
     def poses_and_derivatives(self, q: np.ndarray) -> HandPoses:
         """T_B_H and its derivatives at readings q (n, n_measured)."""
         found = self.chain.poses_and_derivatives(self.angles(q))

@@ -75,7 +75,7 @@ def fit_lag(y: Signal, x: Signal, nuisance: np.ndarray, start: float, drift: flo
             f"the records do not show the same motion (explained {explained:.2f}, lag moved {lag - start:+.3f} s)"
         )
     psi = (slope * r / (slope @ slope)).reshape(-1, y.x.shape[1]).sum(axis=1)
-    return Lag(lag, float(np.sqrt(_long_run_variance(psi))), explained)
+    return Lag(lag, float(np.sqrt(long_run_variance(psi, RATE))), explained)
 
 
 def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -96,8 +96,8 @@ def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray) -> tuple[np.ndarray
     return A, r, slope, 1.0 - float(r @ r) / max(total, np.finfo(float).tiny)
 
 
-def _long_run_variance(psi: np.ndarray) -> float:
-    """Variance of sum(psi) allowing for autocorrelation up to `_MEMORY` (Bartlett weights, never negative)."""
+def long_run_variance(psi: np.ndarray, rate: float) -> float:
+    """Variance of sum(psi), sampled at `rate` [Hz], allowing for autocorrelation up to `_MEMORY` (Bartlett weights)."""
     c = correlate(psi, psi, mode="full", method="fft")
     k = np.abs(correlation_lags(len(psi), len(psi)))
-    return float((c * np.clip(1.0 - k / (_MEMORY * RATE), 0.0, None)).sum())
+    return float((c * np.clip(1.0 - k / (_MEMORY * rate), 0.0, None)).sum())

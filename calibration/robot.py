@@ -79,20 +79,24 @@ class Chain:
     def poses_and_derivatives(self, q: np.ndarray) -> ChainPoses:
         """Poses of the tool frame with d(pose)/d(xi) and d(pose)/dq, at q (n, n_measured) [rad, m]."""
         model, data, tool = self.model, self.model.createData(), self._frame(self.tool_frame)
-        n, k = len(q), len(self.joints)
         ids = [model.getJointId(name) for name in self.joints]
-        velocities = [model.joints[i].idx_v for i in ids]
         right = [pin.Jexp6(pin.Motion(xi)) for xi in self.xi]
-        J_placement, J_joint = np.empty((n, 6, 6 * k)), np.empty((n, 6, k))
+        J_placement = np.empty((len(q), 6, 6 * len(ids)))
         for row, q_row in enumerate(self.configurations(q)):
             # The regressor reads data.oMf: it is garbage unless the frames were updated first.
-            J_joint[row] = pin.computeFrameJacobian(model, data, q_row, tool, pin.LOCAL)[:, velocities]
             pin.forwardKinematics(model, data, q_row)
             pin.updateFramePlacements(model, data)
             regressor = pin.computeFrameKinematicRegressor(model, data, tool, pin.LOCAL)
             for j, (i, J_exp) in enumerate(zip(ids, right, strict=True)):
                 J_placement[row, :, 6 * j : 6 * j + 6] = regressor[:, 6 * (i - 1) : 6 * i] @ J_exp
-        return ChainPoses(self.poses(q), J_placement, J_joint)
+        return ChainPoses(self.poses(q), J_placement, self.joint_jacobians(q))
+
+    def joint_jacobians(self, q: np.ndarray) -> np.ndarray:
+        """Derivatives of the tool's pose by joint position (n, 6, k), local twists, at q (n, n_measured)."""
+        model, data, tool = self.model, self.model.createData(), self._frame(self.tool_frame)
+        columns = [model.joints[model.getJointId(name)].idx_v for name in self.joints]
+        rows = [pin.computeFrameJacobian(model, data, x, tool, pin.LOCAL)[:, columns] for x in self.configurations(q)]
+        return np.array(rows).reshape(len(q), 6, len(columns))
 
     def configurations(self, q: np.ndarray) -> np.ndarray:
         """Readings q (n, n_measured) in the model's own order and format, (n, nq)."""
