@@ -88,7 +88,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
         _simulate(scenario, new, progress)
         estimate = _calibrate(new / "dataset", new / "estimate", None, progress)
         evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
-        score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation)
+        score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation, progress)
         _report(new, progress)
     return RunResult(Path(out), scenario, estimate, evaluation, score)
 
@@ -135,7 +135,9 @@ def evaluate(
     """Write evaluation.json into the folder `out`, and score.json where a truth is given; the rest of `out` stays."""
     with folder.updating(out, folder.EVALUATION) as new:
         evaluation = _evaluate(Path(estimate), Path(dataset), new, progress)
-        score = None if truth is None else _score(Path(estimate), Path(dataset), new, Path(truth), evaluation)
+        score = None
+        if truth is not None:
+            score = _score(Path(estimate), Path(dataset), new, Path(truth), evaluation, progress)
     return evaluation, score
 
 
@@ -143,11 +145,8 @@ def report(run_folder: Path | str, progress: Progress = silent) -> Path:
     """Write report.html of a run folder from what is saved there; return its path.
 
     Raises:
-        ScenarioError: The folder is not a run with an evaluation.
+        ScenarioError: The folder holds no evaluation, or a file that cannot be read.
     """
-    for name, maker in (("scenario.yaml", "tiago-twin run"), ("evaluation.json", "tiago-twin evaluate")):
-        if not (Path(run_folder) / name).is_file():
-            raise ScenarioError(f"{run_folder}: holds no {name}; a report is made of a run folder, see {maker} --help")
     _report(Path(run_folder), progress)
     return Path(run_folder) / "report.html"
 
@@ -160,10 +159,13 @@ def versions() -> dict[str, str]:
 def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
     import twin
     from scenarios import yaml_file
+    from twin.picture import picture
 
     progress("simulate", "", 0.0)
     yaml_file.write(out / "scenario.yaml", scenario, beside={"versions": versions()})
     twin.record(scenario.twin, scenario.seed, out, lambda at, fraction: progress("simulate", at, fraction))
+    (out / "figures").mkdir()
+    picture(scenario.twin, scenario.seed, out / "figures" / "twin.png")
 
 
 def _calibrate(dataset: Path, out: Path, stages: Sequence[str] | None, progress: Progress) -> "Estimate":
@@ -190,10 +192,13 @@ def _evaluate(estimate: Path, dataset: Path, out: Path, progress: Progress) -> "
     return evaluation
 
 
-def _score(estimate: Path, dataset: Path, out: Path, truth: Path, evaluation: "Evaluation") -> "Score":
+def _score(
+    estimate: Path, dataset: Path, out: Path, truth: Path, evaluation: "Evaluation", progress: Progress
+) -> "Score":
     import calibration
     from scenarios.score import score
 
+    progress("score", "", 0.0)
     scored = score(calibration.load_estimate(estimate), calibration.load(dataset), truth, evaluation)
     scored.save(out)
     return scored
