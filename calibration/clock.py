@@ -4,7 +4,8 @@
     lag_k = offset + drift s_k + trial_k + noise_k        s_k the middle of trial k
 
 trial_k is a random effect (model error of a whole trial), its variance the one that makes chi2 equal its degrees of
-freedom, on top of a floor; a floor common to all is added at the end. A trial far off the median line is left out and named. Times are centred before the line is fitted.
+freedom, on top of a floor; a floor common to all trials is added at the end. A trial far off the median line is left
+out and named. Times are centred before the line is fitted.
 """
 
 from dataclasses import dataclass

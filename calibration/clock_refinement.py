@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
+from scipy.ndimage import maximum_filter1d
 
 from calibration.bodies import BodyPoses, poses_of
 from calibration.clock import Clock, TrialLag
@@ -33,8 +34,10 @@ from calibration.schema import Description
 from calibration.se3 import adjoint, inverse, rotation_vector
 
 _STRIDE = 2  # motion-capture samples
+_ENOUGH = 100  # samples
 _MOVES = 0.05  # [rad, m] a joint must move to count as moving
-_LOADED = 0.1  # a joint is loaded while |tau| exceeds this share of its largest in the campaign, and this [N.m, N]
+_LOADED, _TORQUE = 0.1, 0.3  # a joint is loaded while |tau| exceeds this share of its largest, and this [N.m, N]
+_JERK, _AFTER = 3.0, 0.3  # samples within _AFTER [s] of faster accelerations [rad/s2, m/s2] are left out: links bounce
 _SLOW = 0.02  # [rad/s, m/s] below which dry friction has no sign
 _FREE = 0.02  # [rad, m] random error of a joint that is not loaded: more than any gear's play
 _log = logging.getLogger(__name__)
@@ -112,11 +115,13 @@ def _samples(description: Description, trial: Trial, clock: Clock) -> Samples:
     def at(x: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(s, trial.t_robot, c, left=np.nan, right=np.nan) for c in x.T], axis=1)
 
-    q = at(trial.q_motor)
-    rows = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]
-    if len(rows) < 100:
-        raise NotEnoughData("base and hand are hardly in view")
-    v = at(np.gradient(trial.q_motor, trial.t_robot, axis=0))
+    rates = np.gradient(trial.q_motor, trial.t_robot, axis=0)
+    jerked = np.abs(np.gradient(rates, trial.t_robot, axis=0)).max(axis=1) > _JERK
+    near = maximum_filter1d(jerked.astype(float), 2 * int(_AFTER / np.median(np.diff(trial.t_robot))) + 1)
+    q, v, calm = at(trial.q_motor), at(rates), at(near[:, None])[:, 0] == 0.0
+    rows = np.flatnonzero(calm & np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]
+    if len(rows) < _ENOUGH:
+        raise NotEnoughData("base and hand are hardly in view, or all motion is jerky")
     return Samples(trial.t_mocap[rows], q[rows], v[rows], T[rows], _covariances(T, base, hand, rows, description))
 
 
@@ -132,7 +137,7 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     """Least squares for the lag with the nuisances eliminated, its sigma allowing for autocorrelation."""
     hand, columns = robot.hand, robot.hand.chain.columns
     v, tau = x.v[:, columns], _gravity_torques(hand, x.q)
-    loaded = np.abs(tau).min(axis=0) > _LOADED * np.maximum(1.0, robot.largest)
+    loaded = np.abs(tau).min(axis=0) > np.maximum(_TORQUE, _LOADED * robot.largest)
     moves = np.ptp(x.q[:, columns], axis=0) > _MOVES
     if not (loaded & moves).any():
         raise NotEnoughData("no joint moves that gravity holds on one flank")

@@ -22,7 +22,7 @@ from calibration.bodies import poses_of
 from calibration.clock import Clock, TrialLag, fit_clock
 from calibration.clock_refinement import refined
 from calibration.errors import NotEnoughData
-from calibration.inverse_dynamics import base_moments, floating_model, plate_moments
+from calibration.inverse_dynamics import carriers, floating_model, model_moments, plate_moments
 from calibration.lag import coarse_lag, fit_lag
 from calibration.markers import base_body, hand_body
 from calibration.play import play
@@ -179,12 +179,11 @@ def _half_gaps(chain: Chain, joint: str) -> np.ndarray:
 
 def _plate_motions(urdf: str, description: Description, trials: Sequence[Trial], robot: Clock) -> Iterator[Motion]:
     """Moments Mx, My of the plate and of the model, of every trial with a plate."""
-    model = floating_model(urdf, description)
+    trials = [trial for trial in trials if len(trial.t_plate)]
+    parts = carriers(floating_model(urdf, description), description, trials)
     for trial in trials:
-        if len(trial.t_plate) == 0:
-            continue
         try:
-            y, (x, nuisance) = plate_moments(trial), base_moments(model, description, trial, robot)
+            y, (x, nuisance) = plate_moments(trial), model_moments(parts, description, trial, robot)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             continue

@@ -1,13 +1,15 @@
-"""What the nominal robot's motion does to the force plate, and what the plate read.
+"""What the robot's motion does to the force plate, and what the plate read.
 
-    W = -(tau_1..6)(q, dq, ddq)      floating base held still, M_arm(q) a + C v + g (RNEA), root axes about the root
-    M_c = R_lab_root m + (p_root - c) x R_lab_root f        about the plate centre c, lab axes [N.m]
+    W = -sum_c RNEA_c(T_lab_root_c(t), q_motor(t))[root]         action on the plate, lab axes, about its centre
 
-The base is where its markers, at nominal places, are in the first second. The base's own sway is left out: at low
-frequency it adds no delay, since plate / arm = (c s + K) / (I s^2 + c s + K).
+The base rocks on its tyres and the torso bends, at frequencies that would shift any lag, so what can be seen is not
+computed: a body of markers carries all links beyond its own, up to the next body's. For each such body c the robot is
+placed so that c's link is where its markers are, at nominal places, and only the masses c carries count. The hand's
+markers are not used. Nominal masses, q_motor beyond the last body.
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -16,20 +18,69 @@ from scipy.interpolate import CubicSpline
 from calibration.bodies import poses_of
 from calibration.clock import Clock
 from calibration.errors import NotEnoughData
-from calibration.markers import base_body
+from calibration.markers import base_body, hand_body
 from calibration.play import play
 from calibration.recording import Trial
 from calibration.robot import reduced_model
-from calibration.schema import Description
-from calibration.se3 import inverse, mean
+from calibration.schema import Body, Description
+from calibration.se3 import from_vector, inverse, mean, to_vector
 from calibration.signals import RATE, Signal, even, low_passed
 
-_CUTOFF = 3.0  # [Hz] below the base's resonance
+_CUTOFF = 4.0  # [Hz]
 _DECIMATED = 0.01  # [s] plate samples averaged together
 _HALF_GAPS = (1e-3, 4e-3)  # [rad, m] of the play terms of each joint
 _MOVES = 20.0  # half gaps a joint must move to get its terms
-_STRIDE = 4  # the dynamics are evaluated every so many samples: 25 Hz for signals below 3 Hz
-_REST = 1.0  # [s] at the start of every trial
+_SEEN = 0.8  # share of a trial a body must be in view to carry anything
+_STRIDE = 2  # the dynamics are evaluated every so many samples: 50 Hz for signals below 4 Hz
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """A marker body and the links it carries.
+
+    Attributes:
+        body: The markers.
+        model: Free-flyer model in which only those links have mass.
+        joints: Velocity indices of the joints beyond the body that move those links.
+    """
+
+    body: Body
+    model: pin.Model
+    joints: tuple[int, ...]
+
+
+def carriers(model: pin.Model, description: Description, trials: Sequence[Trial]) -> tuple[Carrier, ...]:
+    """The base body and every other one but the hand that all trials show, each with the masses up to the next."""
+    base, hand = base_body(description), hand_body(description)
+    others = [b for b in description.bodies if b.name not in (base.name, hand.name)]
+    owner: dict[int, Body] = {1: base}  # of two bodies on one link the first carries it
+    for body in (b for b in others if all(_is_seen(b, trial) for trial in trials)):
+        owner.setdefault(int(model.frames[model.getFrameId(body.link)].parentJoint), body)
+    nearest = [next((i for i in reversed(list(model.supports[j])) if i in owner), 1) for j in range(model.njoints)]
+    return tuple(
+        Carrier(
+            body,
+            _with_masses(model, [i == joint for i in nearest]),
+            tuple(model.joints[j].idx_v for j in range(2, model.njoints) if nearest[j] == joint != j),
+        )
+        for joint, body in owner.items()
+    )
+
+
+def _is_seen(body: Body, trial: Trial) -> bool:
+    try:
+        return bool(np.isfinite(poses_of(body, trial).T[:, 0, 0]).mean() > _SEEN)
+    except NotEnoughData:
+        return False
+
+
+def _with_masses(model: pin.Model, kept: Sequence[bool]) -> pin.Model:
+    """A copy of the model in which only the joints `kept` carry mass."""
+    copy = model.copy()
+    for joint, keep in enumerate(kept):
+        if not keep:
+            copy.inertias[joint] = pin.Inertia.Zero()
+    return copy
 
 
 def floating_model(urdf: str, description: Description) -> pin.Model:
@@ -53,48 +104,80 @@ def plate_moments(trial: Trial) -> Signal:
     return low_passed(even(t, moment[:n, :2].reshape(-1, size, 2).mean(axis=1)), _CUTOFF)
 
 
-def base_moments(model: pin.Model, description: Description, trial: Trial, robot: Clock) -> tuple[Signal, np.ndarray]:
-    """The same from the nominal model along q_motor, on the mocap clock, and what play and zeros add (n, k, 2)."""
-    q = even(robot.to_mocap(trial.t_robot), trial.q_motor)
+def model_moments(
+    parts: Sequence[Carrier], description: Description, trial: Trial, robot: Clock
+) -> tuple[Signal, np.ndarray]:
+    """The same from masses and motion, on the mocap clock, and what play and zeros of the joints add (n, k, 2).
+
+    Raises:
+        NotEnoughData: A body is not in view for long enough.
+    """
+    order = [description.joint_names.index(name) for name in list(parts[0].model.names)[2:]]
+    q = even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order])
     lost = [play(q.x, np.full(q.x.shape[1], w)) - q.x for w in _HALF_GAPS]
-    both = low_passed(replace(q, x=np.hstack([q.x, *lost, np.ones_like(q.x)])), _CUTOFF)
-    order = [description.joint_names.index(name) for name in list(model.names)[2:]]
-    x = both.x.reshape(len(q.t), len(lost) + 2, -1)[:, :, order]
-    T_lab_root = _root_in_lab(description, trial, model)
-    wrench, change = _root_wrenches(model, T_lab_root, x)
-    T_c_root = pin.SE3(T_lab_root[:3, :3], T_lab_root[:3, 3] - trial.plate_centre[0])
-    action = -T_c_root.dualAction[3:5]
-    moves = np.ptp(q.x[:, order], axis=0) > _MOVES * _HALF_GAPS[0]
-    nuisance = np.einsum("mi,niwk->nwkm", action, change[..., moves]).reshape(len(q.t), -1, 2)
-    return Signal(both.t, wrench @ action.T, both.valid), nuisance
+    x = low_passed(replace(q, x=np.hstack([q.x, *lost, np.ones_like(q.x)])), _CUTOFF).x
+    x = x.reshape(len(q.t), len(lost) + 2, -1)
+    found = [_carried(part, trial, q.t, x) for part in parts]
+    nuisance = np.concatenate([n for _, n, _ in found], axis=1)
+    valid = q.valid & np.logical_and.reduce([v for _, _, v in found])
+    return Signal(q.t, np.sum([m for m, _, _ in found], axis=0), valid), nuisance
 
 
-def _root_in_lab(description: Description, trial: Trial, model: pin.Model) -> np.ndarray:
-    """T_lab_root (4, 4) of the first second, from the base markers at their nominal places."""
-    body = base_body(description)
-    T_lab_body = poses_of(body, trial).T[trial.t_mocap < trial.t_mocap[0] + _REST]
-    if not np.isfinite(T_lab_body).any():
-        raise NotEnoughData(f"{trial.id}: body {body.name!r} is not seen in the first second")
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, pin.neutral(model))
-    T_root_body = data.oMi[1].actInv(data.oMf[model.getFrameId(body.link)]).homogeneous
-    return mean(T_lab_body) @ inverse(T_root_body)
+def _carried(part: Carrier, trial: Trial, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Moments (n, 2) of what a body carries at t, their nuisance terms (n, k, 2), and validity.
 
-
-def _root_wrenches(model: pin.Model, T_lab_root: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """RNEA's root wrench (n, 6) along x[:, 0] (n, k), and its change by x[:, w] joint by joint (n, 6, w - 1, k)."""
-    data, rows = model.createData(), np.append(np.arange(0, len(x) - 1, _STRIDE), len(x) - 1)
-    rates = np.gradient(x, 1.0 / RATE, axis=0)
-    accelerations = np.gradient(rates, 1.0 / RATE, axis=0)
-    neutral = pin.neutral(model)
-    neutral[:7] = pin.SE3ToXYZQUAT(pin.SE3(T_lab_root))
-    still = np.zeros(6)
-    wrench, change = np.empty((len(rows), 6)), np.empty((len(rows), 6, x.shape[1] - 1, x.shape[2]))
-    for k, row in enumerate(rows):
-        q = pin.integrate(model, neutral, np.append(still, x[row, 0]))
-        v, a = np.append(still, rates[row, 0]), np.append(still, accelerations[row, 0])
+    Nuisances are to first order x[:, 1:] of the joints beyond the body and the ten inertial parameters of its link.
+    """
+    rows = np.append(np.arange(0, len(t) - 1, _STRIDE), len(t) - 1)
+    T_lab_link, valid = _link_poses(part.body, trial, t)
+    T = T_lab_link @ inverse(_root_to_link(part, x[:, 0]))
+    rates, turns, link_turns = np.gradient(x, 1.0 / RATE, axis=0), _body_twists(T), _body_twists(T_lab_link)
+    accelerations, pushes, link_pushes = (np.gradient(v, 1.0 / RATE, axis=0) for v in (rates, turns, link_turns))
+    mine = np.array([j for j in part.joints if np.ptp(x[:, 0, j - 6]) > _MOVES * _HALF_GAPS[0]], dtype=int)
+    model, data, neutral, found = part.model, part.model.createData(), pin.neutral(part.model), []
+    for row in rows:
+        q = pin.integrate(model, neutral, np.append(np.zeros(6), x[row, 0]))
+        q[:7] = pin.SE3ToXYZQUAT(pin.SE3(T[row]))
+        v, a = np.append(turns[row], rates[row, 0]), np.append(pushes[row], accelerations[row, 0])
         dq, _, da = pin.computeRNEADerivatives(model, data, q, v, a)
-        wrench[k] = data.tau[:6]
-        change[k] = dq[:6, None, 6:] * x[row, 1:] + da[:6, None, 6:] * accelerations[row, 1:]
-    every = np.arange(len(x))
-    return CubicSpline(rows, wrench)(every), CubicSpline(rows, change)(every)
+        action = _action(T[row], trial)
+        moved = action @ dq[:6, mine] * x[row, 1:, None, mine - 6].transpose(1, 2, 0)
+        pushed = action @ da[:6, mine] * accelerations[row, 1:, None, mine - 6].transpose(1, 2, 0)
+        felt = pin.Motion(link_pushes[row]) - pin.SE3(T_lab_link[row]).actInv(model.gravity)
+        rigid = _action(T_lab_link[row], trial) @ pin.bodyRegressor(pin.Motion(link_turns[row]), felt)
+        joints = np.swapaxes(moved + pushed, 1, 2).reshape(-1, 2)
+        found.append(np.concatenate([(action @ data.tau[:6])[None], joints, rigid.T]))
+    smooth = CubicSpline(rows, np.array(found))(np.arange(len(t)))
+    return smooth[:, 0], smooth[:, 1:], valid
+
+
+def _action(T_lab_frame: np.ndarray, trial: Trial) -> np.ndarray:
+    """Rows (2, 6): wrench that holds links, in a frame's axes -> moments Mx, My of its reaction on the plate."""
+    centre = trial.plate_centre[0]
+    return -pin.SE3(T_lab_frame[:3, :3], T_lab_frame[:3, 3] - centre).dualAction[3:5]
+
+
+def _link_poses(body: Body, trial: Trial, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """T_lab_link (n, 4, 4) at t with the link where the body's markers are, smooth, and validity (n,)."""
+    T = poses_of(body, trial).T
+    middle = mean(T)
+    moved = low_passed(even(trial.t_mocap, to_vector(inverse(middle) @ T)), _CUTOFF)
+    columns = [np.interp(t, moved.t, c) for c in moved.x.T]
+    valid = np.interp(t, moved.t, moved.valid.astype(float), 0.0, 0.0) == 1.0
+    return middle @ from_vector(np.stack(columns, axis=1)), valid
+
+
+def _root_to_link(part: Carrier, q: np.ndarray) -> np.ndarray:
+    """T_root_link (n, 4, 4) at joint positions q (n, k)."""
+    model, data, link = part.model, part.model.createData(), part.model.getFrameId(part.body.link)
+    neutral, T = pin.neutral(model), np.empty((len(q), 4, 4))
+    for k, row in enumerate(q):
+        pin.forwardKinematics(model, data, pin.integrate(model, neutral, np.append(np.zeros(6), row)))
+        T[k] = data.oMi[1].actInv(pin.updateFramePlacement(model, data, link)).homogeneous
+    return T
+
+
+def _body_twists(T: np.ndarray) -> np.ndarray:
+    """Local twists (n, 6) [m/s, rad/s] of poses (n, 4, 4) on the grid, central differences."""
+    before, after = np.concatenate([T[:1], T[:-1]]), np.concatenate([T[1:], T[-1:]])
+    return to_vector(inverse(before) @ after) * 0.5 * RATE

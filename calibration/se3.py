@@ -24,8 +24,8 @@ def compose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 def from_vector(value: np.ndarray) -> np.ndarray:
-    """Transform (4, 4) whose translation [m] and rotation vector [rad] are `value` (6,)."""
-    return compose(Rotation.from_rotvec(value[3:]).as_matrix(), value[:3])
+    """Transforms (..., 4, 4) whose translation [m] and rotation vector [rad] are `value` (..., 6), one axis at most."""
+    return compose(Rotation.from_rotvec(value[..., 3:]).as_matrix(), value[..., :3])
 
 
 def to_vector(T: np.ndarray) -> np.ndarray:
