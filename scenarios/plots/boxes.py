@@ -1,0 +1,74 @@
+"""Boxplot of absolute errors, a box a row.
+
+Box: quartiles and median. Whiskers: 5 % and 95 %. Dot: root mean square.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from scenarios.plots.style import TRUTH
+
+_SHARES = (5.0, 25.0, 50.0, 75.0, 95.0)
+_HEIGHT = 0.56  # of a box, as a share of the distance between rows [-]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Errors of one row.
+
+    Attributes:
+        label: Its name.
+        values: (n,) absolute errors, without NaN.
+        colour: Of its box.
+        hollow: Draw the outline only.
+    """
+
+    label: str
+    values: np.ndarray
+    colour: str
+    hollow: bool = False
+
+
+def error_boxes(samples: Sequence[Sample], quantity: str, floor: float | None, ax: Axes) -> Axes:
+    """Draw samples from top to bottom.
+
+    Args:
+        samples: The rows.
+        quantity: What is along x, with its unit in brackets.
+        floor: Root mean square that no model can undercut, in the unit of the samples; None where not known.
+        ax: Where to draw.
+    """
+    for y, sample in enumerate(samples):
+        _box(y, sample, ax)
+    if floor is not None:
+        ax.axvline(floor, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=0.9)
+    ax.set_yticks(range(len(samples)), [s.label for s in samples])
+    ax.set_ylim(len(samples) - 0.45, -0.55)
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel(quantity)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
+    return ax
+
+
+def _box(y: float, sample: Sample, ax: Axes) -> None:
+    low, first, median, third, high = np.percentile(sample.values, _SHARES)
+    half = _HEIGHT / 2.0
+    ax.hlines(y, low, high, color=sample.colour, linewidth=1.0)
+    ax.vlines([low, high], y - half / 2, y + half / 2, color=sample.colour, linewidth=1.0)
+    ax.barh(
+        y,
+        third - first,
+        _HEIGHT,
+        left=first,
+        facecolor="white" if sample.hollow else sample.colour,
+        edgecolor=sample.colour,
+        linewidth=1.1,
+        zorder=2,
+    )
+    ax.vlines(median, y - half, y + half, color=sample.colour if sample.hollow else "white", linewidth=1.6, zorder=3)
+    rms = float(np.sqrt((sample.values**2).mean()))
+    ax.plot(rms, y, marker="o", color="black", markersize=3.2, markeredgecolor="white", markeredgewidth=0.6, zorder=4)
