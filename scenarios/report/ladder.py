@@ -1,0 +1,109 @@
+"""The ladder: rows in one order, each with how it was predicted, against the motion capture and against the truth."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from scenarios.report.results import Results, Row
+
+MEANINGS = {
+    "nominal": "datasheet geometry, marker bodies where the drawing says",
+    "model_1": "nominal and the published suspension",
+    "model_2": "registration and geometric calibration",
+    "model_3": "model_2 and the published sigmoid-polynomial joint model",
+    "registration": "datasheet geometry, marker bodies fitted: the honest baseline",
+    "full": "one fit of geometry, suspension with stick-slip and a physical joint model",
+    "floor": "the true parameters and states through the same measurements: what no model can undercut",
+}
+BASES = {
+    "fixed": "base assumed still",
+    "plate": "base from the force plate",
+    "dynamics": "base from inverse dynamics",
+    "measured": "base measured",
+}
+_MODELS, _BASES, _ENCODERS = tuple(MEANINGS), tuple(BASES), ("motor", "link")
+_PREDICTIVE = ("dynamics", "plate", "fixed")
+
+
+@dataclass(frozen=True)
+class Step:
+    """One row of the ladder.
+
+    Attributes:
+        model: Its model.
+        base: Where the base's motion comes from.
+        encoder: Which side of the gear was read.
+        trials: `dynamic`, `static` or `all`.
+        mocap: Its error against the motion capture.
+        truth: Its error against the truth.
+    """
+
+    model: str
+    base: str
+    encoder: str
+    trials: str
+    mocap: Row | None
+    truth: Row | None
+
+    @property
+    def kind(self) -> str:
+        """`predictive`, what it was given beyond that, or `floor`."""
+        if self.model == "floor":
+            return "floor"
+        given = {"base": self.base == "measured", "encoder": self.encoder == "link"}
+        oracles = [name for name, is_given in given.items() if is_given]
+        return f"oracle: {' and '.join(oracles)}" if oracles else "predictive"
+
+    @property
+    def label(self) -> str:
+        """A short name for a figure."""
+        return f"{self.model}, {self.base}" + ("" if self.encoder == "motor" else f", {self.encoder}")
+
+    @property
+    def main(self) -> Row:
+        """Its error against the motion capture, or against the truth where that is all there is."""
+        return next(row for row in (self.mocap, self.truth) if row is not None)
+
+
+def ladder(results: Results, trials: str) -> tuple[Step, ...]:
+    """Rows of a kind of trial, in order; models that are not known come after the known ones, before the floor."""
+    mocap = {row.key: row for row in results.evaluation.rows}
+    truth = {row.key: row for row in results.score.rows} if results.score else {}
+    keys = [key for key in dict.fromkeys((*mocap, *truth)) if key[3] == trials]
+    return tuple(Step(*key, mocap.get(key), truth.get(key)) for key in sorted(keys, key=_position))
+
+
+def _position(key: tuple[str, str, str, str]) -> tuple[int, int, int]:
+    model, base, encoder, _ = key
+    place = len(_MODELS) if model == "floor" else _index(_MODELS[:-1], model)
+    return place, _index(_BASES, base), _index(_ENCODERS, encoder)
+
+
+def _index(known: Sequence[str], name: str) -> int:
+    return known.index(name) if name in known else len(known)
+
+
+def predictive(steps: Iterable[Step], model: str) -> Step | None:
+    """The row of a model that reads motor encoders and no measured base; the one that models the base's motion best."""
+    return _first(steps, model, _PREDICTIVE)
+
+
+def oracle_base(steps: Iterable[Step], model: str) -> Step | None:
+    """The row of a model with motor encoders and the measured base."""
+    return _first(steps, model, ("measured",))
+
+
+def floor(steps: Iterable[Step]) -> Row | None:
+    """What no model can undercut."""
+    return next((s.main for s in steps if s.model == "floor"), None)
+
+
+def _first(steps: Iterable[Step], model: str, bases: Sequence[str]) -> Step | None:
+    mine = {s.base: s for s in steps if s.model == model and s.encoder == "motor"}
+    return next((mine[base] for base in bases if base in mine), None)
+
+
+def headline_model(results: Results, steps: Sequence[Step]) -> str:
+    """The model the report is about: the estimate's main one, else the last estimated one of the ladder."""
+    main = results.estimate.main if results.estimate else ""
+    known = [s.model for s in steps if s.model not in ("nominal", "registration", "floor")]
+    return main if main in known else (known[-1] if known else steps[-1].model)
