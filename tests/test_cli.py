@@ -15,6 +15,7 @@ from typing import Annotated
 
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import calibration
 import scenarios
@@ -54,6 +55,11 @@ class Scenario(BaseModel):
         return self.model_copy(update={"description": "short"})
 
 
+def blas_threads() -> tuple[int, ...]:
+    """Threads of each loaded library of linear algebra."""
+    return tuple(library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas")
+
+
 @dataclass
 class Engines:
     """Stand-ins; `fail` raises in a step, `calls` keeps what they were given."""
@@ -79,6 +85,7 @@ class Engines:
 
     def calibrate(self, dataset, stages=None, progress=None):
         self.step("calibrate", dataset, stages)
+        self.calls["blas"] = blas_threads()
         return self.load_estimate(dataset)
 
     def load_estimate(self, path):
@@ -187,6 +194,13 @@ def test_only_the_dataset_reaches_the_calibration(engines, tiago_twin):
     tiago_twin("run", "small")
     dataset, stages = engines.calls["calibrate"]
     assert (dataset.name, stages) == ("dataset", None)
+
+
+def test_engines_work_with_one_blas_thread_and_nobody_else_is_limited(engines, tiago_twin):
+    with threadpool_limits(2, "blas"):
+        tiago_twin("run", "small")
+        assert set(engines.calls["blas"]) == {1}
+        assert set(blas_threads()) == {2}
 
 
 def test_progress_is_told_on_stderr_without_a_terminal(engines, tiago_twin):
