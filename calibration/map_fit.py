@@ -105,6 +105,15 @@ def fit(model: HandModel, parameters: ParameterSet, postures: Postures, play: np
     return replace(result, covariance=_covariance(result.J_white, parameters))
 
 
+def fit_weighted(model: HandModel, parameters: ParameterSet, postures: Postures, W: np.ndarray) -> Fit:
+    """Fit with given whiteners W (n, 6, 6), no random errors of the joints; sigma from the residuals' own size."""
+    at, still = _newton(model, parameters, postures, linearised(model, parameters.nominal, postures), W)
+    result = Fit(at, np.zeros(at.J_joint.shape[2]), np.zeros((0, 0)), W, still)
+    dof = max(1, result.r_white.size - len(parameters))
+    factor = float((result.r_white**2).sum()) / dof
+    return replace(result, covariance=factor * _covariance(result.J_white, parameters))
+
+
 def linearised(model: HandModel, theta: np.ndarray, postures: Postures) -> Linearised:
     """Residuals and derivatives at theta (p,), p = 12 or all."""
     found = model.with_theta(theta).poses_and_derivatives(postures.q)

@@ -14,7 +14,7 @@ from calibration.errors import NoSuchElement, NotEnoughData
 from calibration.estimate import Estimate, Model, RobotNames
 from calibration.geometry import calibrate_geometry
 from calibration.plausibility import implausible_inputs
-from calibration.postures import Postures, read_postures
+from calibration.postures import Postures, read_passing, read_postures
 from calibration.registration import register
 from calibration.robot import Chain, chain_of
 from calibration.schema import Description
@@ -25,6 +25,7 @@ Stage = Callable[[Chain, Description, Postures], tuple[Model, tuple[Verdict, ...
 
 CLOCKS = "clocks"
 FITS: tuple[tuple[str, Stage], ...] = (("registration", register), ("geometry", calibrate_geometry))
+_SPACING = 0.5  # [s] of the swings' postures the registration sees beside the static ones
 STAGES = (CLOCKS, *(name for name, _ in FITS))
 
 
@@ -58,9 +59,14 @@ def calibrate(dataset: Dataset, stages: Sequence[str] | None = None, progress: P
         return _estimate(dataset, verdicts, clocks, [])
     tell("postures", 0.7)
     models, postures = [], read_postures(dataset.description, trials, clocks[0])
+    swings = [
+        trial for entry, trial in zip(dataset.entries("calibration"), trials, strict=True) if entry.kind == "swing"
+    ]
+    passing = read_passing(dataset.description, swings, clocks[0], _SPACING) if swings else None
     for k, (name, stage) in enumerate(fits):
         tell(name, 0.8 + 0.2 * k / len(fits))
-        model, said = stage(chain, dataset.description, postures)
+        data = postures.joined(passing) if stage is register and passing is not None else postures
+        model, said = stage(chain, dataset.description, data)
         models.append(model.with_clocks(clocks))
         verdicts += said
     tell("done", 1.0)

@@ -11,11 +11,11 @@ correlated in time, and motion that has not died out.
 
 import logging
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from calibration.bodies import BodyPoses, body_poses
+from calibration.bodies import BodyPoses, body_poses, poses_of
 from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.markers import base_body, hand_body
@@ -25,6 +25,7 @@ from calibration.se3 import adjoint, inverse, to_vector
 
 _MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
 _BLOCKS = 4
+_REST = 1.0  # [s] at the start of every trial
 _log = logging.getLogger(__name__)
 
 
@@ -47,6 +48,11 @@ class Postures:
     def __len__(self) -> int:
         return len(self.q)
 
+    def joined(self, other: "Postures") -> "Postures":
+        """These postures, then the other ones."""
+        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        return Postures(*(np.concatenate(pair) for pair in pairs))
+
 
 def dwell_windows(trial: Trial) -> np.ndarray:
     """Start and stop of each dwell without its margins, (n, 2) [s, mocap clock]."""
@@ -68,6 +74,31 @@ def read_postures(description: Description, trials: Iterable[Trial], robot: Cloc
     factor = _inflation(quarters, unit)
     _log.info("%d postures, noise of their means %.1f times that of independent samples", len(q), np.sqrt(factor))
     return Postures(q, T, factor * unit, misfit)
+
+
+def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
+    """Postures passed through every `spacing` [s] of these trials, one sample each, their first second left out."""
+    found = [_passed(description, trial, robot, spacing) for trial in trials]
+    T, q, S, misfit = (np.concatenate(x) for x in zip(*found, strict=True))
+    good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
+    return Postures(q[good], T[good], S[good] * description.sigmas.marker**2, misfit[good])
+
+
+def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
+    start, stop = trial.t_mocap[0] + _REST, trial.t_mocap[-1]
+    rows = np.unique(np.searchsorted(trial.t_mocap, np.arange(start, stop, spacing)))
+    base, hand = (poses_of(body(description), trial) for body in (base_body, hand_body))
+    T = inverse(base.T[rows]) @ hand.T[rows]
+    Ad = adjoint(inverse(T))
+    S = hand.covariance[rows] + Ad @ base.covariance[rows] @ np.swapaxes(Ad, 1, 2)
+    return T, readings_at(trial, robot, trial.t_mocap[rows]), S, np.zeros(len(rows))
+
+
+def readings_at(trial: Trial, robot: Clock, t: np.ndarray) -> np.ndarray:
+    """Motor-side readings (n, n_joints) at mocap times t (n,) [s], linear; NaN outside the recording."""
+    s = robot.from_mocap(t)
+    columns = (np.interp(s, trial.t_robot, q, left=np.nan, right=np.nan) for q in trial.q_motor.T)
+    return np.stack(list(columns), axis=1)
 
 
 def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray, ...]]:

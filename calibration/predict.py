@@ -22,6 +22,7 @@ from calibration.estimate import Estimate
 from calibration.hand import HandModel, nominal_hand
 from calibration.markers import base_body
 from calibration.parameters import nominal_frames
+from calibration.postures import readings_at
 from calibration.recording import Trial
 from calibration.robot import chain_of
 from calibration.schema import Body, Role, TrialEntry
@@ -104,10 +105,3 @@ def predictions(estimate: Estimate, dataset: Dataset, role: Role = "validation")
     predict = predictor(estimate, dataset)
     for entry, trial in dataset.trials(role):
         yield from predict(entry, trial)
-
-
-def readings_at(trial: Trial, robot: Clock, t: np.ndarray) -> np.ndarray:
-    """Motor-side readings (n, n_joints) at mocap times t (n,) [s], linear; NaN outside the recording."""
-    s = robot.from_mocap(t)
-    columns = (np.interp(s, trial.t_robot, q, left=np.nan, right=np.nan) for q in trial.q_motor.T)
-    return np.stack(list(columns), axis=1)

@@ -1,17 +1,20 @@
 """Stage `registration`: nominal geometry, the two marker bodies placed where the data say.
 
-    log6(T_measured^-1 T_base_B^-1 T_base_tool(q_motor) T_tool_H),    12 parameters, no prior
+    minimise  sum_i |log6(T_measured_i^-1 T_base_B^-1 T_base_tool(q_i) T_tool_H)|^2 / tolerance^2      12 parameters
 
-The honest baseline: what is left after it is geometry, zeros, play and the base. With the arm alone moving, all twelve
-are identifiable once it turns about two directions; where the base stands in the lab is not asked.
+The honest baseline: what is left after it is geometry, zeros, play and the base. Those errors are millimetres where the
+markers' noise is a tenth of one, so position and rotation weigh as the datasheet's tolerance of a marker body does, and
+postures passed through in swings count beside the static ones: a baseline must not hang on where the statics lie.
+With the arm alone moving, all twelve are identifiable once it turns about two directions; where the base stands in the
+lab is not asked.
 """
 
 import numpy as np
 
 from calibration.estimate import Model
 from calibration.hand import nominal_hand
-from calibration.map_fit import fit
-from calibration.parameters import play_floor, play_start, registration_parameters
+from calibration.map_fit import fit_weighted
+from calibration.parameters import registration_parameters
 from calibration.postures import Postures
 from calibration.result import model_of
 from calibration.robot import Chain
@@ -24,12 +27,10 @@ STAGE = "registration"
 def register(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
     """The two frames, and what is to be said of them."""
     parameters = registration_parameters(chain, description)
-    found = fit(
-        nominal_hand(chain, parameters.nominal),
-        parameters,
-        postures,
-        play_start(chain, description),
-        play_floor(chain, description),
+    tol = description.tolerances
+    W = np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3))
+    found = fit_weighted(
+        nominal_hand(chain, parameters.nominal), parameters, postures, np.tile(W, (len(postures), 1, 1))
     )
     model = model_of(STAGE, chain, parameters, found)
     if not found.converged:
