@@ -1,17 +1,17 @@
 """Epoch of an instrument on the motion-capture clock, from lags of several trials.
 
     t_mocap = s (1 + drift) + offset                      s on the instrument's clock [s]
-    lag_k = offset + drift s_k + trial_k + noise_k        s_k the middle of trial k
+    lag_k = offset + drift s_k + noise_k                  s_k the middle of trial k
+    var noise_k = B^2 (sigma_k^2 + floor^2)               B^2 = max(1, chi2 / degrees of freedom)   (Birge ratio)
 
-trial_k is a random effect (model error of a whole trial), its variance the one that makes chi2 equal its degrees of
-freedom, on top of a floor; a floor common to all trials is added at the end. A trial far off the median line is left
-out and named. Times are centred before the line is fitted.
+The model errors of a trial grow with its own sigma: what moves little shows little, and most of it wrong. What all
+trials share is added at the end. A trial far off the median line is left out and named. Times are centred
+before the line is fitted.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.stats import theilslopes
 
 from calibration.errors import NotEnoughData
@@ -19,8 +19,7 @@ from calibration.lag import Lag
 
 _DRIFT = 1e-4  # prior standard deviation of a clock's drift [-]: 100 ppm
 _FAR = 5.0  # robust standard deviations
-_TRIAL = 1e-4  # [s] no trial's lag is believed better than this
-_COMMON = 1.5e-4  # [s] what all trials share: dry friction winds up a gear, the link is always a little late
+_TRIAL = 1e-4  # [s] floor of a trial's sigma
 
 
 @dataclass(frozen=True)
@@ -61,8 +60,13 @@ class TrialLag:
     lag: Lag
 
 
-def fit_clock(instrument: str, trials: list[TrialLag]) -> tuple[Clock, tuple[str, ...]]:
+def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> tuple[Clock, tuple[str, ...]]:
     """The clock, and the ids of the trials left out.
+
+    Args:
+        instrument: Its name.
+        trials: Lags of several trials.
+        common: Standard deviation of what all trials share [s].
 
     Raises:
         NotEnoughData: No trial gave a lag.
@@ -74,11 +78,11 @@ def fit_clock(instrument: str, trials: list[TrialLag]) -> tuple[Clock, tuple[str
         )
     s = np.array([t.s for t in trials])
     lag = np.array([t.lag.value for t in trials])
-    sigma = np.array([max(t.lag.sigma, _TRIAL) for t in trials])
+    sigma = np.array([np.hypot(t.lag.sigma, _TRIAL) for t in trials])
     kept = _inliers(s, lag, sigma)
     fit = _line(s[kept], lag[kept], sigma[kept])
     (offset, drift), (var_lag, var_drift), centre = fit
-    var_lag += _COMMON**2
+    var_lag += common**2
     J = np.array([[1.0, -centre], [0.0, 1.0]])
     covariance = J @ np.diag([var_lag, var_drift]) @ J.T
     clock = Clock(instrument, float(offset - drift * centre), float(drift), covariance, centre, float(np.sqrt(var_lag)))
@@ -97,20 +101,12 @@ def _inliers(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> np.ndarray:
 
 
 def _line(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """(lag at the centre, drift), their variances, and the centre, with the random effect of trials included."""
-
-    def solve(extra: float) -> tuple[tuple[float, float], tuple[float, float], float, float]:
-        w = 1.0 / (sigma**2 + extra**2)
-        centre = float(w @ s / w.sum())
-        d, reference = s - centre, float(w @ lag / w.sum())
-        information = float(w @ d**2) + _DRIFT**-2
-        drift = float(w @ (d * (lag - reference))) / information
-        r = lag - reference - drift * d
-        return (reference, drift), (1.0 / float(w.sum()), 1.0 / information), centre, float(w @ r**2)
-
-    dof = len(s) - 2
-    extra = 0.0
-    if dof > 0 and solve(0.0)[3] > dof:
-        extra = float(brentq(lambda e: solve(e)[3] - dof, 0.0, 10.0 * max(np.ptp(lag), 1e-6), xtol=1e-9))
-    values, variances, centre, _ = solve(extra)
-    return values, variances, centre
+    """(lag at the centre, drift), their variances, and the centre: weighted least squares, a prior on the drift."""
+    w = sigma**-2.0
+    centre, reference = float(w @ s / w.sum()), float(w @ lag / w.sum())
+    d = s - centre
+    information = float(w @ d**2) + _DRIFT**-2
+    drift = float(w @ (d * (lag - reference))) / information
+    chi2, dof = float(w @ (lag - reference - drift * d) ** 2), len(s) - 2
+    birge = max(1.0, chi2 / dof) if dof > 0 else 1.0
+    return (reference, drift), (birge / float(w.sum()), birge / information), centre

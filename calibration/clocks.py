@@ -23,7 +23,7 @@ from calibration.clock import Clock, TrialLag, fit_clock
 from calibration.clock_refinement import refined
 from calibration.errors import NotEnoughData
 from calibration.inverse_dynamics import carriers, floating_model, model_moments, plate_moments
-from calibration.lag import coarse_lag, fit_lag
+from calibration.lag import Pair, coarse_lag, fit_lag
 from calibration.markers import base_body, hand_body
 from calibration.play import play
 from calibration.recording import Trial
@@ -33,6 +33,8 @@ from calibration.se3 import inverse
 from calibration.signals import Signal, body_rates, even, low_passed
 from calibration.verdict import Verdict
 
+# What all trials share [s]: dry friction winds gears up, the link is always late; markers are noisy accelerometers.
+_COMMON = {"robot": 1.5e-4, "plate": 8e-4}
 _CUTOFF = 6.0  # robot [Hz]
 _HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
 _MOVES = 8.0  # a joint whose range exceeds this many half gaps gets that play term
@@ -42,21 +44,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Motion:
-    """What two clocks are compared by.
-
-    Attributes:
-        trial_id: The trial.
-        y: The noisier of the two, whose residual is minimised.
-        x: The other.
-        nuisance: (n, k, c) of the instant of x.
-        sign: 1 where y is on the mocap clock, -1 where it is on the instrument's.
-    """
+    """What the motion capture (y) and an instrument (x) show of one trial."""
 
     trial_id: str
-    y: Signal
-    x: Signal
-    nuisance: np.ndarray
-    sign: int
+    pair: Pair
 
 
 def synchronise(
@@ -85,7 +76,7 @@ def synchronise(
 def _clock(instrument: str, motions: Iterator[Motion]) -> tuple[Clock, tuple[Verdict, ...]]:
     """Two passes: the second knows the drift within a trial."""
     kept = list(motions)
-    starts = _each(kept, lambda m: m.sign * coarse_lag(m.y, m.x))
+    starts = _each(kept, lambda m: coarse_lag(m.pair.y, m.pair.x))
     lags = _each(kept, lambda m: _trial_lag(m, starts[m.trial_id], 0.0))
     first, _ = fit_clock(instrument, list(lags.values()))
     lags = _each(
@@ -96,7 +87,7 @@ def _clock(instrument: str, motions: Iterator[Motion]) -> tuple[Clock, tuple[Ver
 
 def _concluded(instrument: str, lags: list[TrialLag]) -> tuple[Clock, tuple[Verdict, ...]]:
     """The clock of these lags, and what is to be said of it."""
-    clock, outliers = fit_clock(instrument, lags)
+    clock, outliers = fit_clock(instrument, lags, _COMMON[instrument])
     message = (
         f"{instrument}: offset {clock.offset:.6f} s, drift {1e6 * clock.drift:.1f} ppm, "
         f"{1e3 * clock.sigma:.3f} ms at its middle, {len(lags) - len(outliers)} trials"
@@ -119,10 +110,8 @@ def _each(motions: list[Motion], function: Callable[[Motion], T]) -> dict[str, T
 
 
 def _trial_lag(motion: Motion, start: float, drift: float) -> TrialLag:
-    lag = fit_lag(motion.y, motion.x, motion.nuisance, motion.sign * start, motion.sign * drift)
-    middle = 0.5 * (motion.y.t[0] + motion.y.t[-1])
-    s = middle - lag.value if motion.sign > 0 else middle
-    return TrialLag(motion.trial_id, s, replace(lag, value=motion.sign * lag.value))
+    lag = fit_lag(motion.pair, start, drift)
+    return TrialLag(motion.trial_id, 0.5 * (motion.pair.y.t[0] + motion.pair.y.t[-1]) - lag.value, lag)
 
 
 def _robot_motions(description: Description, chain: Chain, trials: Sequence[Trial]) -> Iterator[Motion]:
@@ -136,7 +125,7 @@ def _robot_motions(description: Description, chain: Chain, trials: Sequence[Tria
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             continue
-        yield Motion(trial.id, _aligned(y, x), x, nuisance, 1)
+        yield Motion(trial.id, Pair(_aligned(y, x), x, nuisance, np.zeros((len(y.t), 0, 3))))
 
 
 def _speed(signal: Signal) -> Signal:
@@ -178,13 +167,13 @@ def _half_gaps(chain: Chain, joint: str) -> np.ndarray:
 
 
 def _plate_motions(urdf: str, description: Description, trials: Sequence[Trial], robot: Clock) -> Iterator[Motion]:
-    """Moments Mx, My of the plate and of the model, of every trial with a plate."""
+    """Moments Mx, My of the model and of the plate, of every trial with a plate; markers are noisier than plates."""
     trials = [trial for trial in trials if len(trial.t_plate)]
     parts = carriers(floating_model(urdf, description), description, trials)
     for trial in trials:
         try:
-            y, (x, nuisance) = plate_moments(trial), model_moments(parts, description, trial, robot)
+            x, (y, nuisance) = plate_moments(trial), model_moments(parts, description, trial, robot)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             continue
-        yield Motion(trial.id, y, x, nuisance, -1)
+        yield Motion(trial.id, Pair(y, x, np.zeros((len(x.t), 0, 2)), nuisance))

@@ -1,8 +1,8 @@
 """Lag between two signals on different clocks.
 
-    y(t) = g x(t - lag) + b + sum_k a_k z_k(t - lag) + noise
+    y(t) = g x(t - lag) + b + sum_k a_k z_k(t - lag) + sum_k c_k u_k(t) + noise
 
-g, b and the nuisance a are eliminated; the lag by Gauss-Newton from a cross-correlation. The residual is not white
+g, b and the nuisances a, c are eliminated; the lag by Gauss-Newton from a cross-correlation. The residual is not white
 (model error), so the variance of the lag sums the autocorrelation of its influence psi_t = [(A'A)^-1 A']_lag r_t:
 
     var = sum_|k|<L (1 - |k| / L) sum_t psi_t psi_{t+k}
@@ -38,6 +38,23 @@ class Lag:
     explained: float
 
 
+@dataclass(frozen=True)
+class Pair:
+    """Two signals that show one motion.
+
+    Attributes:
+        y: The noisier one, c channels on its own clock.
+        x: The other, c channels on its own clock.
+        z: Nuisance terms (n_x, k, c) at the instants of x.
+        u: Nuisance terms (n_y, k, c) at the instants of y.
+    """
+
+    y: Signal
+    x: Signal
+    z: np.ndarray
+    u: np.ndarray
+
+
 def coarse_lag(y: Signal, x: Signal) -> float:
     """Lag [s] of highest cross-correlation, means removed, not normalised.
 
@@ -48,14 +65,15 @@ def coarse_lag(y: Signal, x: Signal) -> float:
     return float(shift / RATE + y.t[0] - x.t[0])
 
 
-def fit_lag(y: Signal, x: Signal, nuisance: np.ndarray, start: float, drift: float = 0.0) -> Lag:
-    """Lag of y (c channels) behind x (c channels) and nuisance (n, k, c) on x's grid, from `start` [s].
+def fit_lag(pair: Pair, start: float, drift: float = 0.0) -> Lag:
+    """Lag of y behind x, from `start` [s].
 
     With a drift the clocks' rates differ and the lag returned is the one at the middle of y.
 
     Raises:
         NotEnoughData: Too little overlap, or the two do not show the same motion.
     """
+    y, x, nuisance = pair.y, pair.x, pair.z
     columns = CubicSpline(x.t, np.concatenate([x.x[:, None], nuisance], axis=1))
     middle = 0.5 * (y.t[0] + y.t[-1])
     lag, step = start, np.inf
@@ -65,7 +83,7 @@ def fit_lag(y: Signal, x: Signal, nuisance: np.ndarray, start: float, drift: flo
         keep[keep] &= x.valid[np.round((s[keep] - x.t[0]) * RATE).astype(int)]
         if keep.sum() < 2.0 * RATE:
             raise NotEnoughData("the two records overlap for less than two seconds")
-        A, r, slope, explained = _design(y.x[keep], columns(s[keep]), columns(s[keep], 1))
+        r, slope, explained = _design(y.x[keep], columns(s[keep]), columns(s[keep], 1), pair.u[keep])
         step = float(slope @ r / (slope @ slope))
         lag -= step
         if abs(step) < 1e-7:
@@ -78,22 +96,20 @@ def fit_lag(y: Signal, x: Signal, nuisance: np.ndarray, start: float, drift: flo
     return Lag(lag, float(np.sqrt(long_run_variance(psi, RATE))), explained)
 
 
-def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Nuisance design, its residual, the derivative by -lag orthogonal to the design, and the share explained."""
+def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Residual of the nuisances, the derivative by -lag orthogonal to them, and the share of y explained."""
     n, k, c = m.shape
-    A = np.concatenate(
-        [np.einsum("nc,cd->ncd", m[:, 0], np.eye(c)), np.tile(np.eye(c), (n, 1, 1)), np.swapaxes(m[:, 1:], 1, 2)],
-        axis=2,
-    ).reshape(n * c, -1)
+    own, one = np.einsum("nc,cd->ncd", m[:, 0], np.eye(c)), np.tile(np.eye(c), (n, 1, 1))
+    A = np.concatenate([own, one, np.swapaxes(m[:, 1:], 1, 2), np.swapaxes(u, 1, 2)], axis=2).reshape(n * c, -1)
     scale = np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
     A = A / scale
     a = np.linalg.lstsq(A, y.ravel(), rcond=1e-8)[0]
     r = y.ravel() - A @ a
-    gains, small = (a / scale)[:c], (a / scale)[2 * c :]
+    gains, small = (a / scale)[:c], (a / scale)[2 * c : 2 * c + k - 1]
     slope = (m_dot[:, 0] * gains + np.einsum("nkc,k->nc", m_dot[:, 1:], small)).ravel()
     slope = slope - A @ np.linalg.lstsq(A, slope, rcond=1e-8)[0]
     total = float(((y - y.mean(axis=0)) ** 2).sum())
-    return A, r, slope, 1.0 - float(r @ r) / max(total, np.finfo(float).tiny)
+    return r, slope, 1.0 - float(r @ r) / max(total, np.finfo(float).tiny)
 
 
 def long_run_variance(psi: np.ndarray, rate: float) -> float:
