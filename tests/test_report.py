@@ -221,6 +221,12 @@ def test_the_same_results_give_the_same_bytes_wherever_they_are(whole, run):
     assert str(run) not in (run / "report.html").read_text()
 
 
+def test_tables_and_figures_are_numbered_in_their_order(whole):
+    text = Page(whole / "report.html").text
+    for kind, n in (("Table", 6), ("Figure", 5)):
+        assert [int(k) for k in re.findall(rf"{kind} (\d+)\. ", text)] == list(range(1, n + 1))
+
+
 def test_the_page_can_be_read_without_seeing(whole):
     page = Page(whole / "report.html")
     assert dict(page.tags)["html"]["lang"] == "en"

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from scenarios.plots import svg
@@ -26,7 +25,7 @@ _NAMES = ("errors", "traces", "parameters", "z_scores")
 class Drawing:
     """A figure as the page shows it and as a file of its own."""
 
-    inline: Markup
+    inline: str
     file: str
 
 
@@ -88,9 +87,9 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
         "table": _numbered(
             *ladders.items(),
             ("axes", made["errors"]),
-            ("parameters", found),
             ("trials", results.recorded),
-            ("clocks", 1),
+            ("clocks", results.recorded and results.estimate and results.estimate.clocks),
+            ("parameters", found),
         ),
         "instruments": instruments(results.description, results.recorded) if results.description else {},
         "trial": figures.traced_trial(results, steps),
@@ -109,7 +108,7 @@ def _numbered(*parts: tuple[str, object]) -> dict[str, int]:
 
 def _drawing(name: str, drawn: Figure) -> Drawing:
     text = svg(drawn, name)
-    return Drawing(Markup(text[text.index("<svg") :].strip()), text)
+    return Drawing(text[text.index("<svg") :].strip(), text)
 
 
 def _png(data: bytes | None) -> str | None:
@@ -133,5 +132,5 @@ def render(values: Mapping[str, Any], drawings: Mapping[str, Drawing]) -> str:
         "cell": numbers.cell,
         "decimals": numbers.decimals,
     }
-    style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))
+    style = (_TEMPLATES / "report.css").read_text(encoding="utf-8")
     return environment.get_template("report.html").render(**values, drawings=drawings, style=style)
