@@ -20,7 +20,7 @@ demo: $(READY)
 	$(BIN)/tiago-twin run humanoids2024 --out runs/demo
 
 test: $(READY)
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 check: $(READY)
 	$(BIN)/ruff format --check .
@@ -28,7 +28,7 @@ check: $(READY)
 	$(BIN)/mypy
 
 slow: $(READY)
-	$(BIN)/python -m pytest -q -m slow -n 2
+	$(BIN)/python -m pytest -q -m slow -n 2 --dist loadfile
 
 bench: $(READY)
 	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench
