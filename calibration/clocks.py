@@ -12,9 +12,8 @@ Plate: its moments Mx, My against those of the nominal floating-base inverse dyn
 """
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -39,7 +38,6 @@ _CUTOFF = 6.0  # robot [Hz]
 _HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
 _MOVES = 8.0  # a joint whose range exceeds this many half gaps gets that play term
 _log = logging.getLogger(__name__)
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ def synchronise(
         NotEnoughData: The robot's clock cannot be told from the motion capture's.
     """
     chain = chain_of(urdf, description)
-    robot, verdicts = _clock("robot", _robot_motions(description, chain, trials))
+    robot, verdicts = _clock("robot", _robot_motions(description, chain, trials), 1)
     try:
         robot, verdicts = _concluded("robot", list(refined(chain, description, trials, robot).values()))
     except NotEnoughData as error:
@@ -67,22 +65,21 @@ def synchronise(
     if not any(len(trial.t_plate) for trial in trials):
         return (robot,), (*verdicts, Verdict("clocks", "missing", "no force plate: no plate clock, no plate wrench"))
     try:
-        plate, more = _clock("plate", _plate_motions(urdf, description, trials, robot))
+        plate, more = _clock("plate", _plate_motions(urdf, description, trials, robot), 2)
     except NotEnoughData as error:
         return (robot,), (*verdicts, Verdict("clocks", "missing", f"no plate clock: {error}"))
     return (robot, plate), (*verdicts, *more)
 
 
-def _clock(instrument: str, motions: Iterator[Motion]) -> tuple[Clock, tuple[Verdict, ...]]:
-    """Two passes: the second knows the drift within a trial."""
-    kept = list(motions)
-    starts = _each(kept, lambda m: coarse_lag(m.pair.y, m.pair.x))
-    lags = _each(kept, lambda m: _trial_lag(m, starts[m.trial_id], 0.0))
-    first, _ = fit_clock(instrument, list(lags.values()))
-    lags = _each(
-        [m for m in kept if m.trial_id in lags], lambda m: _trial_lag(m, lags[m.trial_id].lag.value, first.drift)
-    )
-    return _concluded(instrument, list(lags.values()))
+def _clock(instrument: str, motions: Iterator[Motion], passes: int) -> tuple[Clock, tuple[Verdict, ...]]:
+    """The clock from lags of all motions; every pass after the first knows the drift within a trial."""
+    kept, drift, lags = list(motions), 0.0, []
+    starts = {m.trial_id: coarse_lag(m.pair.y, m.pair.x) for m in kept}
+    for _ in range(passes):
+        lags = _lags(kept, starts, drift)
+        starts = {t.trial_id: t.lag.value for t in lags}
+        drift = fit_clock(instrument, lags)[0].drift
+    return _concluded(instrument, lags)
 
 
 def _concluded(instrument: str, lags: list[TrialLag]) -> tuple[Clock, tuple[Verdict, ...]]:
@@ -98,20 +95,18 @@ def _concluded(instrument: str, lags: list[TrialLag]) -> tuple[Clock, tuple[Verd
     return clock, tuple(found)
 
 
-def _each(motions: list[Motion], function: Callable[[Motion], T]) -> dict[str, T]:
-    """Results by trial, without the trials that cannot answer."""
-    results = {}
-    for motion in motions:
+def _lags(motions: Sequence[Motion], starts: Mapping[str, float], drift: float) -> list[TrialLag]:
+    """Lags of the motions that have a start [s] and show the same on both clocks."""
+    found = []
+    for motion in (m for m in motions if m.trial_id in starts):
         try:
-            results[motion.trial_id] = function(motion)
+            lag = fit_lag(motion.pair, starts[motion.trial_id], drift)
         except NotEnoughData as error:
             _log.info("%s: %s", motion.trial_id, error)
-    return results
-
-
-def _trial_lag(motion: Motion, start: float, drift: float) -> TrialLag:
-    lag = fit_lag(motion.pair, start, drift)
-    return TrialLag(motion.trial_id, 0.5 * (motion.pair.y.t[0] + motion.pair.y.t[-1]) - lag.value, lag)
+            continue
+        middle = 0.5 * (motion.pair.y.t[0] + motion.pair.y.t[-1])
+        found.append(TrialLag(motion.trial_id, middle - lag.value, lag))
+    return found
 
 
 def _robot_motions(description: Description, chain: Chain, trials: Sequence[Trial]) -> Iterator[Motion]:

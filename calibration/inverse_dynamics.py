@@ -5,11 +5,12 @@
 The base rocks on its tyres and the torso bends, at frequencies that would shift any lag, so what can be seen is not
 computed: a body of markers carries all links beyond its own, up to the next body's. For each such body c the robot is
 placed so that c's link is where its markers are, at nominal places, and only the masses c carries count. The hand's
-markers are not used. Nominal masses, q_motor beyond the last body.
+markers are not used. Nominal masses, q_motor beyond the last body; errors of the carrying links' ten inertial
+parameters are nuisances, linear.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -17,9 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from calibration.bodies import poses_of
 from calibration.clock import Clock
-from calibration.errors import NotEnoughData
 from calibration.markers import base_body, hand_body
-from calibration.play import play
 from calibration.recording import Trial
 from calibration.robot import reduced_model
 from calibration.schema import Body, Description
@@ -28,10 +27,8 @@ from calibration.signals import RATE, Signal, even, low_passed
 
 _CUTOFF = 4.0  # [Hz]
 _DECIMATED = 0.01  # [s] plate samples averaged together
-_HALF_GAPS = (1e-3, 4e-3)  # [rad, m] of the play terms of each joint
-_MOVES = 20.0  # half gaps a joint must move to get its terms
 _SEEN = 0.8  # share of a trial a body must be in view to carry anything
-_STRIDE = 2  # the dynamics are evaluated every so many samples: 50 Hz for signals below 4 Hz
+_STRIDE = 3  # the dynamics are evaluated every so many samples: 33 Hz for signals below 4 Hz
 
 
 @dataclass(frozen=True)
@@ -41,12 +38,10 @@ class Carrier:
     Attributes:
         body: The markers.
         model: Free-flyer model in which only those links have mass.
-        joints: Velocity indices of the joints beyond the body that move those links.
     """
 
     body: Body
     model: pin.Model
-    joints: tuple[int, ...]
 
 
 def carriers(model: pin.Model, description: Description, trials: Sequence[Trial]) -> tuple[Carrier, ...]:
@@ -57,21 +52,13 @@ def carriers(model: pin.Model, description: Description, trials: Sequence[Trial]
     for body in (b for b in others if all(_is_seen(b, trial) for trial in trials)):
         owner.setdefault(int(model.frames[model.getFrameId(body.link)].parentJoint), body)
     nearest = [next((i for i in reversed(list(model.supports[j])) if i in owner), 1) for j in range(model.njoints)]
-    return tuple(
-        Carrier(
-            body,
-            _with_masses(model, [i == joint for i in nearest]),
-            tuple(model.joints[j].idx_v for j in range(2, model.njoints) if nearest[j] == joint != j),
-        )
-        for joint, body in owner.items()
-    )
+    return tuple(Carrier(body, _with_masses(model, [i == joint for i in nearest])) for joint, body in owner.items())
 
 
 def _is_seen(body: Body, trial: Trial) -> bool:
-    try:
-        return bool(np.isfinite(poses_of(body, trial).T[:, 0, 0]).mean() > _SEEN)
-    except NotEnoughData:
-        return False
+    columns = [trial.marker.index(m.name) for m in body.markers if m.name in trial.marker]
+    visible = np.isfinite(trial.marker_position[:, columns]).all(axis=2).sum(axis=1) >= 3
+    return bool(visible.mean() > _SEEN)
 
 
 def _with_masses(model: pin.Model, kept: Sequence[bool]) -> pin.Model:
@@ -107,48 +94,35 @@ def plate_moments(trial: Trial) -> Signal:
 def model_moments(
     parts: Sequence[Carrier], description: Description, trial: Trial, robot: Clock
 ) -> tuple[Signal, np.ndarray]:
-    """The same from masses and motion, on the mocap clock, and what play and zeros of the joints add (n, k, 2).
+    """The same from masses and motion, on the mocap clock, and what errors of the masses would add (n, k, 2).
 
     Raises:
         NotEnoughData: A body is not in view for long enough.
     """
     order = [description.joint_names.index(name) for name in list(parts[0].model.names)[2:]]
-    q = even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order])
-    lost = [play(q.x, np.full(q.x.shape[1], w)) - q.x for w in _HALF_GAPS]
-    x = low_passed(replace(q, x=np.hstack([q.x, *lost, np.ones_like(q.x)])), _CUTOFF).x
-    x = x.reshape(len(q.t), len(lost) + 2, -1)
-    found = [_carried(part, trial, q.t, x) for part in parts]
-    nuisance = np.concatenate([n for _, n, _ in found], axis=1)
-    valid = q.valid & np.logical_and.reduce([v for _, _, v in found])
-    return Signal(q.t, np.sum([m for m, _, _ in found], axis=0), valid), nuisance
+    q = low_passed(even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order]), _CUTOFF)
+    found = [_carried(part, trial, q) for part in parts]
+    moments, valid = sum(m[:, 0] for m, _ in found), np.logical_and.reduce([q.valid, *(v for _, v in found)])
+    return Signal(q.t, np.asarray(moments), valid), np.concatenate([m[:, 1:] for m, _ in found], axis=1)
 
 
-def _carried(part: Carrier, trial: Trial, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Moments (n, 2) of what a body carries at t, their nuisance terms (n, k, 2), and validity.
-
-    Nuisances are to first order x[:, 1:] of the joints beyond the body and the ten inertial parameters of its link.
-    """
-    rows = np.append(np.arange(0, len(t) - 1, _STRIDE), len(t) - 1)
-    T_lab_link, valid = _link_poses(part.body, trial, t)
-    T = T_lab_link @ inverse(_root_to_link(part, x[:, 0]))
-    rates, turns, link_turns = np.gradient(x, 1.0 / RATE, axis=0), _body_twists(T), _body_twists(T_lab_link)
+def _carried(part: Carrier, trial: Trial, q: Signal) -> tuple[np.ndarray, np.ndarray]:
+    """Moments (n, 11, 2) of what a body carries and of unit errors of its link's inertial parameters; validity (n,)."""
+    rows = np.append(np.arange(0, len(q.t) - 1, _STRIDE), len(q.t) - 1)
+    T_lab_link, valid = _link_poses(part.body, trial, q.t)
+    T = T_lab_link @ inverse(_root_to_link(part, q.x))
+    rates, turns, link_turns = np.gradient(q.x, 1.0 / RATE, axis=0), _body_twists(T), _body_twists(T_lab_link)
     accelerations, pushes, link_pushes = (np.gradient(v, 1.0 / RATE, axis=0) for v in (rates, turns, link_turns))
-    mine = np.array([j for j in part.joints if np.ptp(x[:, 0, j - 6]) > _MOVES * _HALF_GAPS[0]], dtype=int)
     model, data, neutral, found = part.model, part.model.createData(), pin.neutral(part.model), []
     for row in rows:
-        q = pin.integrate(model, neutral, np.append(np.zeros(6), x[row, 0]))
-        q[:7] = pin.SE3ToXYZQUAT(pin.SE3(T[row]))
-        v, a = np.append(turns[row], rates[row, 0]), np.append(pushes[row], accelerations[row, 0])
-        dq, _, da = pin.computeRNEADerivatives(model, data, q, v, a)
-        action = _action(T[row], trial)
-        moved = action @ dq[:6, mine] * x[row, 1:, None, mine - 6].transpose(1, 2, 0)
-        pushed = action @ da[:6, mine] * accelerations[row, 1:, None, mine - 6].transpose(1, 2, 0)
+        at = pin.integrate(model, neutral, np.append(np.zeros(6), q.x[row]))
+        at[:7] = pin.SE3ToXYZQUAT(pin.SE3(T[row]))
+        v, a = np.append(turns[row], rates[row]), np.append(pushes[row], accelerations[row])
+        whole = _action(T[row], trial) @ pin.rnea(model, data, at, v, a)[:6]
         felt = pin.Motion(link_pushes[row]) - pin.SE3(T_lab_link[row]).actInv(model.gravity)
         rigid = _action(T_lab_link[row], trial) @ pin.bodyRegressor(pin.Motion(link_turns[row]), felt)
-        joints = np.swapaxes(moved + pushed, 1, 2).reshape(-1, 2)
-        found.append(np.concatenate([(action @ data.tau[:6])[None], joints, rigid.T]))
-    smooth = CubicSpline(rows, np.array(found))(np.arange(len(t)))
-    return smooth[:, 0], smooth[:, 1:], valid
+        found.append(np.concatenate([whole[None], rigid.T]))
+    return CubicSpline(rows, np.array(found))(np.arange(len(q.t))), valid
 
 
 def _action(T_lab_frame: np.ndarray, trial: Trial) -> np.ndarray:

@@ -102,12 +102,12 @@ def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> t
     own, one = np.einsum("nc,cd->ncd", m[:, 0], np.eye(c)), np.tile(np.eye(c), (n, 1, 1))
     A = np.concatenate([own, one, np.swapaxes(m[:, 1:], 1, 2), np.swapaxes(u, 1, 2)], axis=2).reshape(n * c, -1)
     scale = np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
-    A = A / scale
-    a = np.linalg.lstsq(A, y.ravel(), rcond=1e-8)[0]
-    r = y.ravel() - A @ a
-    gains, small = (a / scale)[:c], (a / scale)[2 * c : 2 * c + k - 1]
+    U, values, Vt = np.linalg.svd(A / scale, full_matrices=False)
+    U, values, Vt = (x[..., : int((values > 1e-8 * values[0]).sum())] for x in (U, values, Vt.T))
+    a = Vt @ (U.T @ y.ravel() / values) / scale
+    gains, small = a[:c], a[2 * c : 2 * c + k - 1]
     slope = (m_dot[:, 0] * gains + np.einsum("nkc,k->nc", m_dot[:, 1:], small)).ravel()
-    slope = slope - A @ np.linalg.lstsq(A, slope, rcond=1e-8)[0]
+    r, slope = (x - U @ (U.T @ x) for x in (y.ravel(), slope))
     total = float(((y - y.mean(axis=0)) ** 2).sum())
     return r, slope, 1.0 - float(r @ r) / max(total, np.finfo(float).tiny)
 
