@@ -10,8 +10,6 @@ from ruamel.yaml import YAML
 from scenarios import registry, steps, yaml_file
 from scenarios.errors import ScenarioError
 
-pytest.importorskip("scenarios.schema")
-
 
 def mappings(node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
     """Paths of all mappings in a YAML tree."""
