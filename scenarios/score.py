@@ -23,6 +23,7 @@ from calibration.markers import base_body
 from calibration.metrics import pose_errors
 from scenarios.errors import ScenarioError
 from twin import truth
+from twin.defects.base import Parameter
 from twin.truth import TruthTrial
 
 if TYPE_CHECKING:
@@ -121,9 +122,9 @@ def _entry(judged: Judged) -> dict[str, object]:
     return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in asdict(judged).items()}
 
 
-def _read_parameters(path: Path) -> list[tuple[str, str, float]]:
+def _read_parameters(path: Path) -> tuple[Parameter, ...]:
     try:
-        return [tuple(p) for p in truth.read_parameters(path)]
+        return truth.read_parameters(path)
     except FileNotFoundError as error:
         raise ScenarioError(f"{path}: no such file; --truth names a run's truth folder") from error
     except (json.JSONDecodeError, KeyError, TypeError) as error:
@@ -146,8 +147,9 @@ def _identified(model: Model, values: dict[str, float]) -> tuple[np.ndarray, np.
     alone = [i for i, p in enumerate(model.parameters) if p.status == "estimated" and np.isfinite(true[i])]
     rows = [np.eye(len(names))[i] for i in alone]
     judged = []
+    fixed_alone = {names[i] for i in alone}
     for c in model.combinations:
-        if c.name in values and np.isfinite(true[c.coefficients != 0.0]).all():
+        if c.name in values and c.name not in fixed_alone and np.isfinite(true[c.coefficients != 0.0]).all():
             value = float(c.coefficients @ np.nan_to_num(true))
             unit = model.parameters[names.index(c.name)].unit
             judged.append(Judged(c.name, unit, value, c.value, c.sigma, (c.value - value) / c.sigma, "combined"))
