@@ -111,7 +111,10 @@ class Tolerances(Declaration):
 
 
 class TrialEntry(Declaration):
-    """One continuous recording; `file` is relative to the dataset folder."""
+    """One continuous recording; `file` is relative to the dataset folder.
+
+    `payload` is the mass [kg] of the declared payload in this trial, where it differs from the campaign's.
+    """
 
     id: str
     role: Role
@@ -119,6 +122,7 @@ class TrialEntry(Declaration):
     motion: str
     file: str
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    payload: NonNegative | None = None
 
 
 class Description(Declaration):
@@ -161,6 +165,12 @@ class Description(Declaration):
     def joint_names(self) -> tuple[str, ...]:
         """Names of the measured joints, base to tip."""
         return tuple(j.name for j in self.joints)
+
+    def loaded(self, entry: TrialEntry) -> "Description":
+        """The description with the payload of one trial."""
+        if entry.payload is None or self.payload is None:
+            return self
+        return self.model_copy(update={"payload": self.payload.model_copy(update={"mass": entry.payload})})
 
     def body(self, name: str) -> Body | None:
         """The marker body of that name, or None where the laboratory has none."""

@@ -7,6 +7,7 @@ Only dataset/ crosses from the simulation to the calibration. What a step writes
 Importing this module is cheap: the engines are imported by the step that needs them.
 """
 
+import json
 import platform
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -65,9 +66,15 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
     path = registry.find(name_or_path)  # an unknown name is told before the engines are imported
 
     from scenarios import yaml_file
-    from scenarios.schema import Scenario
+    from scenarios.schema import Extension, Scenario
 
-    return yaml_file.read(path, Scenario, overrides, beside={"versions": dict[str, str]})
+    beside = {"versions": dict[str, str]}
+    if not yaml_file.has_field(path, "extends"):
+        return yaml_file.read(path, Scenario, overrides, beside)
+    extension = yaml_file.read(path, Extension)
+    changed = [f"{name}={json.dumps(value)}" for name, value in extension.set.items()]
+    named = [f"{name}={json.dumps(getattr(extension, name))}" for name in ("name", "description")]
+    return yaml_file.read(registry.find(extension.extends), Scenario, [*named, *changed, *overrides], beside)
 
 
 def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress: Progress = silent) -> RunResult:

@@ -58,6 +58,16 @@ def read(path: Path | str, model: type[T], overrides: Sequence[str] = (), beside
     return instance
 
 
+def has_field(path: Path | str, name: str) -> bool:
+    """Whether a file is a mapping with that field at its top.
+
+    Raises:
+        ScenarioError: The file cannot be read as YAML.
+    """
+    tree = _parse(_text(Path(path)), str(path))
+    return isinstance(tree, CommentedMap) and name in tree
+
+
 def write(path: Path | str, instance: Any, beside: Mapping[str, Any] | None = None) -> None:
     """Write every resolved value, floats with all their digits, lists of scalars on one line.
 

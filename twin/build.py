@@ -4,12 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
-from twin.defects.base import Defect, Parameter
+from twin.defects.base import Defect, Parameter, body
 
 # What the instruments need of the simulation: poses of links, wrench of the plate.
 _POSES = (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMEQUAT)
 _WRENCH = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
+HAND = "gripper_grasping_frame"
+PUSH = ("push.x", "push.y", "push.z")
 _HELD = ("wheel", "caster", "head", "gripper")
 
 
@@ -54,6 +57,7 @@ def build(
         defect.apply(spec)
     _brake(spec)
     _sense(spec, links)
+    _push(spec)
     model = spec.compile()
     for defect in defects:
         defect.tune(model)
@@ -82,6 +86,14 @@ def _brake(spec: mujoco.MjSpec) -> None:
     for joint in spec.joints:
         if joint.name.endswith("_joint") and joint.name.startswith(_HELD):
             spec.delete(joint)
+
+
+def _push(spec: mujoco.MjSpec) -> None:
+    """Three forces on the hand, in its own axes [N], that a motion may use."""
+    site = body(spec, HAND).add_site(name="push")
+    for k, name in enumerate(PUSH):
+        force = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=site.name)
+        force.gear = np.eye(6)[k]
 
 
 def _sense(spec: mujoco.MjSpec, links: Sequence[str]) -> None:

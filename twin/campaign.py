@@ -10,7 +10,7 @@ and the instrument, so that the files do not depend on the number of threads.
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -26,6 +26,7 @@ from twin.conventions import exp6
 from twin.declare import declaration
 from twin.defects.base import Parameter
 from twin.defects.ground import spatial_stiffness
+from twin.defects.loads import Payload
 from twin.draw import BASE, Robot, draw
 from twin.instruments import mocap, plate, robot_log
 from twin.instruments.clock import Clock
@@ -106,12 +107,28 @@ def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None =
 
 
 def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry:
-    states = simulate(lab.twin, motion, lab.T_lab_base)
+    states = simulate(_loaded(lab, motion), motion, lab.T_lab_base)
     trial, true = measure(lab, motion, states, start)
     file = f"trials/{motion.id}.nc"
     digest = write_trial(out / "dataset" / file, trial)
     truth.write_trial(out / "truth" / file, true)
-    return TrialEntry(id=motion.id, role=motion.role, kind=motion.kind, motion=motion.name, file=file, sha256=digest)
+    return TrialEntry(
+        id=motion.id,
+        role=motion.role,
+        kind=motion.kind,
+        motion=motion.name,
+        file=file,
+        sha256=digest,
+        payload=motion.payload,
+    )
+
+
+def _loaded(lab: Laboratory, motion: Motion) -> Twin:
+    """The robot with the motion's payload in its hand."""
+    if motion.payload is None:
+        return lab.twin
+    defects = [replace(d, mass=motion.payload) if isinstance(d, Payload) else d for d in lab.robot.defects]
+    return build(mjcf.spec(), defects, lab.twin.links, lab.config.timestep)
 
 
 def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tuple[Trial, TruthTrial]:

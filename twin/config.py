@@ -230,6 +230,8 @@ class Campaign:
         calibration_swing: Duration of each calibration swing [s].
         validation_swing: Duration of each validation swing [s].
         pause: Between trials, on every clock [s].
+        payloads: Further masses [kg] with which the first validation swing is repeated.
+        push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]
@@ -242,6 +244,8 @@ class Campaign:
     calibration_swing: Positive
     validation_swing: Positive
     pause: NonNegative
+    payloads: tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...] = ()
+    push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
 
 
 @dataclass(frozen=True, config=_strict)

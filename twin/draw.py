@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from twin.build import HAND
 from twin.config import MarkerBody, TwinConfig
 from twin.defects.base import Defect
 from twin.defects.gear import DirectDrive, Gear
@@ -16,7 +17,7 @@ from twin.defects.sensing import Cluster, Encoder
 from twin.randomness import generator
 
 TORSO = "torso_lift_joint"
-TOOL = "gripper_grasping_frame"
+TOOL = HAND
 BASE = "base_footprint"
 _LINK_INERTIA = 0.004  # [kg.m2] output gear of an arm joint
 _DAMPING_RATIO = 1.2  # servo velocity gain over sqrt(kp J)

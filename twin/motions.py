@@ -31,6 +31,8 @@ class Motion:
         command: Set-points (n, 8) at RATE, recording starts at the first [m, rad].
         dwells: Start and stop of each rest (n_postures, 2) [s from the first set-point]; empty where there is none.
         approach: Sign of each joint's motion into each posture (n_postures, 8).
+        payload: Mass in the hand [kg]; None: the campaign's.
+        push: Force on the hand at each set-point (n, 3), tool axes [N]; None: none.
     """
 
     id: str
@@ -40,6 +42,8 @@ class Motion:
     command: np.ndarray
     dwells: np.ndarray
     approach: np.ndarray
+    payload: float | None = None
+    push: np.ndarray | None = None
 
     @property
     def duration(self) -> float:
@@ -91,7 +95,22 @@ def swing(id: str, role: Role, kind: Kind, path: Swing, duration: float, campaig
     """A swing between two rests."""
     t = _times(duration + 2.0 * campaign.rest)
     s = path_time(t - campaign.rest, duration, campaign.ramp)
-    return Motion(id, role, kind, id, path.at(s), np.empty((0, 2)), np.empty((0, len(JOINTS)), dtype=np.int8))
+    return Motion(id, role, kind, id, path.at(s), *_no_dwells())
+
+
+def pushed(id: str, role: Role, force: float, campaign: Campaign) -> Motion:
+    """The hand held out in front, pushed sideways, towards the robot and down: two seconds each, with pauses."""
+    t = _times(2.0 * campaign.rest + 3 * 4.0)
+    push = np.zeros((len(t), 3))
+    for k, axis in enumerate((1, 0, 2)):
+        since = t - campaign.rest - 4.0 * k
+        push[:, axis] = -force * np.clip(np.minimum(since / 0.2, (2.2 - since) / 0.2), 0.0, 1.0)
+    still = np.repeat(np.array(_FORWARD)[None], len(t), axis=0)
+    return Motion(id, role, "swing", id, still, *_no_dwells(), push=push)
+
+
+def _no_dwells() -> tuple[np.ndarray, np.ndarray]:
+    return np.empty((0, 2)), np.empty((0, len(JOINTS)), dtype=np.int8)
 
 
 def postures(id: str, role: Role, through: np.ndarray, campaign: Campaign) -> Motion:

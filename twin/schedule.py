@@ -1,5 +1,7 @@
 """The trials of a campaign, in the order they are recorded."""
 
+from dataclasses import replace
+
 import mujoco
 
 from calibration.schema import Role
@@ -16,6 +18,8 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *_sweeps(campaign),
         *_swings("calibration", campaign.calibration_swing, motions.CALIBRATION_SWINGS, campaign),
         *_swings("validation", campaign.validation_swing, motions.VALIDATION_SWINGS, campaign),
+        *_loaded(campaign),
+        *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
         _statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
     )
 
@@ -32,6 +36,18 @@ def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:
             f"sweep_{j}", "calibration", "sweep", motions.sweep_path(j, campaign.sweep), campaign.sweep, campaign
         )
         for j in motions.JOINTS[1:]
+    )
+
+
+def _loaded(campaign: Campaign) -> tuple[Motion, ...]:
+    """The first validation swing with each further payload."""
+    name, path = next(iter(motions.VALIDATION_SWINGS.items()))
+    trials = ((f"{name}_{mass:g}kg".replace(".", "_"), mass) for mass in campaign.payloads)
+    return tuple(
+        replace(
+            motions.swing(id, "validation", "swing", path, campaign.validation_swing, campaign), name=name, payload=m
+        )
+        for id, m in trials
     )
 
 

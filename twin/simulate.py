@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from twin.build import Twin
+from twin.build import PUSH, Twin
 from twin.conventions import placement, states_with_their_sensors, transform
 from twin.defects.gear import rotor_joint
 from twin.errors import Diverged, NotStanding
@@ -58,6 +58,8 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
     model, data = twin.model, mujoco.MjData(twin.model)
     command = _interpolated(motion.command, model.opt.timestep)
     control = _controls(model, command)
+    if motion.push is not None:
+        control[:, [model.actuator(name).id for name in PUSH]] = _interpolated(motion.push, model.opt.timestep)
     first = _initial_state(model, data, motion.command[0], T_lab_base)
     states, sensors = rollout.rollout(model, data, first[None], control[None])
     states = states_with_their_sensors(first, states[0])

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -113,3 +115,24 @@ def test_tipping_is_told(lab, sweep):
 
     with pytest.raises((NotStanding, Diverged)):
         simulate(with_model(lab.twin, soften), sweep, lab.T_lab_base)
+
+
+def test_the_plate_sees_a_push_at_the_hand(lab, config):
+    push = motions.pushed("push", "validation", 20.0, config.campaign)
+    states = simulate(lab.twin, push, lab.T_lab_base)
+    rest = config.campaign.rest
+    before = states.wrench[(states.t > 0.5) & (states.t < rest - 0.1), :3].mean(axis=0)
+    for k in range(3):
+        held = (states.t > rest + 4.0 * k + 1.2) & (states.t < rest + 4.0 * k + 1.9)
+        change = states.wrench[held, :3].mean(axis=0) - before
+        assert np.linalg.norm(change) == pytest.approx(20.0, abs=1.0)
+
+
+def test_a_payload_weighs_what_its_trial_says(lab, config, nominal):
+    from twin.campaign import _loaded
+    from twin.schedule import schedule
+
+    campaign = replace(config.campaign, payloads=(0.0, 2.0))
+    masses = {m.id: _loaded(lab, m).model.body_mass.sum() for m in schedule(campaign, nominal, 0) if m.name == "xyz"}
+    assert masses["xyz_0kg"] == pytest.approx(masses["xyz"] - 0.437)
+    assert masses["xyz_2kg"] == pytest.approx(masses["xyz"] + 2.0 - 0.437)
