@@ -23,6 +23,7 @@ from calibration.bodies import BodyPoses, poses_of
 from calibration.clock import Clock, TrialLag
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel, nominal_hand
+from calibration.inverse_dynamics import JointMotion
 from calibration.lag import Lag, long_run_variance
 from calibration.map_fit import fit
 from calibration.markers import base_body, hand_body
@@ -95,20 +96,35 @@ def provisional(chain: Chain, description: Description, trials: Sequence[Trial],
     return Provisional(hand, found.play, np.abs(_gravity_torques(hand, some)).max(axis=0))
 
 
-def refined_lags(
-    robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock
-) -> dict[str, TrialLag]:
+def refined_lags(robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock) -> list[TrialLag]:
     """Lags of the trials that move loaded joints, around an approximate clock."""
-    lags = {}
+    lags = []
     for trial in trials:
         try:
-            lags[trial.id] = _refined(robot, _samples(description, trial, clock), trial.id, clock)
+            lags.append(_refined(robot, _samples(description, trial, clock, calm=True), trial.id, clock))
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
     return lags
 
 
-def _samples(description: Description, trial: Trial, clock: Clock) -> Samples:
+def link_angles(robot: Provisional, description: Description, trial: Trial, clock: Clock) -> JointMotion:
+    """Joint angles behind the gears: readings, less their zeros, moved by what the hand's pose shows.
+
+        e = -D J' (S + J D J')^-1 r,     D = diag(play^2)
+
+    Joints that are not on the way to the hand keep their readings.
+    """
+    x = _samples(description, trial, clock, calm=False)
+    J, D = robot.hand.joint_jacobians(x.q), robot.play**2
+    r = _residuals(x.T, robot.hand.poses(x.q))
+    C = x.covariance + (J * D) @ np.swapaxes(J, 1, 2)
+    q = robot.hand.angles(x.q)
+    q[:, robot.hand.chain.columns] -= D * np.einsum("nik,ni->nk", J, np.linalg.solve(C, r[..., None])[..., 0])
+    return JointMotion(x.t, q)
+
+
+def _samples(description: Description, trial: Trial, clock: Clock, calm: bool) -> Samples:
+    """Every other sample, without jerky motion if only `calm` ones are wanted."""
     base, hand = poses_of(base_body(description), trial), poses_of(hand_body(description), trial)
     s, T = clock.from_mocap(trial.t_mocap), inverse(base.T) @ hand.T
 
@@ -118,8 +134,8 @@ def _samples(description: Description, trial: Trial, clock: Clock) -> Samples:
     rates = np.gradient(trial.q_motor, trial.t_robot, axis=0)
     jerked = np.abs(np.gradient(rates, trial.t_robot, axis=0)).max(axis=1) > _JERK
     near = maximum_filter1d(jerked.astype(float), 2 * int(_AFTER / np.median(np.diff(trial.t_robot))) + 1)
-    q, v, calm = at(trial.q_motor), at(rates), at(near[:, None])[:, 0] == 0.0
-    rows = np.flatnonzero(calm & np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]
+    q, v, wanted = at(trial.q_motor), at(rates), (at(near[:, None])[:, 0] == 0.0) | (not calm)
+    rows = np.flatnonzero(wanted & np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]
     if len(rows) < _ENOUGH:
         raise NotEnoughData("base and hand are hardly in view, or all motion is jerky")
     return Samples(trial.t_mocap[rows], q[rows], v[rows], T[rows], _covariances(T, base, hand, rows, description))
@@ -181,18 +197,18 @@ def _gravity_torques(hand: HandModel, q: np.ndarray) -> np.ndarray:
 
 
 def refined(
-    chain: Chain, description: Description, trials: Sequence[Trial], clock: Clock, passes: int = 2
-) -> dict[str, TrialLag]:
+    robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock, passes: int = 2
+) -> list[TrialLag]:
     """Lags from poses; each pass starts from the one before, shifted by its median.
 
     Raises:
-        NotEnoughData: No static postures, or no trial moves a joint that gravity holds.
+        NotEnoughData: No trial moves a joint that gravity holds.
     """
-    robot, lags = provisional(chain, description, trials, clock), {}
+    lags: list[TrialLag] = []
     for _ in range(passes):
         lags = refined_lags(robot, description, trials, clock)
         if not lags:
             raise NotEnoughData("no trial moves a joint that gravity holds on one flank")
-        off = [t.lag.value - clock.offset - clock.drift * t.s for t in lags.values()]
+        off = [t.lag.value - clock.offset - clock.drift * t.s for t in lags]
         clock = replace(clock, offset=clock.offset + float(np.median(off)))
     return lags

@@ -8,7 +8,7 @@ w from the nominal chain at the motor-side readings, J_j the axis of joint j. Th
 which lags the link behind the motor by 4 gap / (pi amplitude omega), from passing as a clock error; the last ones
 are the zeros of the readings, to first order.
 Then from whole poses, where static postures allow: see `clock_refinement`.
-Plate: its moments Mx, My against those of the nominal floating-base inverse dynamics, see `inverse_dynamics`.
+Plate: its moments Mx, My against those of the nominal masses, moved as markers and encoders say: `inverse_dynamics`.
 """
 
 import logging
@@ -19,9 +19,16 @@ import numpy as np
 
 from calibration.bodies import poses_of
 from calibration.clock import Clock, TrialLag, fit_clock
-from calibration.clock_refinement import refined
+from calibration.clock_refinement import Provisional, link_angles, provisional, refined
 from calibration.errors import NotEnoughData
-from calibration.inverse_dynamics import carriers, floating_model, model_moments, plate_moments
+from calibration.inverse_dynamics import (
+    Carrier,
+    JointMotion,
+    carriers,
+    floating_model,
+    model_moments,
+    plate_moments,
+)
 from calibration.lag import Pair, coarse_lag, fit_lag
 from calibration.markers import base_body, hand_body
 from calibration.play import play
@@ -32,8 +39,7 @@ from calibration.se3 import inverse
 from calibration.signals import Signal, body_rates, even, low_passed
 from calibration.verdict import Verdict
 
-# What all trials share [s]: dry friction winds gears up, the link is always late; markers are noisy accelerometers.
-_COMMON = {"robot": 1.5e-4, "plate": 8e-4}
+_COMMON = {"robot": 1.5e-4, "plate": 3e-4}  # what all trials share [s]: dry friction winds gears, the link is late
 _CUTOFF = 6.0  # robot [Hz]
 _HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
 _MOVES = 8.0  # a joint whose range exceeds this many half gaps gets that play term
@@ -58,14 +64,18 @@ def synchronise(
     """
     chain = chain_of(urdf, description)
     robot, verdicts = _clock("robot", _robot_motions(description, chain, trials), 1)
+    model = None
     try:
-        robot, verdicts = _concluded("robot", list(refined(chain, description, trials, robot).values()))
+        model = provisional(chain, description, trials, robot)
+        robot, verdicts = _concluded("robot", refined(model, description, trials, robot))
     except NotEnoughData as error:
         verdicts = (*verdicts, Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}"))
-    if not any(len(trial.t_plate) for trial in trials):
+    with_plate = [trial for trial in trials if len(trial.t_plate)]
+    if not with_plate:
         return (robot,), (*verdicts, Verdict("clocks", "missing", "no force plate: no plate clock, no plate wrench"))
+    parts = carriers(floating_model(urdf, description), description, with_plate)
     try:
-        plate, more = _clock("plate", _plate_motions(urdf, description, trials, robot), 2)
+        plate, more = _clock("plate", _plate_motions(parts, description, with_plate, robot, model), 2)
     except NotEnoughData as error:
         return (robot,), (*verdicts, Verdict("clocks", "missing", f"no plate clock: {error}"))
     return (robot, plate), (*verdicts, *more)
@@ -161,13 +171,20 @@ def _half_gaps(chain: Chain, joint: str) -> np.ndarray:
     return np.array(_HALF_GAPS) * (0.1 if chain.is_prismatic(joint) else 1.0)
 
 
-def _plate_motions(urdf: str, description: Description, trials: Sequence[Trial], robot: Clock) -> Iterator[Motion]:
-    """Moments Mx, My of the model and of the plate, of every trial with a plate; markers are noisier than plates."""
-    trials = [trial for trial in trials if len(trial.t_plate)]
-    parts = carriers(floating_model(urdf, description), description, trials)
+def _plate_motions(
+    parts: Sequence[Carrier],
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock,
+    model: Provisional | None,
+) -> Iterator[Motion]:
+    """Moments Mx, My of the model and of the plate, of every trial; markers are noisier than plates."""
     for trial in trials:
         try:
-            x, (y, nuisance) = plate_moments(trial), model_moments(parts, description, trial, robot)
+            joints = JointMotion(robot.to_mocap(trial.t_robot), trial.q_motor)
+            if model is not None:
+                joints = link_angles(model, description, trial, robot)
+            x, (y, nuisance) = plate_moments(trial), model_moments(parts, description, trial, joints)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             continue

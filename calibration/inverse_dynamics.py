@@ -1,12 +1,11 @@
 """What the robot's motion does to the force plate, and what the plate read.
 
-    W = -sum_c RNEA_c(T_lab_root_c(t), q_motor(t))[root]         action on the plate, lab axes, about its centre
+    W = -sum_c RNEA_c(T_lab_root_c(t), q(t))[root]         action on the plate, lab axes, about its centre
 
 The base rocks on its tyres and the torso bends, at frequencies that would shift any lag, so what can be seen is not
 computed: a body of markers carries all links beyond its own, up to the next body's. For each such body c the robot is
 placed so that c's link is where its markers are, at nominal places, and only the masses c carries count. The hand's
-markers are not used. Nominal masses, q_motor beyond the last body; errors of the carrying links' ten inertial
-parameters are nuisances, linear.
+markers are not used here. Masses are nominal; errors of the ten inertial parameters of each body's link are nuisances.
 """
 
 from collections.abc import Sequence
@@ -17,7 +16,6 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from calibration.bodies import poses_of
-from calibration.clock import Clock
 from calibration.markers import base_body, hand_body
 from calibration.recording import Trial
 from calibration.robot import reduced_model
@@ -29,6 +27,19 @@ _CUTOFF = 4.0  # [Hz]
 _DECIMATED = 0.01  # [s] plate samples averaged together
 _SEEN = 0.8  # share of a trial a body must be in view to carry anything
 _STRIDE = 3  # the dynamics are evaluated every so many samples: 33 Hz for signals below 4 Hz
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """Joint angles of a trial.
+
+    Attributes:
+        t: (n,) [s, mocap clock].
+        q: (n, n_measured) [rad, m].
+    """
+
+    t: np.ndarray
+    q: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -92,7 +103,7 @@ def plate_moments(trial: Trial) -> Signal:
 
 
 def model_moments(
-    parts: Sequence[Carrier], description: Description, trial: Trial, robot: Clock
+    parts: Sequence[Carrier], description: Description, trial: Trial, joints: JointMotion
 ) -> tuple[Signal, np.ndarray]:
     """The same from masses and motion, on the mocap clock, and what errors of the masses would add (n, k, 2).
 
@@ -100,10 +111,10 @@ def model_moments(
         NotEnoughData: A body is not in view for long enough.
     """
     order = [description.joint_names.index(name) for name in list(parts[0].model.names)[2:]]
-    q = low_passed(even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order]), _CUTOFF)
+    q = low_passed(even(joints.t, joints.q[:, order]), _CUTOFF)
     found = [_carried(part, trial, q) for part in parts]
-    moments, valid = sum(m[:, 0] for m, _ in found), np.logical_and.reduce([q.valid, *(v for _, v in found)])
-    return Signal(q.t, np.asarray(moments), valid), np.concatenate([m[:, 1:] for m, _ in found], axis=1)
+    whole, valid = sum(m[:, 0] for m, _ in found), np.logical_and.reduce([q.valid, *(v for _, v in found)])
+    return Signal(q.t, np.asarray(whole), valid), np.concatenate([m[:, 1:] for m, _ in found], axis=1)
 
 
 def _carried(part: Carrier, trial: Trial, q: Signal) -> tuple[np.ndarray, np.ndarray]:
