@@ -12,7 +12,7 @@ from calibration.errors import ShapeError
 
 
 def gravity_torques(model: pin.Model, measured: tuple[str, ...], q: np.ndarray) -> np.ndarray:
-    """tau (n, n_measured) of a floating model held level, at joint positions q (n, n_measured) [rad, m].
+    """Gravity torques (n, n_measured) of a floating model held level, at joint positions q (n, n_measured) [rad, m].
 
     Args:
         model: As `inverse_dynamics.floating_model` builds it: root joint first, payload included.

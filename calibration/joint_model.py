@@ -60,7 +60,7 @@ class JointModel:
     Attributes:
         joint: Name of the joint.
         terms: Which terms its degree means.
-        degree: 0 is the choice "none": no correction.
+        degree: None is the choice "none", no correction.
         powers: (i, j) of the k terms kept.
         dropped: Exponents that were left out because their term is zero throughout.
         rho: [s/rad].
@@ -74,7 +74,7 @@ class JointModel:
 
     joint: str
     terms: Terms
-    degree: int
+    degree: int | None
     powers: tuple[Exponent, ...]
     dropped: tuple[Exponent, ...]
     rho: float

@@ -1,0 +1,116 @@
+"""Fit of one joint model by variable projection: linear in A and B, a search in one variable for rho.
+
+    M(rho) = [S Phi, (1 - S) Phi]        x(rho) = argmin |y - M x|^2        minimise |r(rho)|^2,  r = y - M x
+    dr/drho = -M' x - M (M^T M)^-1 (M'^T r - M^T M' x)                      M' = dM/drho,  dS/drho = dq S (1 - S)
+
+rho is sought in its logarithm, between limits: below them a flank is never chosen at the joint's speed, above them an
+encoder's quantum chooses it.
+References: Golub, Pereyra, SIAM J. Numer. Anal. 1973; Kaufman, BIT 1975.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import expit
+
+RHO = (2.0, 1000.0)  # [s/rad] limits of the search
+_GRID = 8
+_RANK = 1e-7  # smallest over largest singular value of the scaled design [-]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Samples of one joint.
+
+    Attributes:
+        phi: (n, k) monomials.
+        velocity: (n,) [rad/s].
+        y: (n,) discrepancy [rad].
+    """
+
+    phi: np.ndarray
+    velocity: np.ndarray
+    y: np.ndarray
+
+    def design(self, rho: float) -> np.ndarray:
+        """M (n, 2 k)."""
+        S = expit(rho * self.velocity)[:, None]
+        return np.hstack([S * self.phi, (1.0 - S) * self.phi])
+
+    def design_slope(self, rho: float) -> np.ndarray:
+        """dM/drho (n, 2 k)."""
+        S = expit(rho * self.velocity)
+        change = (self.velocity * S * (1.0 - S))[:, None] * self.phi
+        return np.hstack([change, -change])
+
+
+@dataclass(frozen=True)
+class Projection:
+    """The problem solved for the coefficients at one rho.
+
+    Attributes:
+        rho: [s/rad].
+        x: (2 k,) coefficients a, b of the scaled monomials [rad].
+        r: (n,) residuals [rad].
+        slope: (n,) their derivative by rho, x following.
+        full_rank: Whether the samples fix every coefficient.
+    """
+
+    rho: float
+    x: np.ndarray
+    r: np.ndarray
+    slope: np.ndarray
+    full_rank: bool
+
+
+def project(problem: Problem, rho: float) -> Projection:
+    """Best coefficients at rho and the residuals' derivative; of undetermined ones the smallest."""
+    M, dM = problem.design(rho), problem.design_slope(rho)
+    U, s, Vt = np.linalg.svd(M, full_matrices=False)
+    kept = s > _RANK * s[0]
+    U, s, Vt = U[:, kept], s[kept], Vt[kept]
+    x = Vt.T @ ((U.T @ problem.y) / s)
+    r = problem.y - M @ x
+    moved = dM @ x
+    slope = -moved - U @ ((Vt @ (dM.T @ r)) / s - U.T @ moved)
+    return Projection(rho, x, r, slope, bool(kept.all()))
+
+
+def search(problem: Problem) -> Projection:
+    """The best rho within its limits: best of a grid, then the zero of the derivative next to it."""
+    grid = rho_grid()
+    best = int(np.argmin([float(r @ r) for r in (project(problem, rho).r for rho in grid)]))
+    low, high = np.log(grid[max(best - 1, 0)]), np.log(grid[min(best + 1, len(grid) - 1)])
+
+    def slope(log_rho: float) -> float:
+        found = project(problem, float(np.exp(log_rho)))
+        return float(found.slope @ found.r)
+
+    if slope(low) >= 0.0:
+        return project(problem, float(np.exp(low)))
+    if slope(high) <= 0.0:
+        return project(problem, float(np.exp(high)))
+    return project(problem, float(np.exp(brentq(slope, low, high, xtol=1e-10))))
+
+
+def rho_grid() -> np.ndarray:
+    """Values at which the search is started."""
+    return np.geomspace(*RHO, _GRID)
+
+
+def at_limit(rho: float) -> bool:
+    """Whether the data did not find rho inside its limits."""
+    return rho < 1.01 * RHO[0] or rho > 0.99 * RHO[1]
+
+
+def clustered_covariance(J: np.ndarray, r: np.ndarray, groups: Sequence[slice]) -> np.ndarray:
+    """Covariance (p, p) of a least-squares fit whose residuals r (n,) hang together within groups, not between them.
+
+    H^-1 (sum_g J_g' r_g r_g' J_g) H^-1 G / (G - 1),  H = J' J.  Reference: Liang, Zeger, Biometrika 1986.
+    """
+    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    pinv = np.linalg.pinv(J / scale, rcond=_RANK)
+    scores = np.array([pinv[:, g] @ r[g] for g in groups])
+    return (scores.T @ scores) * len(groups) / max(1, len(groups) - 1) / scale / scale[:, None]
