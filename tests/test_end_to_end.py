@@ -1,0 +1,113 @@
+"""The short variant of the default scenario, from the simulation to the report."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import xarray
+
+import calibration
+from scenarios import load, run, steps
+from twin.truth import read_parameters
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    return run(load("humanoids2024"), tmp_path_factory.mktemp("run") / "quick", quick=True)
+
+
+def figure(rows, model, base, trials="dynamic", name="position_rmse_component_mm"):
+    found = [r for r in rows if (r["model"], r["base"], r["trials"], r["encoder"]) == (model, base, trials, "motor")]
+    return found[0][name]
+
+
+@pytest.fixture(scope="module")
+def rows(result):
+    return json.loads((result.folder / "score.json").read_text())["rows"]
+
+
+def test_the_run_folder_is_complete(result):
+    present = {str(p.relative_to(result.folder)) for p in result.folder.rglob("*") if p.is_file()}
+    expected = {
+        "scenario.yaml",
+        "dataset/dataset.json",
+        "dataset/nominal.urdf",
+        "truth/truth.json",
+        "estimate/estimate.json",
+        "estimate/estimate.nc",
+        "estimate/calibrated.urdf",
+        "estimate/master_calibration.yaml",
+        "evaluation.json",
+        "score.json",
+        "report.html",
+        "figures/twin.png",
+    }
+    assert expected <= present
+    trials = json.loads((result.folder / "dataset/dataset.json").read_text())["trials"]
+    assert {f"dataset/{t['file']}" for t in trials} | {f"truth/{t['file']}" for t in trials} <= present
+
+
+def test_each_step_of_the_ladder_is_a_step_down(result, rows):
+    assert result.estimate.status == "calibrated"
+    nominal, registration = figure(rows, "nominal", "fixed"), figure(rows, "registration", "fixed")
+    assert registration < nominal
+    assert figure(rows, "model_2", "fixed") < 0.5 * min(nominal, registration)
+    assert figure(rows, "model_2", "measured") < 0.5 * figure(rows, "registration", "measured")
+    assert figure(rows, "model_2", "measured") < figure(rows, "model_2", "fixed")
+    angle = {
+        m: figure(rows, m, "measured", name="orientation_rmse_deg") for m in ("nominal", "registration", "model_2")
+    }
+    assert angle["model_2"] < 0.5 * angle["registration"] < 0.5 * angle["nominal"]
+
+
+def test_nothing_but_the_dataset_reaches_the_calibration(result, tmp_path):
+    shutil.copytree(result.folder / "dataset", tmp_path / "elsewhere" / "dataset")
+    steps.calibrate(tmp_path / "elsewhere" / "dataset", tmp_path / "estimate")
+    for name in ("estimate.json", "estimate.nc", "calibrated.urdf", "master_calibration.yaml"):
+        assert (tmp_path / "estimate" / name).read_bytes() == (result.folder / "estimate" / name).read_bytes(), name
+
+
+def test_the_dataset_holds_no_seed_and_no_drawn_value(result):
+    text = (result.folder / "dataset/dataset.json").read_text()
+    assert "seed" not in text
+    drawn = [p for p in read_parameters(result.folder / "truth/truth.json") if p.name.startswith(("geometry", "link."))]
+    assert len(drawn) > 48
+    assert not [p.name for p in drawn if repr(abs(p.value))[:8] in text]
+
+
+def test_play_is_read_back_from_a_recording(result):
+    """arm_7 carries next to no load: its encoders differ by the play, and by the link encoder's own waves."""
+    dataset = calibration.load(result.folder / "dataset")
+    trial = next(t for e, t in dataset.trials("calibration") if e.id == "sweep_arm_7_joint")
+    truth = {p.name: p.value for p in read_parameters(result.folder / "truth/truth.json")}
+    j = trial.joint.index("arm_7_joint")
+    waves = sum(abs(truth[f"encoder.arm_7_joint.link.{w}"]) for w in ("cos1", "sin1", "cos2", "sin2"))
+    low, high = np.percentile((trial.q_motor - trial.q_link)[:, j], [5.0, 95.0])
+    assert high - low == pytest.approx(truth["backlash.arm_7_joint.gap"], abs=1e-3 + 2 * waves)
+    assert high - low > 0.8 * truth["backlash.arm_7_joint.gap"]
+
+
+def test_clocks_come_back(result):
+    truth = {p.name: p.value for p in read_parameters(result.folder / "truth/truth.json")}
+    for instrument, tolerance in (("robot", 1e-3), ("plate", 5e-3)):
+        clock = result.estimate.clock(instrument)
+        t = np.linspace(120.0, 300.0, 20)
+        true = t * (1.0 + truth[f"clock.{instrument}.drift"]) + truth[f"clock.{instrument}.offset"]
+        assert np.sqrt(np.mean((clock.to_mocap(t) - true) ** 2)) < tolerance, instrument
+
+
+def test_every_parameter_of_the_truth_is_judged_once(result):
+    score = json.loads((result.folder / "score.json").read_text())
+    names = [p["name"] for p in score["parameters"]]
+    assert sorted(names) == sorted(p.name for p in read_parameters(result.folder / "truth/truth.json"))
+    assert {p["status"] for p in score["parameters"]} <= {"estimated", "combined", "not_identifiable", "not_estimated"}
+    floor = [r for r in score["rows"] if r["model"] == "floor"]
+    assert floor and all(r["skill"] == 1.0 for r in floor)
+
+
+def test_other_programs_open_every_file(result):
+    for path in [*result.folder.glob("dataset/trials/*.nc"), *result.folder.glob("truth/trials/*.nc")]:
+        with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
+            for name, variable in data.variables.items():
+                assert variable.dtype.kind not in "fi" or "units" in variable.attrs, (path.name, name)
