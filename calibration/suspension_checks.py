@@ -1,0 +1,103 @@
+"""Data that cannot be what they say, told by name before a spring is fitted to them.
+
+sign       at rest the robot presses down: Fz < 0 (ACTION on the plate), and each component follows the nominal
+           inverse dynamics, not its mirror image
+place      its centre of pressure lies between the wheels' contact points
+rotation   psi = atan2(sum m_d x m_p, sum m_d . m_p) between the horizontal moments of dynamics and plate
+moved      the base rests where it rested before: more than slip has happened when it does not
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from calibration.schema import Description
+from calibration.signals import RATE, Signal, low_passed
+from calibration.suspension_rest import REST
+from calibration.suspension_sway import Forcing, Sway
+from calibration.verdict import Verdict
+
+STAGE = "suspension"
+_SLOW = 2.5  # [Hz] below the base's resonance, where plate and dynamics agree
+_OUTSIDE = 0.03  # [m] the centre of pressure may be outside the wheels
+_WEIGHT = 1.4  # believable ratio of measured to nominal weight, or its inverse [-]
+_TURNED, _WRONG = np.radians(4.0), np.radians(20.0)  # plate to lab: doubtful, not usable [rad]
+_MIRRORED = -0.5  # correlation [-]
+_FAINT = (1.0, 0.5)  # rms force [N] and moment [N.m] that say nothing of a sign
+_SHIFTED, _TWISTED = 5e-3, 50e-3  # rest pose after against before [m, rad]
+_NAMES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
+
+def wrong_plate(description: Description, plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> Iterator[Verdict]:
+    """What is wrong with the plate's wrench; trials in the same order in both."""
+    rest = np.median([f.rest for f in plate], axis=0)
+    weight = -float(np.median([f.rest[2] for f in dynamics]))
+    if rest[2] > 0.0:
+        message = (
+            f"plate sign: Fz = {rest[2]:+.0f} N at rest, it must be the action of the robot ON the plate; negate it"
+        )
+        yield Verdict(STAGE, "refused", message)
+        return
+    if not 1.0 / _WEIGHT < -rest[2] / weight < _WEIGHT:
+        message = f"plate scale: it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} N"
+        yield Verdict(STAGE, "refused", message)
+        return
+    p, d = _slow(plate, dynamics)
+    mirrored = [name for k, name in enumerate(_NAMES) if _is_mirrored(k, p[:, k], d[:, k])]
+    psi = float(np.arctan2((d[:, 3] * p[:, 4] - d[:, 4] * p[:, 3]).sum(), (d[:, 3:5] * p[:, 3:5]).sum()))
+    outside = _outside(description, np.array([-rest[4], rest[3]]) / rest[2])
+    if abs(psi) > _WRONG:
+        message = f"plate rotated by {np.degrees(psi):.0f} deg about the vertical against the lab: turn its axes"
+        yield Verdict(STAGE, "refused", message)
+    elif mirrored:
+        message = f"plate sign: {', '.join(mirrored)} mirror what the robot's motion does; negate them"
+        yield Verdict(STAGE, "refused", message)
+    elif outside > _OUTSIDE:
+        message = f"plate place: its centre of pressure is {1e3 * outside:.0f} mm outside the wheels; see plate_centre"
+        yield Verdict(STAGE, "refused", message)
+    elif abs(psi) > _TURNED:
+        message = f"plate rotated by {np.degrees(psi):.1f} deg about the vertical against the lab"
+        yield Verdict(STAGE, "warning", message)
+
+
+def moved_bases(sways: Sequence[Sway]) -> dict[str, str]:
+    """Trials after which the base stands elsewhere, and by how much."""
+    found = {}
+    for sway in sways:
+        after = sway.x[-int(0.5 * REST * RATE) :].mean(axis=0)
+        shift, turn = float(np.linalg.norm(after[:3])), float(np.linalg.norm(after[3:]))
+        if shift > _SHIFTED or turn > _TWISTED:
+            found[sway.trial_id] = f"{1e3 * shift:.1f} mm, {1e3 * turn:.0f} mrad"
+    return found
+
+
+def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> tuple[np.ndarray, np.ndarray]:
+    """Slow changes of both wrenches at common times, all trials."""
+    rows = []
+    for p, d in zip(plate, dynamics, strict=True):
+        slow_p, slow_d = (low_passed(Signal(f.t, f.w, np.ones(len(f.t), bool)), _SLOW).x for f in (p, d))
+        inside = (d.t >= p.t[0]) & (d.t <= p.t[-1])
+        at = np.stack([np.interp(d.t[inside], p.t, column) for column in slow_p.T], axis=1)
+        rows.append((at, slow_d[inside]))
+    both = [np.concatenate(a) for a in zip(*rows, strict=True)]
+    return both[0], both[1]
+
+
+def _is_mirrored(k: int, p: np.ndarray, d: np.ndarray) -> bool:
+    faint = _FAINT[0] if k < 3 else _FAINT[1]
+    if min(p.std(), d.std()) < faint:
+        return False
+    return bool(np.corrcoef(p, d)[0, 1] < _MIRRORED)
+
+
+def _outside(description: Description, cop: np.ndarray) -> float:
+    """How far a point (2,) is outside the polygon of the wheels' contacts [m]; 0 where no polygon is declared."""
+    contacts = np.array([w.contact[:2] for w in description.wheels])
+    if len(contacts) < 3:
+        return 0.0
+    try:
+        sides = ConvexHull(contacts).equations
+    except QhullError:
+        return 0.0
+    return max(0.0, float((sides[:, :2] @ cop + sides[:, 2]).max()))

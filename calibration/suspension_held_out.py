@@ -1,0 +1,73 @@
+"""Which axes of the base the suspension predicts better than a base that stays: leave one trial out.
+
+    R2_a = 1 - sum_k sum_t (x - x_(-k))_a^2 / sum_k sum_t x_a^2          x_(-k): fitted without trial k, from the wrench
+
+Zero is a base that stays, not the mean. An axis is moved only if R2 is worth it and stays positive without the trial
+that speaks most for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
+capture's noise (its variance at rest) off both sums: what share of the motion itself is the spring's.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.signals import RATE
+from calibration.suspension_modes import modes_of
+from calibration.suspension_sway import Forcing, Sway
+
+_WORTH = 0.05  # R2 below which an axis is left still [-]
+_VISIBLE = 1.5  # motion over noise, mean squares, below which its share cannot be told [-]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Sums over each trial when it was left out, (n_trials, 6).
+
+    Attributes:
+        error: Squared error.
+        motion: Squared displacement.
+        noise: Squared noise to be expected.
+    """
+
+    error: np.ndarray
+    motion: np.ndarray
+    noise: np.ndarray
+
+    @property
+    def r2(self) -> np.ndarray:
+        """(6,) of all trials together."""
+        return 1.0 - self.error.sum(axis=0) / np.maximum(self.motion.sum(axis=0), np.finfo(float).tiny)
+
+    @property
+    def explained(self) -> np.ndarray:
+        """(6,) share of the motion without noise; NaN where there is hardly any."""
+        error, motion, noise = (a.sum(axis=0) for a in (self.error, self.motion, self.noise))
+        visible = motion > _VISIBLE * noise
+        share = 1.0 - (error - noise) / np.where(visible, motion - noise, 1.0)
+        return np.where(visible, np.minimum(share, 1.0), np.nan)
+
+    @property
+    def moves(self) -> np.ndarray:
+        """(6,) whether to move an axis."""
+        gain = self.motion - self.error
+        rest = gain.sum(axis=0) - (gain.max(axis=0) if len(gain) > 1 else 0.0)
+        return (self.r2 > _WORTH) & (rest > 0.0)
+
+
+def held_out(sways: Sequence[Sway], without: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> HeldOut:
+    """Predict every trial by K and C fitted without it."""
+    rows = []
+    for k, sway in enumerate(sways):
+        e = (sway.x - predicted(*without(k), sway.forcing))[sway.valid]
+        rows.append(((e**2).sum(axis=0), (sway.x[sway.valid] ** 2).sum(axis=0), len(e) * sway.noise))
+    error, motion, noise = (np.array(a) for a in zip(*rows, strict=True))
+    return HeldOut(error, motion, noise)
+
+
+def predicted(K: np.ndarray, C: np.ndarray, forcing: Forcing) -> np.ndarray:
+    """Displacement (n, 6) [m, rad] of a base on springs K and dampers C; inf where it does not settle."""
+    modes = modes_of(K + forcing.tangent, C, forcing.inertia)
+    if not np.isfinite(modes.settling):
+        return np.full(forcing.w.shape, np.inf)
+    return modes.respond(forcing.w, 1.0 / RATE)
