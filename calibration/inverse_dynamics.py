@@ -16,6 +16,7 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from calibration.bodies import poses_of
+from calibration.errors import NotEnoughData
 from calibration.markers import base_body, hand_body
 from calibration.recording import Trial
 from calibration.robot import reduced_model
@@ -145,6 +146,8 @@ def _action(T_lab_frame: np.ndarray, trial: Trial) -> np.ndarray:
 def _link_poses(body: Body, trial: Trial, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """T_lab_link (n, 4, 4) at t with the link where the body's markers are, smooth, and validity (n,)."""
     T = poses_of(body, trial).T
+    if not np.isfinite(T).any():
+        raise NotEnoughData(f"{trial.id}: body {body.name!r} is never in view")
     middle = mean(T)
     moved = low_passed(even(trial.t_mocap, to_vector(inverse(middle) @ T)), _CUTOFF)
     columns = [np.interp(t, moved.t, c) for c in moved.x.T]

@@ -5,7 +5,7 @@ It shares its model with the pipeline on purpose: here what the pipeline must re
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -121,7 +121,12 @@ def through(postures: np.ndarray, dwell: float = 1.0, move: float = 1.5) -> tupl
 
 
 def record(
-    truth: Truth, motor: np.ndarray, start: float, rng: np.random.Generator, dwells: np.ndarray | None = None
+    truth: Truth,
+    motor: np.ndarray,
+    start: float,
+    rng: np.random.Generator,
+    dwells: np.ndarray | None = None,
+    plate: bool = True,
 ) -> Trial:
     """A trial along motor angles (n, 8) on GRID; `start` [s] on the mocap clock."""
     t = np.arange(len(motor)) / GRID
@@ -145,10 +150,11 @@ def record(
     )
     position = position + truth.marker_sigma * rng.normal(size=position.shape)
     t_plate = np.arange(int(t[-1] * 200.0)) / 200.0 + 0.5 / 200.0
-    coarse = np.arange(0, len(link), 5)
-    wrench = np.stack(
-        [np.interp(t_plate, t[coarse], w) for w in plate_wrench(truth, link[coarse], T_lab_base, GRID / 5.0).T], axis=1
-    )
+    wrench = np.zeros((len(t_plate), 6))
+    if plate:
+        some = slice(None, None, 5)
+        found = plate_wrench(truth, link[some], T_lab_base, GRID / 5.0)
+        wrench = np.stack([np.interp(t_plate, t[some], w) for w in found.T], axis=1)
     dwells = np.zeros((0, 2)) if dwells is None else dwells
     zeros = np.zeros((n, 8))
 
@@ -178,6 +184,11 @@ def plate_wrench(truth: Truth, q: np.ndarray, T_lab_base: np.ndarray, rate: floa
         tau = pin.rnea(m, d, np.r_[start, q[k]], np.r_[zero, v[k]], np.r_[zero, a[k]])
         out[k] = -root.act(pin.Force(tau[:6])).vector
     return out
+
+
+def without_plate(trial: Trial) -> Trial:
+    empty = {"plate": (), "t_plate": np.zeros(0), "plate_wrench": np.zeros((0, 0, 6)), "plate_centre": np.zeros((0, 3))}
+    return replace(trial, **empty)
 
 
 def description(trials: list[dict], **changes: object) -> dict:
@@ -223,7 +234,7 @@ def near_postures(rng: np.random.Generator, n: int, torso: bool = True) -> np.nd
     return q
 
 
-def campaign(folder: Path, truth: Truth, seed: int = 0, n_postures: int = 20, **changes: object) -> Path:
+def campaign(folder: Path, truth: Truth, seed: int = 0, n_postures: int = 20, plate: bool = True) -> Path:
     """A short campaign: one static trial, three sweeps, a swing; validation: a swing and a static trial."""
     rng = np.random.default_rng(seed)
     static, dwells = through(near_postures(rng, n_postures))
@@ -239,9 +250,10 @@ def campaign(folder: Path, truth: Truth, seed: int = 0, n_postures: int = 20, **
     ]
     trials, start = [], 12.0
     for name, role, kind, motor, rests in plan:
-        trials.append((name, role, kind, record(truth, motor, start, rng, rests)))
+        trial = record(truth, motor, start, rng, rests, plate)
+        trials.append((name, role, kind, trial if plate else without_plate(trial)))
         start += len(motor) / GRID + 20.0
-    return write(folder, trials, **changes)
+    return write(folder, trials)
 
 
 def postures(truth: Truth, q: np.ndarray, sigma: float = 1e-9, seed: int = 0) -> Postures:

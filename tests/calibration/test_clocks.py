@@ -45,9 +45,8 @@ def sweeps(truth, n, seed=0):
     rng = np.random.default_rng(seed)
     joints = (1, 2, 3, 4, 5, 6, 7)
     motors = [matched.sweep(joints[k % 7], seconds=15.0) for k in range(n)]
-    trials = [matched.record(truth, m, 12.0 + 60.0 * k, rng) for k, m in enumerate(motors)]
-    return [replace(t, id=f"sweep{k}", plate=(), t_plate=np.zeros(0), plate_wrench=np.zeros((0, 0, 6)),
-                    plate_centre=np.zeros((0, 3))) for k, t in enumerate(trials)]  # fmt: skip
+    trials = [matched.record(truth, m, 12.0 + 60.0 * k, rng, plate=False) for k, m in enumerate(motors)]
+    return [replace(matched.without_plate(t), id=f"sweep{k}") for k, t in enumerate(trials)]
 
 
 def test_a_campaign_of_sweeps_gives_the_robot_clock_to_300_us(truth):
@@ -90,6 +89,11 @@ def test_the_sigma_of_a_lag_is_its_scatter_when_the_noise_is_correlated():
         found.append(fit_lag(pair(signal(t, x.x + 0.2 * noise.x), x), 0.0))
     scatter, stated = np.std([f.value for f in found]), np.mean([f.sigma for f in found])
     assert 0.7 < stated / scatter < 1.4
+
+
+def test_a_play_starts_centred_and_follows_half_a_gap_behind():
+    q = np.array([0.0, 0.5, 3.0, 2.5, 1.5, 0.0])[:, None]
+    np.testing.assert_array_equal(play(q, np.array([1.0]))[:, 0], [0.0, 0.0, 2.0, 2.0, 2.0, 1.0])
 
 
 def test_backlash_shifts_a_lag_by_its_formula_unless_its_term_is_there():

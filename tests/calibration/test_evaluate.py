@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from calibration import evaluate, load, load_estimate, predictions, save_estimate
+from calibration import calibrate, evaluate, load, load_estimate, predictions, save_estimate
 from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.metrics import PoseErrors, dwell_means, pose_errors, row_metrics
 from calibration.recording import read_trial, write_trial
@@ -31,9 +31,7 @@ def test_every_model_improves_on_the_one_before_it(evaluation):
 
 def test_without_play_or_noise_only_the_mocap_s_own_noise_is_left(tmp_path):
     truth = replace(matched.defects(2), marker_sigma=1e-5)
-    from calibration import calibrate
-
-    dataset = load(matched.campaign(tmp_path / "dataset", truth))
+    dataset = load(matched.campaign(tmp_path / "dataset", truth, n_postures=14, plate=False))
     row = evaluate(calibrate(dataset), dataset).row("model_2", "static", "fixed")
     assert row.metrics.position_rmse_component_mm < 0.05
     assert row.metrics.orientation_rmse_deg < 0.01

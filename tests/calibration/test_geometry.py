@@ -170,8 +170,15 @@ def test_a_wrist_zero_of_forty_degrees_is_beyond_belief(chain):
     assert "encoder.arm_6_joint.motor.offset" in refusals(chain, postures)
 
 
-def test_joints_in_the_wrong_order_are_refused(chain):
+def test_a_joint_whose_readings_scatter_is_refused_by_name(chain):
     postures = with_play(matched.defects(1), matched.near_postures(np.random.default_rng(1), 30))
+    q = postures.q.copy()
+    q[:, 3] += 0.2 * np.random.default_rng(2).normal(size=30)
+    assert "readings of arm_3_joint scatter by" in refusals(chain, replace(postures, q=q))
+
+
+def test_joints_in_the_wrong_order_are_refused(chain):
+    postures = with_play(matched.defects(1), matched.near_postures(np.random.default_rng(1), 16))
     swapped = replace(postures, q=postures.q[:, [0, 1, 3, 2, 4, 5, 6, 7]])
     assert refusals(chain, swapped) != ""
 

@@ -8,6 +8,7 @@ import pytest
 
 from calibration import calibrate, load, save_estimate
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
+from calibration.recording import sha256
 from tests.calibration import matched
 from tests.calibration.changes import rewritten
 
@@ -19,8 +20,10 @@ def saved(folder: Path, out: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in sorted(out.iterdir())}
 
 
-def refused(folder: Path) -> str:
+def refused(folder: Path, out: Path | None = None) -> str:
     estimate = calibrate(load(folder))
+    if out is not None:
+        save_estimate(estimate, out)
     assert estimate.status == "not_calibrated"
     return " | ".join(v.message for v in estimate.verdicts if v.verdict == "refused")
 
@@ -67,11 +70,8 @@ def test_an_unknown_stage_is_told_with_those_that_exist(dataset):
 
 
 def test_without_a_plate_everything_else_works_and_it_is_said(folder, tmp_path):
-    def without(trial):
-        empty = {"plate": (), "t_plate": np.zeros(0), "plate_wrench": np.zeros((0, 0, 6))}
-        return replace(trial, **empty, plate_centre=np.zeros((0, 3)))
-
-    estimate = calibrate(load(rewritten(folder, tmp_path / "copy", dict.fromkeys(CALIBRATION, without))))
+    changes = dict.fromkeys(CALIBRATION, matched.without_plate)
+    estimate = calibrate(load(rewritten(folder, tmp_path / "copy", changes)))
     assert estimate.calibrated and [c.instrument for c in estimate.clocks] == ["robot"]
     assert any(v.verdict == "missing" and "plate" in v.message for v in estimate.verdicts)
 
@@ -115,9 +115,9 @@ def test_five_postures_are_refused_and_nothing_is_exported(folder, tmp_path):
         return replace(trial, dwell_start=trial.dwell_start[:5], dwell_stop=trial.dwell_stop[:5],
                        approach=trial.approach[:5])  # fmt: skip
 
-    copy = rewritten(folder, tmp_path / "copy", {"postures": five})
-    assert "5 distinct postures" in refused(copy)
-    assert "calibrated.urdf" not in saved(copy, tmp_path / "out")
+    said = refused(rewritten(folder, tmp_path / "copy", {"postures": five}), tmp_path / "out")
+    assert "5 distinct postures" in said
+    assert not (tmp_path / "out" / "calibrated.urdf").exists()
 
 
 def test_a_truncated_recording_is_told_by_file(folder, tmp_path):
@@ -127,8 +127,6 @@ def test_a_truncated_recording_is_told_by_file(folder, tmp_path):
     with pytest.raises(InputError, match=r"sweep1\.nc.*sha256"):
         calibrate(load(copy))
     listed = json.loads((copy / "dataset.json").read_text())
-    from calibration.recording import sha256
-
     for entry in listed["trials"]:
         entry["sha256"] = sha256(copy / entry["file"])
     (copy / "dataset.json").write_text(json.dumps(listed))
