@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from calibration.identifiability import Combination, Status
 from calibration.parameters import parameter_names
 from calibration.robot import Chain
 from calibration.verdict import Verdict
+
+if TYPE_CHECKING:
+    from calibration.joint_model import JointModel
+    from calibration.suspension import Suspension
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,9 @@ class Estimate:
         main: Name of the model that calibrated.urdf and `Compensator` use; empty where there is none.
         urdf: URDF text the geometry is relative to; None: the dataset's nominal one.
         robot: Joints and frames; None where the source does not say.
+        suspension: Base under a wrench, of row `model_1`; None where there is none.
+        joint_models: Printed joint models, of row `model_3`.
+        link_zero: Motor minus link reading of each measured joint over the calibration postures [rad, m].
     """
 
     status: Literal["calibrated", "not_calibrated"]
@@ -120,6 +127,9 @@ class Estimate:
     main: str
     urdf: str | None = None
     robot: RobotNames | None = None
+    suspension: "Suspension | None" = None
+    joint_models: "tuple[JointModel, ...]" = ()
+    link_zero: tuple[float, ...] = ()
 
     def model(self, name: str) -> Model:
         """The model of that name.

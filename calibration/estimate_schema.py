@@ -8,6 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from calibration.clock import Clock
 from calibration.estimate import Estimate, Model, Parameter, RobotNames
+from calibration.estimate_parts import (
+    JointEntry,
+    SuspensionEntry,
+    joint_entry,
+    joint_model,
+    suspension_entry,
+    suspension_of,
+)
 from calibration.identifiability import Combination, Status
 from calibration.verdict import Verdict
 
@@ -92,6 +100,9 @@ class EstimateFile(Entry):
     main: str = ""
     clocks: tuple[ClockEntry, ...] = ()
     robot: RobotEntry | None = None
+    suspension: SuspensionEntry | None = None
+    joint_models: tuple[JointEntry, ...] = ()
+    link_zero: tuple[float | None, ...] = ()
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore", validate_by_name=True)
 
@@ -119,6 +130,9 @@ def to_file(estimate: Estimate) -> EstimateFile:
         else RobotEntry(
             joints=estimate.robot.joints, base_frame=estimate.robot.base_frame, tool_frame=estimate.robot.tool_frame
         ),
+        suspension=None if estimate.suspension is None else suspension_entry(estimate.suspension),
+        joint_models=tuple(joint_entry(m) for m in estimate.joint_models),
+        link_zero=tuple(_finite(z) for z in estimate.link_zero),
     )
 
 
@@ -133,14 +147,24 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
         file.main or (list(file.models)[-1] if file.models else ""),
         urdf,
         None if robot is None else RobotNames(robot.joints, robot.base_frame, robot.tool_frame),
+        None if file.suspension is None else suspension_of(file.suspension),
+        tuple(joint_model(entry) for entry in file.joint_models),
+        tuple(float("nan") if z is None else z for z in file.link_zero),
     )
+
+
+def _finite(x: float) -> float | None:
+    """JSON has no NaN: what is not known is null."""
+    return float(x) if np.isfinite(x) else None
 
 
 def _model_entry(model: Model) -> ModelEntry:
     names = [p.name for p in model.parameters]
     return ModelEntry(
         parameters=tuple(
-            ParameterEntry(name=p.name, unit=p.unit, nominal=p.nominal, value=p.value, sigma=p.sigma, status=p.status)
+            ParameterEntry(
+                name=p.name, unit=p.unit, nominal=p.nominal, value=p.value, sigma=_finite(p.sigma), status=p.status
+            )
             for p in model.parameters
         ),
         combinations=tuple(

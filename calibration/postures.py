@@ -91,13 +91,13 @@ def _passed(description: Description, trial: Trial, robot: Clock, spacing: float
     T = inverse(base.T[rows]) @ hand.T[rows]
     Ad = adjoint(inverse(T))
     S = hand.covariance[rows] + Ad @ base.covariance[rows] @ np.swapaxes(Ad, 1, 2)
-    return T, readings_at(trial, robot, trial.t_mocap[rows]), S, np.zeros(len(rows))
+    return T, readings_at(trial, robot, trial.t_mocap[rows], trial.q_motor), S, np.zeros(len(rows))
 
 
-def readings_at(trial: Trial, robot: Clock, t: np.ndarray) -> np.ndarray:
-    """Motor-side readings (n, n_joints) at mocap times t (n,) [s], linear; NaN outside the recording."""
+def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray) -> np.ndarray:
+    """Readings (m, n_joints) taken at `t_robot`, at mocap times t (n,) [s], linear; NaN outside the recording."""
     s = robot.from_mocap(t)
-    columns = (np.interp(s, trial.t_robot, q, left=np.nan, right=np.nan) for q in trial.q_motor.T)
+    columns = (np.interp(s, trial.t_robot, q, left=np.nan, right=np.nan) for q in readings.T)
     return np.stack(list(columns), axis=1)
 
 

@@ -1,10 +1,16 @@
 """Held-out prediction of the hand pose by every model of an estimate.
 
-    fixed:     T_lab_hand(t) = T_lab_B(first second)  T_B_H(q_motor(t))
-    measured:  T_lab_hand(t) = T_lab_B(t)             T_B_H(q_motor(t))
+    T_lab_hand(t) = T_lab_B(t)  T_B_H(q(t))
 
-T_lab_B comes from the base markers, q_motor at mocap time t by the robot's clock. Of a trial nothing else is read:
-base markers of its first second (throughout where the base is `measured`) and encoders, never hand or shoulder.
+T_lab_B, where the base's marker body is:      fixed      as in the first second
+                                               plate      moved by the suspension under the plate's wrench
+                                               dynamics   moved by the suspension under the nominal inverse dynamics
+                                               measured   by its markers throughout
+q, what stands for the joints' positions:      motor      q_motor by the robot's clock; less the joint model in model_3
+                                               link       link readings, their zero laid on the motor's
+
+Of a trial nothing else is read: encoders, plate, base markers of its first second (throughout where the base is
+`measured`), never hand or shoulder.
 """
 
 from collections.abc import Iterator
@@ -20,17 +26,31 @@ from calibration.dataset import Dataset
 from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.estimate import Estimate
 from calibration.hand import HandModel, nominal_hand
+from calibration.joint_correction import JointModels, correct
+from calibration.joint_inputs import input_model
+from calibration.joint_zero import aligned_link_readings
 from calibration.markers import base_body
 from calibration.parameters import nominal_frames
 from calibration.postures import readings_at
 from calibration.recording import Trial
 from calibration.robot import chain_of
-from calibration.schema import Body, Role, TrialEntry
-from calibration.se3 import mean
+from calibration.schema import Description, Role, TrialEntry
+from calibration.se3 import from_vector, mean
+from calibration.suspension import Suspension
+from calibration.suspension_predict import base_poses
+from calibration.suspension_read import laboratory
 
 REFERENCE = 1.0  # [s] of rest at the start of every trial
-Base = Literal["fixed", "measured"]
-_ROWS = ("nominal", "registration", "model_2")
+Base = Literal["fixed", "plate", "dynamics", "measured"]
+Encoder = Literal["motor", "link"]
+_EVERY: tuple[Base, ...] = ("fixed", "plate", "dynamics", "measured")
+_ROWS: tuple[tuple[str, tuple[Base, ...], tuple[Encoder, ...]], ...] = (
+    ("nominal", ("fixed", "measured"), ("motor",)),
+    ("model_1", ("plate", "dynamics", "measured"), ("motor",)),
+    ("registration", _EVERY, ("motor",)),
+    ("model_2", _EVERY, ("motor",)),
+    ("model_3", _EVERY, ("motor", "link")),
+)
 
 
 @dataclass(frozen=True)
@@ -39,8 +59,8 @@ class Prediction:
 
     Attributes:
         model: Row of the ladder.
-        base: Where the base's motion comes from: `fixed` or `measured`.
-        encoder: `motor`.
+        base: Where the base's motion comes from.
+        encoder: Which side of the gear was read.
         trial_id: The trial.
         kind: Its kind: static, sweep, swing, spin, drive.
         t: (n,) [s, mocap clock].
@@ -49,7 +69,7 @@ class Prediction:
 
     model: str
     base: Base
-    encoder: Literal["motor"]
+    encoder: Encoder
     trial_id: str
     kind: str
     t: np.ndarray
@@ -58,25 +78,69 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Predictor:
-    """All that predicting the trials of one dataset takes."""
+    """All that predicting the trials of one dataset takes.
 
-    models: tuple[tuple[str, HandModel], ...]
-    body: Body
+    Attributes:
+        models: Robots by row.
+        urdf: Nominal robot.
+        description: Of the dataset.
+        robot: Clock of the encoders.
+        plate: Clock of the plate, None where there is none.
+        suspension: None where there is none.
+        joints: None where there is none.
+    """
+
+    models: dict[str, HandModel]
+    urdf: str
+    description: Description
     robot: Clock
+    plate: Clock | None = None
+    suspension: Suspension | None = None
+    joints: JointModels | None = None
 
     def __call__(self, entry: TrialEntry, trial: Trial) -> Iterator[Prediction]:
-        """Predictions of one trial by every model and every source of the base's motion."""
-        T_lab_B = poses_of(self.body, trial).T
-        start = T_lab_B[trial.t_mocap <= trial.t_mocap[0] + REFERENCE]
-        if not np.isfinite(start).any():
-            raise NotEnoughData(f"{entry.id}: body {self.body.name!r} is not seen in the first second of the trial")
-        q = readings_at(trial, self.robot, trial.t_mocap)
-        known = np.isfinite(q).all(axis=1)
-        for name, hand in self.models:
+        """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
+        for name, hand, encoder, bases in self._rows():
+            q = self._positions(name, encoder, trial)
+            known = np.isfinite(q).all(axis=1)
             T_B_H = np.full((len(q), 4, 4), np.nan)
             T_B_H[known] = hand.poses(q[known])
-            yield Prediction(name, "fixed", "motor", entry.id, entry.kind, trial.t_mocap, mean(start) @ T_B_H)
-            yield Prediction(name, "measured", "motor", entry.id, entry.kind, trial.t_mocap, T_lab_B @ T_B_H)
+            for base in bases:
+                T_lab_B = self._base(base, hand, entry, trial)
+                if T_lab_B is not None:
+                    yield Prediction(name, base, encoder, entry.id, entry.kind, trial.t_mocap, T_lab_B @ T_B_H)
+
+    def _rows(self) -> Iterator[tuple[str, HandModel, Encoder, tuple[Base, ...]]]:
+        for name, bases, encoders in _ROWS:
+            if name in self.models:
+                for encoder in encoders:
+                    yield name, self.models[name], encoder, bases
+
+    def _positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
+        """Joint positions (n, n_joints) [rad, m] the geometry is asked with, at the motion capture's times."""
+        if encoder == "link" and self.joints is not None:
+            return readings_at(trial, self.robot, trial.t_mocap, aligned_link_readings(trial, self.joints.zero))
+        if name == "model_3" and self.joints is not None:
+            corrected = correct(self.joints, trial.t_robot, trial.q_motor).q
+            return readings_at(trial, self.robot, trial.t_mocap, corrected)
+        return readings_at(trial, self.robot, trial.t_mocap, trial.q_motor)
+
+    def _base(self, base: Base, hand: HandModel, entry: TrialEntry, trial: Trial) -> np.ndarray | None:
+        """T_lab_B (n, 4, 4), or None where that source is not there."""
+        T_lab_B = poses_of(base_body(self.description), trial).T
+        start = T_lab_B[trial.t_mocap <= trial.t_mocap[0] + REFERENCE]
+        if not np.isfinite(start).any():
+            body = base_body(self.description).name
+            raise NotEnoughData(f"{entry.id}: body {body!r} is not seen in the first second of the trial")
+        if base == "measured":
+            return T_lab_B
+        if base == "fixed":
+            return np.broadcast_to(mean(start), T_lab_B.shape)
+        if self.suspension is None or (base == "plate" and (self.plate is None or len(trial.t_plate) == 0)):
+            return None
+        description = self.description.loaded(entry)
+        lab = laboratory(self.urdf, description, self.robot, self.plate, from_vector(hand.base))
+        return base_poses(self.suspension, lab, trial, base)
 
 
 def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
@@ -91,13 +155,19 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     drawn = chain_of(dataset.urdf, description)
     frames = nominal_frames(drawn, description)
     chain = drawn if estimate.urdf in (None, dataset.urdf) else chain_of(str(estimate.urdf), description)
-    models = [("nominal", nominal_hand(drawn, frames))]
-    models += [(m.name, m.hand(chain, frames)) for m in estimate.models if m.name in _ROWS]
+    models = {m.name: m.hand(chain, frames) for m in estimate.models}
+    models["nominal"] = nominal_hand(drawn, frames)
+    if estimate.suspension is not None:
+        models["model_1"] = models["nominal"]
     robot = estimate.clock("robot")
     if robot is None:
         trials = tuple(trial for _, trial in dataset.trials("calibration"))
         robot = synchronise(dataset.urdf, description, trials)[0][0]
-    return Predictor(tuple(models), base_body(description), robot)
+    joints = None
+    if estimate.joint_models and "model_3" in models:
+        inputs = input_model(dataset.urdf, description, models["model_3"])
+        joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
+    return Predictor(models, dataset.urdf, description, robot, estimate.clock("plate"), estimate.suspension, joints)
 
 
 def predictions(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[Prediction]:

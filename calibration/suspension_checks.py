@@ -24,8 +24,9 @@ _OUTSIDE = 0.03  # [m] the centre of pressure may be outside the wheels
 _WEIGHT = 1.4  # believable ratio of measured to nominal weight, or its inverse [-]
 _TURNED, _WRONG = np.radians(4.0), np.radians(20.0)  # plate to lab: doubtful, not usable [rad]
 _MIRRORED = -0.5  # correlation [-]
+_ALIKE = 0.7  # share of common motion of two pairs of moments between which an angle means something [-]
 _FAINT = (1.0, 0.5)  # rms force [N] and moment [N.m] that say nothing of a sign
-_SHIFTED, _TWISTED = 5e-3, 50e-3  # rest pose after against before [m, rad]
+_SHIFTED, _TWISTED = 15e-3, 0.1  # rest pose after against before: slip alone reaches 6 mm, 30 mrad [m, rad]
 _NAMES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
@@ -45,7 +46,7 @@ def wrong_plate(description: Description, plate: Sequence[Forcing], dynamics: Se
         return
     p, d = _slow(plate, dynamics)
     mirrored = [name for k, name in enumerate(_NAMES) if _is_mirrored(k, p[:, k], d[:, k])]
-    psi = float(np.arctan2((d[:, 3] * p[:, 4] - d[:, 4] * p[:, 3]).sum(), (d[:, 3:5] * p[:, 3:5]).sum()))
+    psi = _turn(d[:, 3:5], p[:, 3:5])
     outside = _outside(description, np.array([-rest[4], rest[3]]) / rest[2])
     if abs(psi) > _WRONG:
         message = f"plate rotated by {np.degrees(psi):.0f} deg about the vertical against the lab: turn its axes"
@@ -82,6 +83,13 @@ def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> tuple[np.nda
         rows.append((at, slow_d[inside]))
     both = [np.concatenate(a) for a in zip(*rows, strict=True)]
     return both[0], both[1]
+
+
+def _turn(d: np.ndarray, p: np.ndarray) -> float:
+    """Angle from d to p (n, 2) [rad]; 0 where they do not show the same motion."""
+    along, across = float((d * p).sum()), float((d[:, 0] * p[:, 1] - d[:, 1] * p[:, 0]).sum())
+    alike = np.hypot(along, across) > _ALIKE * np.sqrt((d**2).sum() * (p**2).sum())
+    return float(np.arctan2(across, along)) if alike else 0.0
 
 
 def _is_mirrored(k: int, p: np.ndarray, d: np.ndarray) -> bool:

@@ -2,8 +2,8 @@
 
     R2_a = 1 - sum_k sum_t (x - x_(-k))_a^2 / sum_k sum_t x_a^2          x_(-k): fitted without trial k, from the wrench
 
-Zero is a base that stays, not the mean. An axis is moved only if R2 is worth it and stays positive without the trial
-that speaks most for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
+Zero is a base that stays, not the mean. An axis is moved only if R2 is worth it, also without the trial that speaks
+most for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
 capture's noise (its variance at rest) off both sums: what share of the motion itself is the spring's.
 """
 
@@ -50,9 +50,11 @@ class HeldOut:
     @property
     def moves(self) -> np.ndarray:
         """(6,) whether to move an axis."""
-        gain = self.motion - self.error
-        rest = gain.sum(axis=0) - (gain.max(axis=0) if len(gain) > 1 else 0.0)
-        return (self.r2 > _WORTH) & (rest > 0.0)
+        gain, axes = self.motion - self.error, np.arange(self.motion.shape[1])
+        best = gain.argmax(axis=0)
+        rest = gain.sum(axis=0) - gain[best, axes]
+        others = self.motion.sum(axis=0) - self.motion[best, axes]
+        return np.asarray((self.r2 > _WORTH) & (rest >= _WORTH * others))
 
 
 def held_out(sways: Sequence[Sway], without: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> HeldOut:

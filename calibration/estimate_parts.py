@@ -1,0 +1,156 @@
+"""The parts of estimate.json that are more than parameters: the suspension and the joint models, as they predict."""
+
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+from scipy.linalg import block_diag
+
+from calibration.estimate import Model, Parameter
+from calibration.joint_model import JointModel, Quality, Terms
+from calibration.suspension import Source, Suspension
+from calibration.suspension_held_out import HeldOut
+
+Rows = tuple[tuple[float, ...], ...]
+
+
+class Part(BaseModel):
+    """Frozen; no NaN."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore")
+
+
+class JointEntry(Part):
+    """See `joint_model.JointModel`; coefficients and their covariance stand among the parameters of model_3."""
+
+    joint: str
+    terms: Terms
+    degree: int | None = None
+    powers: tuple[tuple[int, int], ...]
+    dropped: tuple[tuple[int, int], ...]
+    rho: float
+    A: tuple[float, ...]
+    B: tuple[float, ...]
+    domain: Rows
+    zero: float
+    quality: tuple[float, float, float, float]
+
+
+class HeldOutEntry(Part):
+    """Leave-one-trial-out sums of the suspension for one source of the wrench."""
+
+    source: Source
+    error: Rows
+    motion: Rows
+    noise: Rows
+
+
+class SuspensionEntry(Part):
+    """See `suspension.Suspension`; its parameters are those of model_1."""
+
+    form: Literal["printed", "compliance"]
+    K: Rows
+    C: Rows
+    tangent: Rows
+    gravity: Rows
+    held_out: tuple[HeldOutEntry, ...]
+
+
+def joint_entry(model: JointModel) -> JointEntry:
+    """A joint model as it stands in the file."""
+    q = model.quality
+    return JointEntry(
+        joint=model.joint,
+        terms=model.terms,
+        degree=model.degree,
+        powers=model.powers,
+        dropped=model.dropped,
+        rho=model.rho,
+        A=tuple(map(float, model.A)),
+        B=tuple(map(float, model.B)),
+        domain=_rows(model.domain),
+        zero=model.zero,
+        quality=(q.rms, q.residual, q.r2, q.r2_out),
+    )
+
+
+def joint_model(entry: JointEntry) -> JointModel:
+    """A joint model as it stood in the file."""
+    return JointModel(
+        entry.joint,
+        entry.terms,
+        entry.degree,
+        entry.powers,
+        entry.dropped,
+        entry.rho,
+        np.array(entry.A),
+        np.array(entry.B),
+        np.array(entry.domain),
+        entry.zero,
+        quality=Quality(*entry.quality),
+    )
+
+
+def suspension_entry(suspension: Suspension) -> SuspensionEntry:
+    """A suspension as it stands in the file."""
+    return SuspensionEntry(
+        form=suspension.form,
+        K=_rows(suspension.K),
+        C=_rows(suspension.C),
+        tangent=_rows(suspension.tangent),
+        gravity=_rows(suspension.gravity),
+        held_out=tuple(
+            HeldOutEntry(source=source, error=_rows(h.error), motion=_rows(h.motion), noise=_rows(h.noise))
+            for source, h in suspension.held_out
+        ),
+    )
+
+
+def suspension_of(entry: SuspensionEntry) -> Suspension:
+    """A suspension as it stood in the file, without the sigmas that its parameters have."""
+    unknown = np.full((6, 6), np.nan)
+    return Suspension(
+        entry.form,
+        np.array(entry.K),
+        np.array(entry.C),
+        unknown,
+        unknown,
+        np.array(entry.tangent),
+        np.array(entry.gravity),
+        tuple((h.source, HeldOut(np.array(h.error), np.array(h.motion), np.array(h.noise))) for h in entry.held_out),
+        (),
+        (),
+    )
+
+
+def suspension_model(suspension: Suspension) -> Model:
+    """Row `model_1`: the suspension's parameters; what has no sigma is not known."""
+    sigma = np.nan_to_num([p.sigma for p in suspension.parameters], nan=0.0)
+    return Model("model_1", suspension.parameters, suspension.combinations, np.diag(sigma**2))
+
+
+def joints_model(geometry: Model, models: tuple[JointModel, ...]) -> Model:
+    """Row `model_3`: the parameters of the geometry, then `sigmoid.<joint>.{rho,A_ij,B_ij}`."""
+    added, blocks = [], [geometry.covariance]
+    for model in models:
+        values = (model.rho, *model.A, *model.B) if model.powers else ()
+        names = ("rho", *(f"{side}_{i}{j}" for side in "AB" for i, j in model.powers))
+        units = ("s/rad", *(f"rad/(rad^{i} (N.m)^{j})" for _ in "AB" for i, j in model.powers))
+        covariance = model.covariance if model.powers else np.zeros((0, 0))
+        sigma = np.sqrt(np.diag(covariance))
+        added += [
+            Parameter(f"sigmoid.{model.joint}.{n}", u, 0.0, float(v), float(s), "estimated")
+            for n, u, v, s in zip(names, units, values, sigma, strict=False)
+        ]
+        blocks.append(covariance)
+    return Model(
+        "model_3",
+        (*geometry.parameters, *added),
+        covariance=block_diag(*blocks),
+        joints=geometry.joints,
+        play=geometry.play,
+    )
+
+
+def _rows(matrix: np.ndarray) -> Rows:
+    return tuple(tuple(map(float, row)) for row in np.asarray(matrix))
