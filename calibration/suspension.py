@@ -65,7 +65,7 @@ class Suspension:
         grid = t[0] + np.arange(int(np.ceil((t[-1] - t[0]) * RATE - 1e-6)) + 1) / RATE
         w = np.stack([np.interp(grid, t, column) for column in wrench.T], axis=1)
         none = np.zeros((6, 6))
-        x = self.displaced(Forcing(grid, w, np.zeros(6), none, self.tangent), "plate")
+        x = self.displaced(Forcing(grid, w, np.zeros(6), none, self.tangent, np.eye(4)), "plate")
         return np.stack([np.interp(t, grid, column) for column in x.T], axis=1)
 
     def displaced(self, forcing: Forcing, source: Source) -> np.ndarray:

@@ -3,7 +3,8 @@
 sign       at rest the robot presses down: Fz < 0 (ACTION on the plate), and each component follows the nominal
            inverse dynamics, not its mirror image
 place      its centre of pressure lies between the wheels' contact points
-rotation   psi = atan2(sum m_d x m_p, sum m_d . m_p) between the horizontal moments of dynamics and plate
+rotation   psi = atan2(sum m_d x m_p, sum m_d . m_p) from the horizontal moments of dynamics to those of the plate,
+           about the plate's centre
 moved      the base rests where it rested before: more than slip has happened when it does not
 """
 
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from calibration.schema import Description
+from calibration.se3 import adjoint
 from calibration.signals import RATE, Signal, low_passed
 from calibration.suspension_rest import REST
 from calibration.suspension_sway import Forcing, Sway
@@ -74,10 +76,12 @@ def moved_bases(sways: Sequence[Sway]) -> dict[str, str]:
 
 
 def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> tuple[np.ndarray, np.ndarray]:
-    """Slow changes of both wrenches at common times, all trials."""
+    """Slow changes of both wrenches as the plate reads them, about its centre, at common times of all trials."""
     rows = []
     for p, d in zip(plate, dynamics, strict=True):
         slow_p, slow_d = (low_passed(Signal(f.t, f.w, np.ones(len(f.t), bool)), _SLOW).x for f in (p, d))
+        to_plate = adjoint(p.T_0_plate).T  # of a wrench: Ad(T_0_plate)' maps it from frame 0
+        slow_p, slow_d = slow_p @ to_plate.T, slow_d @ to_plate.T
         inside = (d.t >= p.t[0]) & (d.t <= p.t[-1])
         at = np.stack([np.interp(d.t[inside], p.t, column) for column in slow_p.T], axis=1)
         rows.append((at, slow_d[inside]))
@@ -86,10 +90,11 @@ def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> tuple[np.nda
 
 
 def _turn(d: np.ndarray, p: np.ndarray) -> float:
-    """Angle from d to p (n, 2) [rad]; 0 where they do not show the same motion."""
-    along, across = float((d * p).sum()), float((d[:, 0] * p[:, 1] - d[:, 1] * p[:, 0]).sum())
-    alike = np.hypot(along, across) > _ALIKE * np.sqrt((d**2).sum() * (p**2).sum())
-    return float(np.arctan2(across, along)) if alike else 0.0
+    """Angle from d to p (n, 2) [rad]; 0 where they do not show the same motion, or rather its mirror image."""
+    turned = complex(np.vdot(d[:, 0] + 1j * d[:, 1], p[:, 0] + 1j * p[:, 1]))
+    mirrored = complex(np.vdot(d[:, 0] - 1j * d[:, 1], p[:, 0] + 1j * p[:, 1]))
+    alike = abs(turned) > max(_ALIKE * float(np.linalg.norm(d) * np.linalg.norm(p)), abs(mirrored))
+    return float(np.angle(turned)) if alike else 0.0
 
 
 def _is_mirrored(k: int, p: np.ndarray, d: np.ndarray) -> bool:

@@ -50,7 +50,8 @@ class HeldOut:
     @property
     def moves(self) -> np.ndarray:
         """(6,) whether to move an axis."""
-        gain, axes = self.motion - self.error, np.arange(self.motion.shape[1])
+        error = np.minimum(self.error, np.finfo(float).max)
+        gain, axes = self.motion - error, np.arange(self.motion.shape[1])
         best = gain.argmax(axis=0)
         rest = gain.sum(axis=0) - gain[best, axes]
         others = self.motion.sum(axis=0) - self.motion[best, axes]

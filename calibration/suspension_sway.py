@@ -12,7 +12,7 @@ with the base (wheels are suspended in its axes), and its weight f moves with it
 The first is 745 N/rad between force and tilt on TIAGo, the second takes W c_z = 270 N.m/rad off roll and pitch.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -41,6 +41,7 @@ class Forcing:
         rest: (6,) wrench in the first second.
         inertia: M (6, 6).
         tangent: G (6, 6).
+        T_0_plate: (4, 4) centre of the first plate and axes of its readings; frame 0 for dynamics.
     """
 
     t: np.ndarray
@@ -48,6 +49,7 @@ class Forcing:
     rest: np.ndarray
     inertia: np.ndarray
     tangent: np.ndarray
+    T_0_plate: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def forcing_of(load: Load, start: float) -> Forcing:
     if early.sum() < 0.5 * REST * RATE:
         raise NotEnoughData(f"the wrench of the first second is missing: it begins {t[0] - start:.2f} s into the trial")
     rest = w[early].mean(axis=0)
-    return Forcing(t, w - rest, rest, load.inertia, _tangent(rest, load))
+    return Forcing(t, w - rest, rest, load.inertia, _tangent(rest, load), load.T_0_plate)
 
 
 def sway_of(description: Description, trial: Trial, rest: Rest, load: Load, cutoff: float = CUTOFF) -> Sway:
@@ -97,7 +99,7 @@ def sway_of(description: Description, trial: Trial, rest: Rest, load: Load, cuto
     t, x = found.t[keep], found.x[keep]
     early = t <= trial.t_mocap[0] + REST
     w = CubicSpline(forcing.t, forcing.w)(t)
-    on_grid = Forcing(t, w, forcing.rest, forcing.inertia, forcing.tangent)
+    on_grid = replace(forcing, t=t, w=w)
     return Sway(trial.id, on_grid, x - x[early].mean(axis=0), found.valid[keep], x[early].var(axis=0) * _RESTLESS)
 
 

@@ -21,6 +21,7 @@ from scipy.interpolate import CubicSpline
 from calibration.clock import Clock
 from calibration.recording import Trial
 from calibration.schema import Description
+from calibration.se3 import compose, inverse
 from calibration.signals import Signal, even, low_passed
 
 CUTOFF = 10.0  # [Hz]
@@ -37,12 +38,14 @@ class Load:
         inertia: M (6, 6) about the origin of frame 0; zero where the base's inertia is in w already (plate).
         weight: [N]; zero where its change with the base's motion is in w already (plate).
         centre_of_mass: (3,) [m, frame 0].
+        T_0_plate: (4, 4) centre of the first plate and axes of its readings; frame 0 for dynamics.
     """
 
     signal: Signal
     inertia: np.ndarray
     weight: float
     centre_of_mass: np.ndarray
+    T_0_plate: np.ndarray
 
 
 def plate_load(trial: Trial, plate: Clock, T_lab_0: np.ndarray, cutoff: float = CUTOFF) -> Load:
@@ -54,7 +57,8 @@ def plate_load(trial: Trial, plate: Clock, T_lab_0: np.ndarray, cutoff: float = 
     force, moment = lab[..., :3], lab[..., 3:]
     moment = moment + np.cross(trial.plate_centre - T_lab_0[:3, 3], force)
     w = np.concatenate([force.sum(axis=1) @ T_lab_0[:3, :3], moment.sum(axis=1) @ T_lab_0[:3, :3]], axis=1)
-    return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3))
+    T_0_plate = inverse(T_lab_0) @ compose(np.eye(3), trial.plate_centre[0])
+    return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3), T_0_plate)
 
 
 def dynamics_load(
@@ -75,7 +79,7 @@ def dynamics_load(
     M = T_0_root.dualAction @ (np.triu(M) + np.triu(M, 1).T) @ T_0_root.inverse().action
     weight = float(M[0, 0] * np.linalg.norm(description.gravity))
     com = np.array([M[2, 4] * -1.0, M[2, 3], M[0, 4]]) / M[0, 0]
-    return Load(Signal(q.t, -w, q.valid), M, weight, com)
+    return Load(Signal(q.t, -w, q.valid), M, weight, com, np.eye(4))
 
 
 def _root_in_base(model: pin.Model, description: Description) -> pin.SE3:

@@ -1,0 +1,161 @@
+import numpy as np
+import pytest
+
+from calibration.schema import Sigmas
+from calibration.signals import RATE
+from calibration.suspension_compliance import fit_compliance
+from calibration.suspension_fit import Springs, _refusal
+from calibration.suspension_held_out import HeldOut, held_out, predicted
+from calibration.suspension_modes import modes_of
+from calibration.suspension_parameters import element_parameters, wheel_parameters
+from calibration.suspension_printed import matrices, normal_of, solve
+from calibration.suspension_wheels import wheel_model
+from tests.calibration.swaying import WHEELS, smooth, sway, values
+
+SIGMAS = Sigmas(marker=1e-4, encoder=1e-5, plate_force=1.2, plate_moment=0.35)
+NONE = np.zeros((6, 6))
+LOADS = np.array([5.0, 5.0, 20.0, 15.0, 15.0, 4.0])
+
+
+def matrix_error(found, true):
+    q = np.sqrt(np.diag(true))
+    return np.abs((found - true) / np.outer(q, q)).max()
+
+
+@pytest.mark.parametrize("point", ["centre", "contact"])
+def test_printed_combinations_come_back_exactly(point):
+    rng = np.random.default_rng(0)
+    wheels, p = wheel_model(WHEELS, point), values(rng)
+    K, C = matrices(wheels, p)
+    G = np.zeros((6, 6))
+    G[0, 4], G[1, 3] = -730.0, 730.0
+    sways = []
+    for k in range(3):
+        x = smooth(rng, 30.0, np.full(6, 1e-3), fastest=1.0)
+        w = x @ (K + G).T + np.gradient(x, 1.0 / RATE, axis=0) @ C.T
+        sways.append(sway(str(k), w, x, G=G))
+    normals = [normal_of(wheels, s, SIGMAS) for s in sways]
+    found = solve(wheels, normals)
+    assert (found >= 0.0).all()
+    np.testing.assert_allclose(wheels.matrix(found[:36]), K, rtol=1e-6, atol=1e-6 * np.sqrt(K.max()))
+    parameters, combinations = wheel_parameters(wheels, found, np.tile(found, (3, 1)), 5)
+    assert len(parameters) == 72 and len(combinations) > 10
+    for c in combinations:
+        assert c.value == pytest.approx(c.coefficients[5:] @ p, rel=1e-6)
+
+
+def test_the_compliance_comes_back_and_gravity_is_told_apart():
+    rng = np.random.default_rng(1)
+    wheels = wheel_model(WHEELS, "contact")
+    K, C = matrices(wheels, values(rng))
+    W, h = 730.0, 0.37
+    M = np.diag([74.0, 74.0, 74.0, 20.0, 21.0, 4.0])
+    M[0, 4] = M[4, 0] = 27.0
+    M[1, 3] = M[3, 1] = -27.0
+    gravity = np.zeros((6, 6))
+    gravity[3, 3] = gravity[4, 4] = -W * h
+    for inertia, G in ((NONE, NONE), (M, gravity)):
+        w = [smooth(rng, 25.0, LOADS, fastest=6.0) for _ in range(3)]
+        sways = [
+            sway(str(k), w_k, modes_of(K + G, C, inertia).respond(w_k, 1.0 / RATE), inertia, G)
+            for k, w_k in enumerate(w)
+        ]
+        found = fit_compliance(sways, wheels.couples)
+        assert matrix_error(found.K, K) < 1e-3
+        assert matrix_error(found.C, C) < 2e-2
+    assert W * h / K[3, 3] > 5e-3  # what forgetting gravity would cost
+
+
+def test_the_uncertainty_of_the_compliance_covers_the_truth():
+    rng = np.random.default_rng(2)
+    wheels = wheel_model(WHEELS, "contact")
+    K, C = matrices(wheels, values(rng))
+    noise = np.array([2e-5, 2e-5, 2e-5, 1e-4, 1e-4, 5e-5])
+    sways = []
+    for k in range(4):
+        w = smooth(rng, 25.0, LOADS, fastest=6.0)
+        x = modes_of(K, C, NONE).respond(w, 1.0 / RATE) + noise * rng.normal(size=w.shape)
+        sways.append(sway(str(k), w, x))
+    found = fit_compliance(sways, wheels.couples)
+    sigma, _ = found.sigmas()
+    z = ((found.K - K) / np.where(wheels.couples, sigma, np.inf))[wheels.couples]
+    assert np.abs(z).max() < 4.5 and np.sqrt((z**2).mean()) < 2.0
+    assert (np.diag(sigma)[[3, 4]] < 0.01 * np.diag(K)[[3, 4]]).all()
+
+
+def test_a_fold_is_the_fit_without_that_trial():
+    rng = np.random.default_rng(3)
+    wheels = wheel_model(WHEELS, "contact")
+    K, C = matrices(wheels, values(rng))
+    sways = []
+    for k in range(3):
+        w = smooth(rng, 20.0, LOADS, fastest=6.0)
+        x = modes_of((1.0 + 0.1 * k) * K, C, NONE).respond(w, 1.0 / RATE)
+        sways.append(sway(str(k), w, x))
+    whole, alone = fit_compliance(sways, wheels.couples), fit_compliance(sways[:2], wheels.couples)
+    fold = whole.without(2)[0]
+    q = np.sqrt(np.diag(alone.K))
+    assert np.abs((fold - alone.K) / np.outer(q, q)).max() < 0.02
+
+
+def springs(K, C):
+    return Springs(K, C, (), (NONE, NONE), np.ones((6, 6), dtype=bool))
+
+
+def judged(r2):
+    motion = np.ones((2, 6))
+    return HeldOut(motion * (1.0 - np.array(r2)), motion, 1e-6 * motion)
+
+
+def test_a_printed_fit_that_cannot_be_used_is_refused():
+    good = judged([0.9] * 6)
+    K, C = np.diag([8e4, 9e4, 9e5, 2e4, 2e4, 4e3]), np.diag([500.0, 500.0, 1e4, 300.0, 300.0, 20.0])
+    assert _refusal(springs(K, C), good) == ""
+    soft = K.copy()
+    soft[5, 5] = 10.0
+    assert "drifts" in _refusal(springs(soft, C), good)
+    soft[5, 5] = 0.0
+    assert "positive definite" in _refusal(springs(soft, C), good)
+    wrong = C.copy()
+    wrong[3, 3] = -50.0
+    assert "damping" in _refusal(springs(K, wrong), good)
+    assert "worse than a base that stays along rz" in _refusal(springs(K, C), judged([0.9] * 5 + [-20.0]))
+
+
+def test_r2_compares_with_a_base_that_stays():
+    rng = np.random.default_rng(4)
+    K, C = np.diag([8e4, 9e4, 9e5, 2e4, 2e4, 4e3]), np.diag([500.0, 500.0, 1e4, 300.0, 300.0, 20.0])
+    sways = []
+    for k in range(3):
+        w = smooth(rng, 20.0, LOADS)
+        x = modes_of(K, C, NONE).respond(w, 1.0 / RATE)
+        x[:, 5] = np.cumsum(rng.normal(size=len(x))) * 1e-4  # slips where no spring would put it
+        sways.append(sway(str(k), w, x))
+    tried = held_out(sways, lambda k: (K, C))
+    np.testing.assert_allclose(tried.r2[:5], 1.0)
+    literal = 1.0 - sum(((s.x - predicted(K, C, s.forcing)) ** 2).sum(axis=0) for s in sways) / sum(
+        (s.x**2).sum(axis=0) for s in sways
+    )
+    np.testing.assert_allclose(tried.r2, literal)
+    assert tried.moves[:5].all() and not tried.moves[5]
+    assert tried.explained[5] < 0.1
+
+
+def test_one_trial_alone_does_not_move_an_axis():
+    motion = np.ones((5, 6))
+    error = motion.copy()
+    error[0] = 0.0
+    assert HeldOut(error, motion, 0.0 * motion).r2[0] == pytest.approx(0.2)
+    assert not HeldOut(error, motion, 0.0 * motion).moves.any()
+    error[1] = 0.5
+    assert HeldOut(error, motion, 0.0 * motion).moves.all()
+
+
+def test_what_slips_is_no_spring_and_is_not_reported_as_one():
+    K = np.diag([8e4, 9e4, 9e5, 2e4, 2e4, 4e3])
+    sigma, couples = 0.01 * K, np.eye(6, dtype=bool)
+    sigma[2, 2] = 0.5 * K[2, 2]
+    found = element_parameters("K", K, sigma, couples, np.array([0.2, 0.95, np.nan, 1.0, 1.0, 0.5]))
+    assert [p.name[-2:] for p in found] == ["11", "22", "33", "44", "55", "66"]
+    assert [p.status == "estimated" for p in found] == [False, True, False, True, True, False]
+    assert [p.unit for p in found][2:4] == ["N/m", "N.m/rad"]
