@@ -2,8 +2,9 @@
 
     R2_a = 1 - sum_k sum_t (x - x_(-k))_a^2 / sum_k sum_t x_a^2          x_(-k): fitted without trial k, from the wrench
 
-Zero is a base that stays, not the mean. An axis is moved only if R2 is worth it, also without the trial that speaks
-most for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
+Zero is a base that stays, not the mean. One trial may slip more than all others move; an axis is moved only if R2 is
+positive and, with such a trial counting no more than the others together, is worth it with and without the trial that
+speaks most for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
 capture's noise (its variance at rest) off both sums: what share of the motion itself is the spring's.
 """
 
@@ -50,12 +51,14 @@ class HeldOut:
     @property
     def moves(self) -> np.ndarray:
         """(6,) whether to move an axis."""
-        error = np.minimum(self.error, np.finfo(float).max)
-        gain, axes = self.motion - error, np.arange(self.motion.shape[1])
+        error, axes = np.minimum(self.error, np.finfo(float).max), np.arange(self.motion.shape[1])
+        others = self.motion.sum(axis=0) - self.motion
+        weight = np.minimum(1.0, others / np.maximum(self.motion, np.finfo(float).tiny))
+        motion, gain = weight * self.motion, weight * (self.motion - error)
         best = gain.argmax(axis=0)
-        rest = gain.sum(axis=0) - gain[best, axes]
-        others = self.motion.sum(axis=0) - self.motion[best, axes]
-        return np.asarray((self.r2 > _WORTH) & (rest >= _WORTH * others))
+        rest_motion, rest_gain = (a.sum(axis=0) - a[best, axes] for a in (motion, gain))
+        worth = gain.sum(axis=0) > _WORTH * motion.sum(axis=0)
+        return np.asarray((self.r2 > 0.0) & worth & (rest_gain > _WORTH * rest_motion))
 
 
 def held_out(sways: Sequence[Sway], without: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> HeldOut:
