@@ -1,29 +1,11 @@
 """A scenario: a robot, its laboratory and a seed, as typed and validated values."""
 
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from twin import TwinConfig
-
-
-class Extension(BaseModel):
-    """A scenario that is another one but for some values.
-
-    Attributes:
-        name: Its name.
-        description: One line.
-        extends: Name of the other one.
-        set: Values by `path.to.field`.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
-    description: str
-    extends: str
-    set: dict[str, Any]
 
 
 class Scenario(BaseModel):

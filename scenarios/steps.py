@@ -66,7 +66,8 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
     path = registry.find(name_or_path)  # an unknown name is told before the engines are imported
 
     from scenarios import yaml_file
-    from scenarios.schema import Extension, Scenario
+    from scenarios.extension import Extension
+    from scenarios.schema import Scenario
 
     beside = {"versions": dict[str, str]}
     if not yaml_file.has_field(path, "extends"):

@@ -12,7 +12,6 @@ import twin
 from calibration.clock import Clock
 from calibration.evaluate import scored_errors
 from calibration.hand import nominal_hand
-from calibration.markers import base_body
 from calibration.metrics import pose_errors
 from calibration.parameters import nominal_frames
 from calibration.predict import Predictor
@@ -89,9 +88,8 @@ def nominal_error(config, seed: int) -> tuple[float, float]:
     lab, description = laboratory(config, seed), declaration(config, ())
     chain = chain_of(mjcf.urdf(), description)
     clock = Clock("robot", 3.9, 1.2e-5, np.eye(2), 0.0, 1.0)
-    predict = Predictor(
-        (("nominal", nominal_hand(chain, nominal_frames(chain, description))),), base_body(description), clock
-    )
+    models = {"nominal": nominal_hand(chain, nominal_frames(chain, description))}
+    predict = Predictor(models, mjcf.urdf(), description, clock)
     position, rotation = [], []
     for motion in schedule(config.campaign, mjcf.spec().compile(), seed):
         if motion.role == "validation" and motion.kind == "swing":

@@ -32,7 +32,7 @@ def test_every_model_improves_on_the_one_before_it(evaluation):
 def test_without_play_or_noise_only_the_mocap_s_own_noise_is_left(tmp_path):
     truth = replace(matched.defects(2), marker_sigma=1e-5)
     dataset = load(matched.campaign(tmp_path / "dataset", truth, n_postures=14, plate=False))
-    row = evaluate(calibrate(dataset), dataset).row("model_2", "static", "fixed")
+    row = evaluate(calibrate(dataset, ["geometry"]), dataset).row("model_2", "static", "fixed")
     assert row.metrics.position_rmse_component_mm < 0.05
     assert row.metrics.orientation_rmse_deg < 0.01
 
@@ -56,16 +56,15 @@ def test_predictions_never_use_hand_markers_and_the_base_s_only_at_the_start_unl
         np.testing.assert_array_equal(p.T_lab_hand[rows], before[rows])
 
 
-def test_rows_of_a_ladder_are_complete_and_named_as_in_the_contract(evaluation, tmp_path):
+def test_rows_of_a_ladder_are_complete_and_named_as_in_the_contract(evaluation, estimate, tmp_path):
     evaluation.save(tmp_path)
     found = json.loads((tmp_path / "evaluation.json").read_text())
     keys = {(r["model"], r["trials"], r["base"], r["encoder"], r["against"]) for r in found["rows"]}
-    assert keys == {
-        (m, t, b, "motor", "mocap")
-        for m in ("nominal", "registration", "model_2")
-        for t in ("dynamic", "static", "all")
-        for b in ("fixed", "measured")
-    }
+    sources = ("fixed", "measured") if estimate.suspension is None else ("fixed", "plate", "dynamics", "measured")
+    rows = [("nominal", b, "motor") for b in ("fixed", "measured")]
+    rows += [("model_1", b, "motor") for b in sources[1:]] if estimate.suspension is not None else []
+    rows += [(m, b, "motor") for m in ("registration", "model_2") for b in sources]
+    assert keys == {(m, t, b, e, "mocap") for m, b, e in rows for t in ("dynamic", "static", "all")}
     assert set(found["rows"][0]) == {
         "model", "trials", "base", "encoder", "against", "n", "position_rmse_component_mm", "position_rmse_norm_mm",
         "position_p95_norm_mm", "position_max_norm_mm", "orientation_rmse_deg", "orientation_rmse_component_deg",
