@@ -21,7 +21,7 @@ def saved(folder: Path, out: Path) -> dict[str, bytes]:
 
 
 def refused(folder: Path, out: Path | None = None) -> str:
-    estimate = calibrate(load(folder))
+    estimate = calibrate(load(folder), ["geometry"])
     if out is not None:
         save_estimate(estimate, out)
     assert estimate.status == "not_calibrated"
@@ -41,10 +41,10 @@ def test_the_estimate_is_a_function_of_the_dataset_folder_s_bytes_alone(folder, 
 
 def test_the_estimate_says_what_it_is(estimate):
     assert estimate.calibrated and estimate.main == "model_2"
-    assert [m.name for m in estimate.models] == ["registration", "model_2"]
+    assert {"registration", "model_2"} <= {m.name for m in estimate.models}
     assert estimate.model("model_2").rank == 36
     assert estimate.model("registration").rank == 12
-    assert {v.stage for v in estimate.verdicts} == {"clocks", "registration", "geometry"}
+    assert {"clocks", "registration", "geometry"} <= {v.stage for v in estimate.verdicts}
 
 
 def test_the_calibrated_robot_is_the_true_one_within_its_play(estimate, truth, chain):
@@ -71,7 +71,7 @@ def test_an_unknown_stage_is_told_with_those_that_exist(dataset):
 
 def test_without_a_plate_everything_else_works_and_it_is_said(folder, tmp_path):
     changes = dict.fromkeys(CALIBRATION, matched.without_plate)
-    estimate = calibrate(load(rewritten(folder, tmp_path / "copy", changes)))
+    estimate = calibrate(load(rewritten(folder, tmp_path / "copy", changes)), ["geometry"])
     assert estimate.calibrated and [c.instrument for c in estimate.clocks] == ["robot"]
     assert any(v.verdict == "missing" and "plate" in v.message for v in estimate.verdicts)
 
