@@ -23,6 +23,7 @@ from calibration.markers import hand_body
 from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics
 from calibration.postures import dwell_windows
 from calibration.predict import REFERENCE, Prediction, predictor
+from calibration.protocols import protocol_rows
 from calibration.recording import Trial
 from calibration.schema import Role
 
@@ -90,7 +91,12 @@ class Evaluation:
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         part = folder / "evaluation.json.part"
-        part.write_text(json.dumps({"schema": 1, "rows": [row_entry(r) for r in self.rows]}, indent=1) + "\n", "utf-8")
+        content = {
+            "schema": 1,
+            "rows": [row_entry(r) for r in self.rows],
+            "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
+        }
+        part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
         os.replace(part, folder / "evaluation.json")
         _write_traces(folder / "evaluation.nc", self.traces)
 
