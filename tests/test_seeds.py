@@ -39,10 +39,14 @@ def ladders(tmp_path_factory):
         dataset = calibration.load(folder / "dataset")
         estimate = calibration.calibrate(dataset)
         judged = score(estimate, dataset, folder / "truth", calibration.evaluate(estimate, dataset))
-        rows = {(r.model, r.base): r.metrics for r in judged.rows if r.trials == "dynamic"}
+        rows = {(r.model, r.base, r.encoder): r.metrics for r in judged.rows if r.trials == "dynamic"}
         found.append(rows)
-        print(seed, *(f"{m}/{b} {x.position_rmse_component_mm:.2f}" for (m, b), x in rows.items()))
+        print(seed, *(f"{'/'.join(k)} {x.position_rmse_component_mm:.2f}" for k, x in rows.items()))
     return found
+
+
+def mm(rows, model, base="plate", encoder="motor") -> float:
+    return rows[model, base, encoder].position_rmse_component_mm
 
 
 def holds(ladders, condition) -> int:
@@ -50,23 +54,34 @@ def holds(ladders, condition) -> int:
 
 
 def test_registration_is_better_than_nominal(ladders):
-    assert (
-        holds(
-            ladders,
-            lambda r: (
-                r["registration", "fixed"].position_rmse_component_mm < r["nominal", "fixed"].position_rmse_component_mm
-            ),
-        )
-        >= 9
-    )
+    assert holds(ladders, lambda r: mm(r, "registration", "fixed") < mm(r, "nominal", "fixed")) >= 9
 
 
 def test_geometry_reaches_its_figures_with_the_base_measured(ladders):
     def reached(rows):
-        m = rows["model_2", "measured"]
+        m = rows["model_2", "measured", "motor"]
         return m.position_rmse_component_mm <= 2.5 and m.position_rmse_norm_mm <= 4.3 and m.orientation_rmse_deg <= 1.2
 
     assert holds(ladders, reached) >= 9
+
+
+@pytest.mark.parametrize("base", ["plate", "dynamics"])
+def test_the_papers_models_keep_their_order(ladders, base):
+    def kept(rows):
+        model_3 = rows["model_3", base, "motor"]
+        return (
+            mm(rows, "model_1", base) <= mm(rows, "nominal", "fixed")
+            and mm(rows, "model_2", base) < min(mm(rows, "model_1", base), mm(rows, "registration", base))
+            and mm(rows, "model_3", base) <= 1.10 * mm(rows, "model_2", base)
+            and model_3.position_rmse_component_mm <= 5.7
+            and model_3.orientation_rmse_deg <= 2.71
+        )
+
+    assert holds(ladders, kept) >= 9
+
+
+def test_link_encoders_beat_motor_encoders_with_the_base_measured(ladders):
+    assert holds(ladders, lambda r: mm(r, "model_3", "measured", "link") < mm(r, "model_2", "measured")) >= 9
 
 
 def test_the_papers_nominal_error_is_one_of_the_series(capsys):
