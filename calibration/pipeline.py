@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from calibration.clock import Clock
 from calibration.clocks import synchronise
 from calibration.dataset import Dataset
-from calibration.errors import NoSuchElement, NotEnoughData
+from calibration.errors import InputError, NoSuchElement
 from calibration.estimate import Estimate, Model, RobotNames
 from calibration.estimate_parts import joints_model, suspension_model
 from calibration.geometry import calibrate_geometry
@@ -75,7 +75,8 @@ def calibrate(dataset: Dataset, stages: Sequence[str] | None = None, progress: P
 
     Raises:
         NoSuchElement: A stage of that name does not exist.
-        NotEnoughData: There is no calibration trial, or none from which the clocks can be told.
+        InputError: There is no calibration trial.
+        NotEnoughData: There is none from which the clocks can be told.
     """
     wanted = _wanted(stages)
     tell = progress or (lambda stage, share: None)
@@ -83,7 +84,10 @@ def calibrate(dataset: Dataset, stages: Sequence[str] | None = None, progress: P
     tell("reading", 0.0)
     trials = tuple(trial for _, trial in dataset.trials("calibration"))
     if not trials:
-        raise NotEnoughData("no calibration trial: record static postures and one moving trial with that role")
+        raise InputError(
+            dataset.folder / "dataset.json",
+            "trials: no calibration trial; record static postures and one moving trial with that role",
+        )
     refused = [Verdict("reading", "refused", m) for m in implausible_inputs(dataset.description, chain, trials)]
     if refused:
         return _estimate(dataset, refused, ())

@@ -81,7 +81,7 @@ def test_only_validation_trials_are_not_enough(folder, tmp_path):
     listed = json.loads((copy / "dataset.json").read_text())
     listed["trials"] = [t for t in listed["trials"] if t["role"] == "validation"]
     (copy / "dataset.json").write_text(json.dumps(listed))
-    with pytest.raises(NotEnoughData, match="no calibration trial"):
+    with pytest.raises(InputError, match="no calibration trial"):
         calibrate(load(copy))
 
 
