@@ -16,6 +16,7 @@ import h5netcdf
 import numpy as np
 
 from calibration.bodies import poses_of
+from calibration.comparison import comparisons
 from calibration.dataset import Dataset
 from calibration.errors import NotEnoughData
 from calibration.estimate import Estimate
@@ -95,6 +96,7 @@ class Evaluation:
             "schema": 1,
             "rows": [row_entry(r) for r in self.rows],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
+            "comparisons": [asdict(c) for c in comparisons(self.traces)],
         }
         part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
         os.replace(part, folder / "evaluation.json")

@@ -1,0 +1,90 @@
+"""Whether one row of the ladder is better than another: a paired bootstrap over blocks of the held-out dynamic trials.
+
+    d = RMSE_b - RMSE_a [mm per component]      negative: b is better
+
+Errors of neighbouring samples are alike, so whole blocks of `_BLOCK` seconds are drawn, the same for both rows.
+Reference: Kuensch, Annals of Statistics 1989 (block bootstrap).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from calibration.evaluate import Trace
+
+_BLOCK = 2.0  # [s]
+_DRAWS = 2000
+_SEED = 20241122  # of the bootstrap alone: the same traces give the same interval
+_PAIRS = (
+    (("nominal", "fixed"), ("model_1", "plate")),
+    (("nominal", "fixed"), ("model_1", "dynamics")),
+    (("registration", "plate"), ("model_2", "plate")),
+    (("registration", "dynamics"), ("model_2", "dynamics")),
+    (("model_2", "plate"), ("model_3", "plate")),
+    (("model_2", "dynamics"), ("model_3", "dynamics")),
+)
+
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Row b against row a, motor encoders, dynamic trials.
+
+    Attributes:
+        a: Model and base of the reference.
+        b: Model and base of the other.
+        difference_mm: RMSE of b minus RMSE of a, per component [mm].
+        low_mm: 2.5th percentile of the bootstrap [mm].
+        high_mm: 97.5th percentile [mm].
+        blocks: Number of blocks.
+        finding: `better`, `worse` or `no difference`, of b.
+    """
+
+    a: Key
+    b: Key
+    difference_mm: float
+    low_mm: float
+    high_mm: float
+    blocks: int
+    finding: str
+
+
+def comparisons(traces: Sequence["Trace"]) -> Iterator[Comparison]:
+    """The pairs that the ladder is built on, as far as they are there."""
+    present = {(t.model, t.base) for t in traces if t.encoder == "motor"}
+    for a, b in _PAIRS:
+        if a in present and b in present:
+            yield compare(traces, a, b)
+
+
+def compare(traces: Sequence["Trace"], a: Key, b: Key) -> Comparison:
+    """One pair."""
+    sums = np.concatenate(list(_blocks(traces, a, b)))  # squared error of a, of b, number of components
+    rows = np.random.default_rng(_SEED).integers(len(sums), size=(_DRAWS, len(sums)))
+    low, high = np.percentile(_difference(sums[rows].sum(axis=1)), [2.5, 97.5])
+    finding = "better" if high < 0.0 else "worse" if low > 0.0 else "no difference"
+    whole = float(_difference(sums.sum(axis=0)[None])[0])
+    return Comparison(a, b, whole, float(low), float(high), len(sums), finding)
+
+
+def _difference(sums: np.ndarray) -> np.ndarray:
+    """RMSE of b minus RMSE of a [mm] from sums (n, 3)."""
+    return np.asarray(1e3 * (np.sqrt(sums[:, 1] / sums[:, 2]) - np.sqrt(sums[:, 0] / sums[:, 2])))
+
+
+def _blocks(traces: Sequence["Trace"], a: Key, b: Key) -> Iterator[np.ndarray]:
+    for trial in dict.fromkeys(t.trial_id for t in traces if t.kind != "static"):
+        pair = [
+            next(t for t in traces if (t.trial_id, t.model, t.base, t.encoder) == (trial, *key, "motor"))
+            for key in (a, b)
+        ]
+        e = np.stack([t.scored.position for t in pair], axis=1)
+        rate = (len(pair[0].t) - 1) / (pair[0].t[-1] - pair[0].t[0])
+        for part in np.array_split(e, max(1, round(len(e) / rate / _BLOCK))):
+            good = part[np.isfinite(part).all(axis=(1, 2))]
+            if len(good):
+                yield np.append((good**2).sum(axis=(0, 2)), good[:, 0].size)[None]

@@ -1,0 +1,37 @@
+import numpy as np
+import pytest
+
+from calibration.comparison import compare, comparisons
+from calibration.evaluate import Trace
+from calibration.metrics import PoseErrors
+
+
+def trace(model, base, error):
+    t = np.arange(len(error)) * 0.01
+    errors = PoseErrors(error, np.zeros_like(error))
+    return Trace(model, base, "motor", "xyz", "swing", t, errors, errors)
+
+
+@pytest.fixture
+def common():
+    return 1e-3 * np.cumsum(np.random.default_rng(0).normal(size=(6000, 3)), axis=0) / 10.0
+
+
+def test_a_pair_is_compared_on_the_same_blocks(common):
+    worse = compare([trace("a", "fixed", common), trace("b", "plate", 1.2 * common)], ("a", "fixed"), ("b", "plate"))
+    rms = 1e3 * np.sqrt((common**2).mean())
+    assert worse.difference_mm == pytest.approx(0.2 * rms)
+    assert worse.finding == "worse" and worse.low_mm < worse.difference_mm < worse.high_mm
+    assert worse.blocks == 30
+
+
+def test_equal_rows_do_not_differ(common):
+    noise = 1e-4 * np.random.default_rng(1).normal(size=common.shape)
+    pair = [trace("a", "fixed", common + noise), trace("b", "plate", common - noise)]
+    assert compare(pair, ("a", "fixed"), ("b", "plate")).finding == "no difference"
+
+
+def test_what_is_not_there_is_not_compared(common):
+    assert list(comparisons([trace("nominal", "fixed", common)])) == []
+    found = list(comparisons([trace("nominal", "fixed", common), trace("model_1", "plate", 0.5 * common)]))
+    assert [c.b for c in found] == [("model_1", "plate")] and found[0].finding == "better"
