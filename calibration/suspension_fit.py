@@ -2,8 +2,8 @@
 
     1  wrong data are told by name (suspension_checks)
     2  the printed form, displacement -> wrench; refused unless K > 0, C >= 0, it settles, and, run forward on trials it
-       was not fitted to, it is on no axis worse than a base that stays
-    3  refused: the reduced 6x6 compliance, fitted wrench -> displacement
+       was not fitted to, it is on no axis worse than a base that stays nor, by 2 % of the motion, than
+    3  the reduced 6x6 compliance, fitted wrench -> displacement, which then takes its place
     4  each axis is moved or left still, by leave-one-trial-out, for each source of the wrench
 
 Where there is no plate the wrench is that of inverse dynamics.
@@ -20,19 +20,13 @@ from calibration.recording import Trial
 from calibration.schema import Description
 from calibration.suspension import AXES, Source, Suspension
 from calibration.suspension_checks import STAGE, moved_bases, wrong_plate
-from calibration.suspension_compliance import fit_compliance
 from calibration.suspension_held_out import HeldOut, held_out
-from calibration.suspension_modes import modes_of
-from calibration.suspension_parameters import element_parameters, jackknife, wheel_parameters
-from calibration.suspension_printed import matrices, normal_of, solve
+from calibration.suspension_parameters import element_parameters, wheel_parameters
 from calibration.suspension_read import Laboratory, Sways, laboratory, read_sways
+from calibration.suspension_springs import Springs, compliance_springs, printed_springs, refusal
 from calibration.suspension_sway import Sway
-from calibration.suspension_wheels import Point, WheelModel, wheel_model
+from calibration.suspension_wheels import Point, wheel_model
 from calibration.verdict import Verdict
-
-_SETTLES = 1.0  # [s] a base takes less; a slower mode integrates the plate's noise into drift
-_STIFF = 1e-5  # smallest eigenvalue of K over the largest, angles times the lever [-]
-_LEVER = 0.2  # [m]
 
 
 @dataclass(frozen=True)
@@ -40,36 +34,15 @@ class Form:
     """What is fitted.
 
     Attributes:
-        point: r_i of the printed form: `centre` of the hub or `contact`.
+        point: r_i of the printed form: `centre` of the hub or `contact`; None: what predicts left-out trials better.
         full: Whether Kt, Ct, Ktheta, Ctheta are symmetric matrices instead of diagonal ones.
         coupled: Whether the compliance couples all six axes, as hub centres do, or (x, y, rz) and (z, rx, ry) apart,
             as contact points in the floor do.
     """
 
-    point: Point = "centre"
+    point: Point | None = None
     full: bool = False
     coupled: bool = False
-
-
-@dataclass(frozen=True)
-class Springs:
-    """A fit of either form.
-
-    Attributes:
-        K: (6, 6).
-        C: (6, 6).
-        folds: (K, C) without each trial.
-        sigmas: Standard deviations of K and C.
-        couples: (6, 6) elements that were fitted.
-        wheels: Values (2 p,) and those without each trial (n, 2 p); None for the compliance.
-    """
-
-    K: np.ndarray
-    C: np.ndarray
-    folds: tuple[tuple[np.ndarray, np.ndarray], ...]
-    sigmas: tuple[np.ndarray, np.ndarray]
-    couples: np.ndarray
-    wheels: tuple[np.ndarray, np.ndarray] | None = None
 
 
 def fit_suspension(
@@ -107,27 +80,21 @@ def fit_suspension(
 
 def _fitted(lab: Laboratory, sways: Sways, form: Form) -> tuple[Suspension, list[Verdict]]:
     used = sways.plate or sways.dynamics
-    wheels = wheel_model(lab.description.wheels, form.point, form.full) if lab.description.wheels else None
-    refusal, springs = "no wheels declared", None
-    if wheels is not None and sways.plate:
-        springs = _printed(lab.description, wheels, used)
-        refusal = _refusal(springs, held_out(used, springs.folds.__getitem__))
+    springs = compliance_springs(lab.description, used, form.coupled)
     said = []
-    if springs is None or refusal:
-        why = f"printed form (displacement to wrench) refused: {refusal}" if sways.plate else "no plate"
-        said.append(
-            Verdict(STAGE, "warning", f"{why}; the 6x6 compliance fitted wrench to displacement takes its place")
-        )
-        springs = _compliance(lab.description, used, form)
+    if lab.description.wheels and sways.plate:
+        springs, verdict = _chosen(lab.description, used, form, springs)
+        said.append(verdict)
     sources: list[tuple[Source, tuple[Sway, ...]]] = [("plate", sways.plate), ("dynamics", sways.dynamics)]
     tried = tuple((s, held_out(rows, springs.folds.__getitem__)) for s, rows in sources if rows)
+    slips = tried[0][1].slips
     parameters = (
-        *element_parameters("K", springs.K, springs.sigmas[0], springs.couples, tried[0][1].explained),
-        *element_parameters("C", springs.C, springs.sigmas[1], springs.couples, tried[0][1].explained),
+        *element_parameters("K", springs.K, springs.sigmas[0], springs.couples, slips),
+        *element_parameters("C", springs.C, springs.sigmas[1], springs.couples, slips),
     )
     combinations: tuple[Combination, ...] = ()
-    if wheels is not None and springs.wheels is not None:
-        more, combinations = wheel_parameters(wheels, *springs.wheels, len(parameters))
+    if springs.wheels is not None:
+        more, combinations = wheel_parameters(*springs.wheels, len(parameters))
         parameters += more
     preload = np.mean([s.forcing.tangent for s in sways.plate], axis=0) if sways.plate else np.zeros((6, 6))
     suspension = Suspension(
@@ -144,43 +111,25 @@ def _fitted(lab: Laboratory, sways: Sways, form: Form) -> tuple[Suspension, list
     return suspension, said + [_judged(s, h) for s, h in tried]
 
 
-def _printed(description: Description, wheels: WheelModel, sways: Sequence[Sway]) -> Springs:
-    normals = [normal_of(wheels, s, description.sigmas) for s in sways]
-    values = solve(wheels, normals)
-    others = np.array([solve(wheels, normals[:k] + normals[k + 1 :]) for k in range(len(normals))])
-    folds = tuple(matrices(wheels, p) for p in others)
-    sigma_K, sigma_C = (
-        np.sqrt(np.diag(jackknife(np.array([f[k].ravel() for f in folds])))).reshape(6, 6) for k in (0, 1)
+def _chosen(description: Description, sways: Sequence[Sway], form: Form, reduced: Springs) -> tuple[Springs, Verdict]:
+    """The printed form, about the points that predict better, or the reduced one where that is refused."""
+    points: tuple[Point, ...] = (form.point,) if form.point else ("centre", "contact")
+    found = []
+    for point in points:
+        springs = printed_springs(description, wheel_model(description.wheels, point, form.full), sways)
+        tried = held_out(sways, springs.folds.__getitem__)
+        found.append((float(np.clip(tried.r2, -1.0, 1.0).sum()), springs, tried, point))
+    _, springs, tried, point = max(found, key=lambda f: f[0])
+    why = refusal(springs, tried, held_out(sways, reduced.folds.__getitem__))
+    if not why:
+        return springs, Verdict(
+            STAGE, "ok", f"printed form with r_i the wheels' {point} points, displacement to wrench"
+        )
+    message = (
+        f"printed form (r_i the wheels' {point} points, displacement to wrench) refused: {why}; the 6x6 compliance "
+        "fitted wrench to displacement takes its place"
     )
-    return Springs(*matrices(wheels, values), folds, (sigma_K, sigma_C), wheels.couples, (values, others))
-
-
-def _compliance(description: Description, sways: Sequence[Sway], form: Form) -> Springs:
-    couples = np.ones((6, 6), dtype=bool)
-    if description.wheels and not form.coupled:
-        couples = wheel_model(description.wheels, "contact").couples
-    found = fit_compliance(sways, couples)
-    folds = tuple(found.without(k) for k in range(len(sways)))
-    return Springs(found.K, found.C, folds, found.sigmas(), couples)
-
-
-def _refusal(springs: Springs, tried: HeldOut) -> str:
-    """Why a printed fit must not be used; empty where it may."""
-    scale = np.outer(*[np.array([1.0] * 3 + [1.0 / _LEVER] * 3)] * 2)
-    stiffness, damping = np.linalg.eigvalsh(springs.K * scale), np.linalg.eigvalsh(springs.C * scale)
-    if stiffness[0] < _STIFF * stiffness[-1]:
-        return "its stiffness is not positive definite"
-    if damping[0] < -_STIFF * damping[-1]:
-        return "its damping is not positive"
-    settling = modes_of(springs.K, springs.C, np.zeros((6, 6))).settling
-    if settling > _SETTLES:
-        return f"it drifts, its slowest mode takes {settling:.1f} s to settle"
-    worse = [
-        a for a, r2, share in zip(AXES, tried.r2, tried.explained, strict=True) if r2 < 0.0 and not np.isnan(share)
-    ]
-    if worse:
-        return f"run forward it is worse than a base that stays along {', '.join(worse)}"
-    return ""
+    return reduced, Verdict(STAGE, "warning", message)
 
 
 def _judged(source: Source, tried: HeldOut) -> Verdict:

@@ -18,6 +18,8 @@ from calibration.suspension_modes import modes_of
 from calibration.suspension_sway import Forcing, Sway
 
 _WORTH = 0.05  # R2 below which an axis is left still [-]
+_NOISE = 1.25  # how much more than expected the noise may be, known from one second a trial [-]
+_SLIP = 0.1  # share of the motion [-]
 _VISIBLE = 1.5  # motion over noise, mean squares, below which its share cannot be told [-]
 
 
@@ -47,6 +49,12 @@ class HeldOut:
         visible = motion > _VISIBLE * noise
         share = 1.0 - (error - noise) / np.where(visible, motion - noise, 1.0)
         return np.where(visible, np.minimum(share, 1.0), np.nan)
+
+    @property
+    def slips(self) -> np.ndarray:
+        """(6,) axes whose error is more than noise and a tenth of the motion: no spring's alone."""
+        error, motion, noise = (a.sum(axis=0) for a in (self.error, self.motion, self.noise))
+        return np.asarray(error > _NOISE * noise + _SLIP * np.maximum(motion - noise, 0.0))
 
     @property
     def moves(self) -> np.ndarray:

@@ -3,26 +3,28 @@
     suspension.{K,C}.<i><j>      elements about the base frame's origin, i <= j, 1 to 6 for x y z rx ry rz
     suspension.<wheel>.{kx,...}  of the printed form: one total wrench tells only combinations of them
 
-An element is `estimated` if its standard deviation, over the geometric mean of its diagonal pair, is below 0.3 and the
-springs explain the motion of both its axes; where wheels slip the number found is of no spring.
+Base markers are placed on the base with a tolerance, so where frame 0 is in the floor's plane is uncertain by
+xi = (dx, dy, dpsi), which adds  dK = K ad(xi) + ad(xi)' K.  An element is `estimated` if its standard deviation, over
+the geometric mean of its diagonal pair, is below 0.3 and the springs explain the motion of both its axes; where wheels
+slip the number found is of no spring.
 """
 
 import numpy as np
 
 from calibration.estimate import Parameter
 from calibration.identifiability import Combination, Status
+from calibration.schema import Tolerances
+from calibration.se3 import skew
 from calibration.suspension_wheels import WheelModel
 
 _KNOWN = 0.3  # sigma over the geometric mean of the diagonal pair [-]
-_SPRING = 0.9  # share of the motion that is the spring's [-]
 
 
 def element_parameters(
-    letter: str, matrix: np.ndarray, sigma: np.ndarray, couples: np.ndarray, explained: np.ndarray
+    letter: str, matrix: np.ndarray, sigma: np.ndarray, couples: np.ndarray, slips: np.ndarray
 ) -> tuple[Parameter, ...]:
-    """Upper triangle of K or C (6, 6), elements that the wheels couple; `explained` (6,) share of each axis' motion."""
+    """Upper triangle of K or C (6, 6), elements that the wheels couple; `slips` (6,) axes that no spring explains."""
     root = np.sqrt(np.abs(np.diag(matrix)))
-    slips = np.nan_to_num(explained, nan=1.0) < _SPRING
     found = []
     for i in range(6):
         for j in range(i, 6):
@@ -63,6 +65,23 @@ def jackknife(others: np.ndarray) -> np.ndarray:
     """Covariance (p, p) of a value from the n values (n, p) without one trial each: (n - 1) / n sum d d'."""
     d = others - others.mean(axis=0)
     return np.asarray((len(others) - 1) / len(others) * d.T @ d)
+
+
+def frame_sigma(matrix: np.ndarray, tolerances: Tolerances) -> np.ndarray:
+    """Standard deviations (6, 6) of K or C by the tolerance of frame 0 in the floor's plane."""
+    variance = np.zeros((6, 6))
+    for axis, sigma in (
+        (0, tolerances.body_translation),
+        (1, tolerances.body_translation),
+        (5, tolerances.body_rotation),
+    ):
+        xi = np.zeros(6)
+        xi[axis] = sigma
+        ad = np.zeros((6, 6))
+        ad[:3, :3] = ad[3:, 3:] = skew(xi[3:])
+        ad[:3, 3:] = skew(xi[:3])
+        variance += (matrix @ ad + ad.T @ matrix) ** 2
+    return np.sqrt(variance)
 
 
 def _unit(letter: str, i: int, j: int) -> str:

@@ -4,12 +4,13 @@ import pytest
 from calibration.schema import Sigmas
 from calibration.signals import RATE
 from calibration.suspension_compliance import fit_compliance
-from calibration.suspension_fit import Springs, _refusal
 from calibration.suspension_held_out import HeldOut, held_out, predicted
 from calibration.suspension_modes import modes_of
-from calibration.suspension_parameters import element_parameters, wheel_parameters
+from calibration.suspension_parameters import element_parameters, frame_sigma, wheel_parameters
 from calibration.suspension_printed import matrices, normal_of, solve
+from calibration.suspension_springs import Springs, refusal
 from calibration.suspension_wheels import wheel_model
+from tests.calibration import matched
 from tests.calibration.swaying import WHEELS, smooth, sway, values
 
 SIGMAS = Sigmas(marker=1e-4, encoder=1e-5, plate_force=1.2, plate_moment=0.35)
@@ -110,16 +111,18 @@ def judged(r2):
 def test_a_printed_fit_that_cannot_be_used_is_refused():
     good = judged([0.9] * 6)
     K, C = np.diag([8e4, 9e4, 9e5, 2e4, 2e4, 4e3]), np.diag([500.0, 500.0, 1e4, 300.0, 300.0, 20.0])
-    assert _refusal(springs(K, C), good) == ""
+    assert refusal(springs(K, C), good, good) == ""
     soft = K.copy()
     soft[5, 5] = 10.0
-    assert "drifts" in _refusal(springs(soft, C), good)
+    assert "drifts" in refusal(springs(soft, C), good, good)
     soft[5, 5] = 0.0
-    assert "positive definite" in _refusal(springs(soft, C), good)
+    assert "positive definite" in refusal(springs(soft, C), good, good)
     wrong = C.copy()
     wrong[3, 3] = -50.0
-    assert "damping" in _refusal(springs(K, wrong), good)
-    assert "worse than a base that stays along rz" in _refusal(springs(K, C), judged([0.9] * 5 + [-20.0]))
+    assert "damping" in refusal(springs(K, wrong), good, good)
+    slips, poor = judged([0.9] * 5 + [-20.0]), judged([0.9, 0.5] + [0.9] * 4)
+    assert "worse than a base that stays along rz" in refusal(springs(K, C), slips, good)
+    assert "worse than the compliance along y" in refusal(springs(K, C), poor, good)
 
 
 def test_r2_compares_with_a_base_that_stays():
@@ -139,6 +142,7 @@ def test_r2_compares_with_a_base_that_stays():
     np.testing.assert_allclose(tried.r2, literal)
     assert tried.moves[:5].all() and not tried.moves[5]
     assert tried.explained[5] < 0.1
+    assert tried.slips.tolist() == [False] * 5 + [True]
 
 
 def test_one_trial_alone_does_not_move_an_axis():
@@ -155,7 +159,21 @@ def test_what_slips_is_no_spring_and_is_not_reported_as_one():
     K = np.diag([8e4, 9e4, 9e5, 2e4, 2e4, 4e3])
     sigma, couples = 0.01 * K, np.eye(6, dtype=bool)
     sigma[2, 2] = 0.5 * K[2, 2]
-    found = element_parameters("K", K, sigma, couples, np.array([0.2, 0.95, np.nan, 1.0, 1.0, 0.5]))
+    found = element_parameters("K", K, sigma, couples, np.array([True, False, False, False, False, True]))
     assert [p.name[-2:] for p in found] == ["11", "22", "33", "44", "55", "66"]
     assert [p.status == "estimated" for p in found] == [False, True, False, True, True, False]
     assert [p.unit for p in found][2:4] == ["N/m", "N.m/rad"]
+
+
+def test_a_frame_that_is_off_counts_in_the_uncertainty():
+    K = np.diag([8e4, 9e4, 9e5, 2e4, 2e4, 4e3])
+    tolerances = matched.described().tolerances
+    d = tolerances.body_translation
+    A = np.eye(6)
+    A[2, 4] = -d  # the point that was taken for the origin is d ahead of it
+    A[1, 5] = d
+    shifted = A.T @ K @ A
+    sigma = frame_sigma(K, tolerances)
+    assert sigma[2, 4] == pytest.approx(abs(shifted[2, 4]), rel=1e-9)
+    assert sigma[1, 5] == pytest.approx(abs(shifted[1, 5]), rel=1e-9)
+    assert sigma[2, 2] == 0.0
