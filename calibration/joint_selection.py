@@ -4,7 +4,8 @@
 
 Each left-out trial is asked inside the others' domain, rho is theirs too. One QR per trial and rho serves all folds
 and degrees: R_t' R_t = [M_t, y_t]' [M_t, y_t], and the lower degrees are columns of the highest one.
-The choice "none" scores 1 and stays unless a degree does clearly better.
+The lowest degree whose score is within a tenth of the best is taken: what a higher one gains on a handful of trials does
+not carry over. The choice "none" scores 1 and stays unless a degree does clearly better.
 """
 
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from calibration.joint_samples import Samples, box, pooled
 
 HIGHEST = 5
 _WORTH = 0.95  # a model that leaves more than this share of the mean square is not worth its coefficients [-]
+_TIE = 1.1  # scores within this factor of the best are as good [-]
 
 
 @dataclass(frozen=True)
@@ -39,29 +41,29 @@ class Candidate:
     score: float
 
 
-def candidates(samples: Sequence[Samples], terms: Terms) -> tuple[Candidate, ...]:
+def candidates(samples: Sequence[Samples], terms: Terms, highest: int = HIGHEST) -> tuple[Candidate, ...]:
     """The choice "none" and every degree up to the highest, judged on these trials."""
     whole = pooled(samples)
-    none = Candidate(None, (), tuple(np.zeros(len(s)) for s in samples), 1.0)
-    found = [none]
-    kept = not_zero(exponents(terms, HIGHEST), whole.theta, whole.tau)
-    if not kept or len(samples) < 2:
+    found = [Candidate(None, (), tuple(np.zeros(len(s)) for s in samples), 1.0)]
+    kept = not_zero(exponents(terms, highest), whole.theta, whole.tau)
+    total = float((whole.y**2).sum())
+    if not kept or len(samples) < 2 or total == 0.0:
         return tuple(found)
     basis = basis_of(kept, box(whole))
     factors = {float(rho): [_factor(basis, s, rho) for s in samples] for rho in rho_grid()}
-    for degree in range(HIGHEST + 1):
+    for degree in range(highest + 1):
         powers = tuple(p for p in exponents(terms, degree) if p in kept)
         if powers and powers != found[-1].powers:
             left_out = tuple(_left_out(basis, powers, samples, factors, k) for k in range(len(samples)))
             missed = sum(float(((s.y - p) ** 2).sum()) for s, p in zip(samples, left_out, strict=True))
-            found.append(Candidate(degree, powers, left_out, missed / max(float((whole.y**2).sum()), 1e-300)))
+            found.append(Candidate(degree, powers, left_out, missed / total))
     return tuple(found)
 
 
 def choose(found: Sequence[Candidate]) -> Candidate:
-    """The candidate of the lowest score, "none" unless it is clearly better."""
-    best = min(found, key=lambda c: c.score)
-    return best if best.score < _WORTH else found[0]
+    """The lowest degree nearly as good as the best; "none", which comes first, unless that is clearly better."""
+    best = min(c.score for c in found)
+    return next(c for c in found[1:] if c.score <= _TIE * best) if best < _WORTH else found[0]
 
 
 def _factor(basis: Basis, samples: Samples, rho: float) -> np.ndarray:
