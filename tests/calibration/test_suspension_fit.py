@@ -34,7 +34,7 @@ def record(name, joints, rng):
     """A trial whose base answers the plate's wrench, which is that of the arm alone."""
     amplitudes = np.zeros(8)
     amplitudes[joints] = 0.4
-    motor = matched.swing(amplitudes, rng.uniform(0.3, 0.8, 8), 8.0)
+    motor = matched.swing(amplitudes, rng.uniform(0.3, 0.8, 8), 6.0)
     trial = matched.record(TRUTH, motor, 0.0, rng)
     t = np.arange(len(motor) // 5) / (matched.GRID / 5.0)
     w = matched.plate_wrench(TRUTH, motor[::5], T_LAB_BASE, matched.GRID / 5.0)[: len(t)]
