@@ -23,7 +23,7 @@ from calibration.suspension_checks import STAGE, moved_bases, wrong_plate
 from calibration.suspension_held_out import HeldOut, held_out
 from calibration.suspension_parameters import element_parameters, wheel_parameters
 from calibration.suspension_read import Laboratory, Sways, laboratory, read_sways
-from calibration.suspension_springs import Springs, compliance_springs, printed_springs, refusal
+from calibration.suspension_springs import Springs, compliance_springs, not_positive, printed_springs, refusal
 from calibration.suspension_sway import Sway
 from calibration.suspension_wheels import Point, wheel_model
 from calibration.verdict import Verdict
@@ -114,13 +114,16 @@ def _fitted(lab: Laboratory, sways: Sways, form: Form) -> tuple[Suspension, list
 def _chosen(description: Description, sways: Sequence[Sway], form: Form, reduced: Springs) -> tuple[Springs, Verdict]:
     """The printed form, about the points that predict better, or the reduced one where that is refused."""
     points: tuple[Point, ...] = (form.point,) if form.point else ("centre", "contact")
-    found = []
+    found: list[tuple[float, Springs, str, Point]] = []
     for point in points:
         springs = printed_springs(description, wheel_model(description.wheels, point, form.full), sways)
-        tried = held_out(sways, springs.folds.__getitem__)
-        found.append((float(np.clip(tried.r2, -1.0, 1.0).sum()), springs, tried, point))
-    _, springs, tried, point = max(found, key=lambda f: f[0])
-    why = refusal(springs, tried, held_out(sways, reduced.folds.__getitem__))
+        why, worth = not_positive(springs), -np.inf
+        if not why:
+            tried = held_out(sways, springs.folds.__getitem__)
+            why = refusal(springs, tried, held_out(sways, reduced.folds.__getitem__))
+            worth = float(np.clip(tried.r2, -1.0, 1.0).sum())
+        found.append((worth, springs, why, point))
+    _, springs, why, point = max(found, key=lambda f: f[0])
     if not why:
         return springs, Verdict(
             STAGE, "ok", f"printed form with r_i the wheels' {point} points, displacement to wrench"

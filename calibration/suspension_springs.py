@@ -65,14 +65,19 @@ def compliance_springs(description: Description, sways: Sequence[Sway], coupled:
     return Springs(K, C, tuple(found.without(k) for k in range(len(sways))), (placed[0], placed[1]), couples)
 
 
-def refusal(springs: Springs, tried: HeldOut, reduced: HeldOut) -> str:
-    """Why a printed fit must not be used, empty where it may; `reduced` is the compliance on the same trials."""
+def not_positive(springs: Springs) -> str:
+    """Why a fit, or one without a trial, cannot be run forward at all; empty where it can."""
     scale = np.outer(*[np.array([1.0] * 3 + [1.0 / _LEVER] * 3)] * 2)
-    stiffness, damping = np.linalg.eigvalsh(springs.K * scale), np.linalg.eigvalsh(springs.C * scale)
-    if stiffness[0] < _STIFF * stiffness[-1]:
-        return "its stiffness is not positive definite"
-    if damping[0] < -_STIFF * damping[-1]:
-        return "its damping is not positive"
+    for where, K in (("", springs.K), *((" without one of the trials", K) for K, _ in springs.folds)):
+        stiffness = np.linalg.eigvalsh(K * scale)
+        if stiffness[0] < _STIFF * stiffness[-1]:
+            return f"its stiffness is not positive definite{where}"
+    damping = np.linalg.eigvalsh(springs.C * scale)
+    return "its damping is not positive" if damping[0] < -_STIFF * damping[-1] else ""
+
+
+def refusal(springs: Springs, tried: HeldOut, reduced: HeldOut) -> str:
+    """Why a positive printed fit must not be used, empty where it may; `reduced` is the compliance on the same trials."""
     settling = modes_of(springs.K, springs.C, np.zeros((6, 6))).settling
     if settling > _SETTLES:
         return f"it drifts, its slowest mode takes {settling:.1f} s to settle"

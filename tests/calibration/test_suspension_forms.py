@@ -177,3 +177,14 @@ def test_a_frame_that_is_off_counts_in_the_uncertainty():
     assert sigma[2, 4] == pytest.approx(abs(shifted[2, 4]), rel=1e-9)
     assert sigma[1, 5] == pytest.approx(abs(shifted[1, 5]), rel=1e-9)
     assert sigma[2, 2] == 0.0
+
+
+def test_a_fit_that_is_singular_without_one_trial_is_told():
+    from calibration.suspension_springs import Springs, not_positive
+
+    good, singular = np.eye(6), np.diag([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    sigmas = (np.zeros((6, 6)), np.zeros((6, 6)))
+    whole = Springs(good, good, ((good, good), (good, good)), sigmas, np.ones((6, 6), dtype=bool))
+    assert not_positive(whole) == ""
+    left_out = Springs(good, good, ((good, good), (singular, good)), sigmas, np.ones((6, 6), dtype=bool))
+    assert not_positive(left_out) == "its stiffness is not positive definite without one of the trials"
