@@ -77,7 +77,7 @@ def not_positive(springs: Springs) -> str:
 
 
 def refusal(springs: Springs, tried: HeldOut, reduced: HeldOut) -> str:
-    """Why a positive printed fit must not be used, empty where it may; `reduced` is the compliance on the same trials."""
+    """Why a positive printed fit must not be used, or nothing; `reduced` is the compliance on the same trials."""
     settling = modes_of(springs.K, springs.C, np.zeros((6, 6))).settling
     if settling > _SETTLES:
         return f"it drifts, its slowest mode takes {settling:.1f} s to settle"

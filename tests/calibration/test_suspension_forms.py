@@ -8,7 +8,7 @@ from calibration.suspension_held_out import HeldOut, held_out, predicted
 from calibration.suspension_modes import modes_of
 from calibration.suspension_parameters import element_parameters, frame_sigma, wheel_parameters
 from calibration.suspension_printed import matrices, normal_of, solve
-from calibration.suspension_springs import Springs, refusal
+from calibration.suspension_springs import Springs, not_positive, refusal
 from calibration.suspension_wheels import wheel_model
 from tests.calibration import matched
 from tests.calibration.swaying import WHEELS, smooth, sway, values
@@ -116,10 +116,10 @@ def test_a_printed_fit_that_cannot_be_used_is_refused():
     soft[5, 5] = 10.0
     assert "drifts" in refusal(springs(soft, C), good, good)
     soft[5, 5] = 0.0
-    assert "positive definite" in refusal(springs(soft, C), good, good)
+    assert "positive definite" in not_positive(springs(soft, C))
     wrong = C.copy()
     wrong[3, 3] = -50.0
-    assert "damping" in refusal(springs(K, wrong), good, good)
+    assert "damping" in not_positive(springs(K, wrong))
     slips, poor = judged([0.9] * 5 + [-20.0]), judged([0.9, 0.5] + [0.9] * 4)
     assert "worse than a base that stays along rz" in refusal(springs(K, C), slips, good)
     assert "worse than the compliance along y" in refusal(springs(K, C), poor, good)
@@ -180,8 +180,6 @@ def test_a_frame_that_is_off_counts_in_the_uncertainty():
 
 
 def test_a_fit_that_is_singular_without_one_trial_is_told():
-    from calibration.suspension_springs import Springs, not_positive
-
     good, singular = np.eye(6), np.diag([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     sigmas = (np.zeros((6, 6)), np.zeros((6, 6)))
     whole = Springs(good, good, ((good, good), (good, good)), sigmas, np.ones((6, 6), dtype=bool))
