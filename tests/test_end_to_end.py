@@ -111,3 +111,28 @@ def test_other_programs_open_every_file(result):
         with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
             for name, variable in data.variables.items():
                 assert variable.dtype.kind not in "fi" or "units" in variable.attrs, (path.name, name)
+
+
+def test_roll_and_pitch_of_the_base_are_predicted_from_the_plate(result, base_r2):
+    """Without its markers beyond the first second, on swings no stage has seen; inverse dynamics: test_seeds.py."""
+    assert base_r2(result.folder, result.estimate, "plate").min() >= 0.95
+
+
+def test_the_papers_models_keep_their_order(rows):
+    def mm(model, base):
+        return figure(rows, model, base)
+
+    assert mm("model_1", "plate") <= mm("nominal", "fixed")
+    assert mm("model_2", "plate") < min(mm("model_1", "plate"), mm("registration", "plate"))
+    assert mm("model_3", "plate") <= min(1.10 * mm("model_2", "plate"), 5.7)
+    assert figure(rows, "model_3", "plate", name="orientation_rmse_deg") <= 2.71
+
+
+def test_one_estimate_is_scored_under_both_protocols(result):
+    found = json.loads((result.folder / "evaluation.json").read_text())
+    assert [(p["protocol"], p["model"]) for p in found["protocols"]] == [
+        (protocol, model) for protocol in ("public", "ours") for model in ("nominal", "model_1", "model_2", "model_3")
+    ]
+    better = {tuple(c["b"]): c["finding"] for c in found["comparisons"]}
+    assert better["model_2", "plate"] == "better"
+    assert better["model_1", "plate"] != "worse"
