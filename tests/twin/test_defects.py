@@ -91,10 +91,16 @@ def test_encoder_readings_are_the_stated_formula():
 def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
     contacts = {w.name: np.array(w.contact) for w in mjcf.wheels()}
     p = np.array([contacts[w.name] for w in lab.robot.wheels])
-    K, _ = spatial_stiffness(lab.robot.wheels, p)
+    K, C = spatial_stiffness(lab.robot.wheels, p)
     kz = [w.stiffness[2] * w.contact_stiffness / (w.stiffness[2] + w.contact_stiffness) for w in lab.robot.wheels]
     np.testing.assert_allclose(K[2, 2], sum(kz))
     np.testing.assert_allclose(K[3, 3], np.dot(kz, p[:, 1] ** 2))
     kx, ky = (np.array([w.stiffness[i] for w in lab.robot.wheels]) for i in (0, 1))
     np.testing.assert_allclose(K[5, 5], np.dot(kx, p[:, 1] ** 2) + np.dot(ky, p[:, 0] ** 2))
     np.testing.assert_allclose(K, K.T)
+    h = 1e-3  # heave at h rad/s: the imaginary part of the dynamic stiffness is damping times h
+    series = [
+        1 / (1 / (w.stiffness[2] + 1j * h * w.damping[2]) + 1 / (w.contact_stiffness + 1j * h * w.contact_damping))
+        for w in lab.robot.wheels
+    ]
+    np.testing.assert_allclose(C[2, 2], sum(series).imag / h, rtol=1e-9)

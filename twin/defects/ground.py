@@ -96,15 +96,20 @@ class Wheel(Defect):
 def spatial_stiffness(wheels: tuple[Wheel, ...], contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear K and C (6, 6) about the base frame's origin, wheels holding on the floor, gravity's part apart.
 
-        K = sum_i A_i' diag(kx, ky, kz Kc / (kz + Kc)) A_i,   A_i = [1, -[p_i]x]
+        K = sum_i A_i' diag(kx, ky, kz | Kc) A_i,   C alike,   A_i = [1, -[p_i]x],   | bushing and contact in series
 
     A braked sphere that tilts with the base keeps its contact point, hence p_i (n, 3) [m] are contact points.
     """
     K, C = np.zeros((6, 6)), np.zeros((6, 6))
     for wheel, (x, y, z) in zip(wheels, contacts, strict=True):
         A = np.hstack([np.eye(3), [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]])
-        k = np.array(wheel.stiffness)
-        k[2] = k[2] * wheel.contact_stiffness / (k[2] + wheel.contact_stiffness)
+        k, c = np.array(wheel.stiffness), np.array(wheel.damping)
+        k[2], c[2] = _in_series(k[2], c[2], wheel.contact_stiffness, wheel.contact_damping)
         K += A.T @ np.diag(k) @ A
-        C += A.T @ np.diag(wheel.damping) @ A
+        C += A.T @ np.diag(c) @ A
     return K, C
+
+
+def _in_series(k1: float, c1: float, k2: float, c2: float) -> tuple[float, float]:
+    """Stiffness and damping of two spring-dampers in series, slow motion: 1 / (k + c s) to first order in s."""
+    return k1 * k2 / (k1 + k2), (c1 * k2**2 + c2 * k1**2) / (k1 + k2) ** 2
