@@ -95,6 +95,7 @@ class Evaluation:
         content = {
             "schema": 1,
             "rows": [row_entry(r) for r in self.rows],
+            "trials": [trial_entry(t) for t in self.traces],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
             "comparisons": [asdict(c) for c in comparisons(self.traces)],
         }
@@ -161,6 +162,20 @@ def row_entry(row: Row) -> dict[str, Any]:
     figures["per_axis_mm"] = dict(zip("xyz", row.metrics.per_axis_mm, strict=True))
     names = {"model": row.model, "trials": row.trials, "base": row.base, "encoder": row.encoder}
     return names | {"against": row.against} | figures
+
+
+def trial_entry(trace: Trace) -> dict[str, Any]:
+    """One row in one trial: where a row is good and where it is not."""
+    m = row_metrics(trace.scored)
+    return {
+        "trial": trace.trial_id,
+        "model": trace.model,
+        "base": trace.base,
+        "encoder": trace.encoder,
+        "n": m.n,
+        "position_rmse_component_mm": m.position_rmse_component_mm,
+        "orientation_rmse_deg": m.orientation_rmse_deg,
+    }
 
 
 def _trace(p: Prediction, trial: Trial, errors: PoseErrors) -> Trace:
