@@ -2,25 +2,25 @@
 
 Data: motor minus link reading of all calibration trials, rests included, the mean over the static calibration postures
 removed (the zero of readings). Inputs: motor encoders, the geometry's zeros, the nominal robot with its payload.
+Two choices, both by models that have not seen the trial they are judged on: a joint's degree in its own discrepancy
+(`joint_selection`), and whether the joint is corrected at all in the hand's error (`joint_hand`).
 """
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel
-from calibration.joint_basis import basis_of
 from calibration.joint_correction import JointModels
-from calibration.joint_inputs import input_model
-from calibration.joint_model import JointModel, Quality, Terms, exponents
-from calibration.joint_projection import Problem, clustered_covariance, search
-from calibration.joint_samples import Samples, box, pooled, samples_of
-from calibration.joint_selection import Candidate, candidates, choose
+from calibration.joint_hand import harmful
+from calibration.joint_inputs import InputModel, input_model
+from calibration.joint_model import JointModel, Terms
+from calibration.joint_projection import RHO, at_limit
+from calibration.joint_samples import Samples, samples_of
+from calibration.joint_single import fit_joint, no_correction
 from calibration.joint_zero import link_zeros
 from calibration.recording import Trial
 from calibration.schema import Description
@@ -50,60 +50,65 @@ def fit_joint_models(
     except NotEnoughData as error:
         unknown = np.full(len(inputs.measured), np.nan)
         return JointModels(inputs, unknown, ()), (Verdict(STAGE, "missing", str(error)),)
-    columns = list(zip(*(samples_of(inputs, trial, zero) for trial in trials), strict=True))
-    found = {
-        joint: fit_joint(joint, tuple(s for s in samples if s is not None), float(z), terms)
-        for joint, samples, z in zip(inputs.measured, columns, zero, strict=True)
-        if np.isfinite(z)
-    }
-    without = [joint for joint in hand.chain.joints if joint not in found]
-    return JointModels(inputs, zero, tuple(found.values())), tuple(_verdicts(found.values(), without))
+    samples = _samples(urdf, description, trials, inputs, hand, zero)
+    models, predicted = {}, {}
+    for joint, of_joint in samples.items():
+        z = float(zero[inputs.measured.index(joint)])
+        models[joint], chosen = fit_joint(joint, of_joint, z, terms)
+        if chosen.degree is not None:
+            left_out = zip(of_joint, chosen.left_out, strict=True)
+            predicted[joint] = {s.trial_id: (s.t, p) for s, p in left_out}
+        _log.info("%s: degree %s of %s, score %.3f", joint, chosen.degree, terms, chosen.score)
+    worse = harmful(description, trials, robot, hand, predicted)
+    for joint in worse:
+        models[joint] = no_correction(joint, samples[joint], models[joint].zero, terms)
+    without = [joint for joint in hand.chain.joints if joint not in models]
+    found = tuple(models.values())
+    return JointModels(inputs, zero, found), tuple(_verdicts(found, worse, without))
 
 
-def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms = TERMS) -> JointModel:
-    """The model of one joint from its samples, trial by trial; degree by leaving one trial out."""
-    chosen = choose(candidates(samples, terms))
-    fitted = fit_degree(joint, samples, zero, terms, chosen)
-    _log.info("%s: degree %s of %s, rho %.0f", joint, fitted.degree, terms, fitted.rho)
-    return fitted
+def _samples(
+    urdf: str,
+    description: Description,
+    trials: Sequence[Trial],
+    inputs: InputModel,
+    hand: HandModel,
+    zero: np.ndarray,
+) -> dict[str, tuple[Samples, ...]]:
+    """Samples of every joint of the chain with a link encoder, trial by trial, each with its own payload."""
+    entries = {entry.id: entry for entry in description.trials}
+    rows = []
+    for trial in trials:
+        own = description.loaded(entries[trial.id]) if trial.id in entries else description
+        rows.append(samples_of(inputs if own is description else input_model(urdf, own, hand), trial, zero))
+    columns = dict(zip(inputs.measured, zip(*rows, strict=True), strict=True))
+    found = {joint: tuple(s for s in columns[joint] if s is not None) for joint in hand.chain.joints}
+    return {joint: of_joint for joint, of_joint in found.items() if of_joint}
 
 
-def fit_degree(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:
-    """The model of one joint with a degree that was chosen."""
-    whole = pooled(samples)
-    domain, powers, k = box(whole), chosen.powers, len(chosen.powers)
-    missed = np.concatenate([s.y - p for s, p in zip(samples, chosen.left_out, strict=True)])
-    none = JointModel(joint, terms, None, (), (), 0.0, np.zeros(0), np.zeros(0), domain, zero)
-    if chosen.degree is None:
-        return replace(none, quality=_quality(whole.y, whole.y, missed))
-    basis = basis_of(powers, domain)
-    problem = Problem(basis(whole.theta, whole.tau), whole.velocity, whole.y)
-    found = search(problem)
-    J = np.column_stack([problem.design_slope(found.rho) @ found.x, problem.design(found.rho)])
-    stops = np.cumsum([0, *(len(s) for s in samples)])
-    groups = [slice(a, b) for a, b in pairwise(stops)]
-    to_printed = np.eye(1 + 2 * k)
-    to_printed[1 : 1 + k, 1 : 1 + k] = to_printed[1 + k :, 1 + k :] = basis.to_printed()
-    values = to_printed @ np.append(found.rho, found.x)
-    return replace(
-        none,
-        degree=chosen.degree,
-        powers=powers,
-        dropped=tuple(p for p in exponents(terms, chosen.degree) if p not in powers),
-        rho=found.rho,
-        A=values[1 : 1 + k],
-        B=values[1 + k :],
-        covariance=to_printed @ clustered_covariance(J, found.r, groups) @ to_printed.T,
-        quality=_quality(whole.y, found.r, missed),
-    )
-
-
-def _quality(y: np.ndarray, residual: np.ndarray, left_out: np.ndarray) -> Quality:
-    total = max(float(((y - y.mean()) ** 2).sum()), np.finfo(float).tiny)
-    rms, left = (float(np.sqrt((x**2).mean())) for x in (y, residual))
-    return Quality(rms, left, 1.0 - float(residual @ residual) / total, 1.0 - float(left_out @ left_out) / total)
-
-
-def _verdicts(models: Iterable[JointModel], without: list[str]) -> Iterator[Verdict]:
+def _verdicts(models: Sequence[JointModel], worse: Sequence[str], without: Sequence[str]) -> Iterator[Verdict]:
     if without:
-        yield Verdict(STAGE, "missing", f"no joint model, since there is no link encoder: {without}")
+        yield Verdict(STAGE, "missing", f"no joint model without a link encoder: {', '.join(without)}")
+    used = [m for m in models if m.degree is not None]
+    if used:
+        yield Verdict(STAGE, "ok", f"{used[0].terms} terms; {'; '.join(_told(m) for m in used)}")
+    if worse:
+        yield Verdict(
+            STAGE, "ok", f"not corrected, since the markers see the hand nearer without it: {', '.join(worse)}"
+        )
+    none = [m.joint for m in models if m.degree is None and m.joint not in worse]
+    if none:
+        yield Verdict(STAGE, "ok", f"not corrected, since no degree predicts a trial left out: {', '.join(none)}")
+    for model in used:
+        if model.dropped:
+            names = ", ".join(f"A_{i}{j}, B_{i}{j}" for i, j in model.dropped)
+            yield Verdict(STAGE, "ok", f"{model.joint}: terms that are zero throughout are left out: {names}")
+
+
+def _told(model: JointModel) -> str:
+    q = model.quality
+    limit = f" at a limit of {RHO[0]:g} to {RHO[1]:g}" if at_limit(model.rho) else ""
+    return (
+        f"{model.joint} degree {model.degree}, rho {model.rho:.3g} s/rad{limit}, {1e3 * q.rms:.1f} -> "
+        f"{1e3 * q.residual:.1f} mrad, R2 {q.r2:.2f}, left out {q.r2_out:.2f}"
+    )

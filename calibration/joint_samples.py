@@ -9,7 +9,8 @@ from calibration.errors import NotEnoughData
 from calibration.joint_inputs import InputModel, velocities
 from calibration.recording import Trial
 
-_EVERY = 0.05  # [s] between samples used
+_EVERY = 0.1  # [s] between samples used
+_FIELDS = ("t", "theta", "tau", "velocity", "y")
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,7 @@ class Samples:
 
     Attributes:
         trial_id: The trial, or part of it.
+        t: [s, robot clock].
         theta: [rad].
         tau: [N.m].
         velocity: Motor side [rad/s].
@@ -25,6 +27,7 @@ class Samples:
     """
 
     trial_id: str
+    t: np.ndarray
     theta: np.ndarray
     tau: np.ndarray
     velocity: np.ndarray
@@ -35,7 +38,7 @@ class Samples:
 
     def part(self, rows: np.ndarray) -> "Samples":
         """Those of the rows (m,) or mask (n,)."""
-        return Samples(self.trial_id, self.theta[rows], self.tau[rows], self.velocity[rows], self.y[rows])
+        return Samples(self.trial_id, *(getattr(self, name)[rows] for name in _FIELDS))
 
 
 def samples_of(inputs: InputModel, trial: Trial, zero: np.ndarray) -> tuple[Samples | None, ...]:
@@ -51,18 +54,18 @@ def samples_of(inputs: InputModel, trial: Trial, zero: np.ndarray) -> tuple[Samp
     rows = np.unique(np.searchsorted(t, np.arange(t[0], t[-1], _EVERY)))
     found = inputs.inputs(t[rows], q[rows], velocities(t, q)[rows])
     y = q[rows] - trial.q_link[good][rows] - zero
+    has = np.isfinite(y)
     return tuple(
-        Samples(trial.id, *(x[k] for x in (found.theta[:, j], found.tau[:, j], found.velocity[:, j], y[:, j])))
-        if (k := np.isfinite(y[:, j])).any()
+        Samples(trial.id, t[rows][k], *(x[k, j] for x in (found.theta, found.tau, found.velocity, y)))
+        if k.any()
         else None
-        for j in range(y.shape[1])
+        for j, k in enumerate(has.T)
     )
 
 
 def pooled(samples: Sequence[Samples]) -> Samples:
     """Samples of several trials in a row."""
-    names = ("theta", "tau", "velocity", "y")
-    return Samples("", *(np.concatenate([getattr(s, name) for s in samples]) for name in names))
+    return Samples("", *(np.concatenate([getattr(s, name) for s in samples]) for name in _FIELDS))
 
 
 def box(samples: Samples) -> np.ndarray:

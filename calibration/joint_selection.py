@@ -4,8 +4,8 @@
 
 Each left-out trial is asked inside the others' domain, rho is theirs too. One QR per trial and rho serves all folds
 and degrees: R_t' R_t = [M_t, y_t]' [M_t, y_t], and the lower degrees are columns of the highest one.
-The lowest degree whose score is within a tenth of the best is taken: what a higher one gains on a handful of trials does
-not carry over. The choice "none" scores 1 and stays unless a degree does clearly better.
+The lowest degree whose score is within a tenth of the best is taken: what a higher one gains on a handful of trials
+does not carry over. The choice "none" scores 1 and stays unless a degree does clearly better.
 """
 
 from collections.abc import Sequence

@@ -1,0 +1,80 @@
+"""The printed model of one joint from its samples: degree by leaving one trial out, then A, B and rho.
+
+A degree whose coefficients the samples do not all fix is no candidate: a joint that never moves shows both flanks at
+once, and neither.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.joint_basis import basis_of, not_zero
+from calibration.joint_model import JointModel, Quality, Terms, exponents
+from calibration.joint_projection import Problem, clustered_covariance, search
+from calibration.joint_samples import Samples, box, pooled
+from calibration.joint_selection import HIGHEST, Candidate, candidates, choose
+
+
+def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms) -> tuple[JointModel, Candidate]:
+    """The model of a joint from its samples, trial by trial, and the candidate that was chosen."""
+    found = candidates(samples, terms)
+    while True:
+        chosen = choose(found)
+        try:
+            return fit_degree(joint, samples, zero, terms, chosen), chosen
+        except NotEnoughData:
+            found = tuple(c for c in found if c is not chosen)
+
+
+def fit_degree(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:
+    """The model of a joint with a degree that was chosen.
+
+    Raises:
+        NotEnoughData: The samples do not fix its coefficients.
+    """
+    if chosen.degree is None:
+        return no_correction(joint, samples, zero, terms)
+    whole, powers, k = pooled(samples), chosen.powers, len(chosen.powers)
+    basis = basis_of(powers, box(whole))
+    problem = Problem(basis(whole.theta, whole.tau), whole.velocity, whole.y)
+    found = search(problem)
+    if not found.full_rank:
+        raise NotEnoughData(f"{joint}: the trials do not fix the {2 * k} coefficients of degree {chosen.degree}")
+    J = np.column_stack([problem.design_slope(found.rho) @ found.x, problem.design(found.rho)])
+    stops = np.cumsum([0, *(len(s) for s in samples)])
+    C = clustered_covariance(J, found.r, [slice(a, b) for a, b in pairwise(stops)])
+    to_printed = np.eye(1 + 2 * k)
+    to_printed[1 : 1 + k, 1 : 1 + k] = to_printed[1 + k :, 1 + k :] = basis.to_printed()
+    values = to_printed @ np.append(found.rho, found.x)
+    missed = np.concatenate([s.y - p for s, p in zip(samples, chosen.left_out, strict=True)])
+    return replace(
+        no_correction(joint, samples, zero, terms),
+        degree=chosen.degree,
+        powers=powers,
+        dropped=tuple(p for p in exponents(terms, chosen.degree) if p not in powers),
+        rho=found.rho,
+        A=values[1 : 1 + k],
+        B=values[1 + k :],
+        covariance=to_printed @ C @ to_printed.T,
+        quality=_quality(whole.y, found.r, missed),
+    )
+
+
+def no_correction(joint: str, samples: Sequence[Samples], zero: float, terms: Terms) -> JointModel:
+    """The choice "none"; terms that were zero throughout are still told."""
+    whole, every = pooled(samples), exponents(terms, HIGHEST)
+    kept = not_zero(every, whole.theta, whole.tau)
+    rms = float(np.sqrt((whole.y**2).mean()))
+    return JointModel(
+        joint, terms, None, (), tuple(p for p in every if p not in kept), 0.0, np.zeros(0), np.zeros(0), box(whole),
+        zero, quality=Quality(rms, rms),
+    )  # fmt: skip
+
+
+def _quality(y: np.ndarray, residual: np.ndarray, left_out: np.ndarray) -> Quality:
+    total = max(float(((y - y.mean()) ** 2).sum()), np.finfo(float).tiny)
+    rms, left = (float(np.sqrt((x**2).mean())) for x in (y, residual))
+    return Quality(rms, left, 1.0 - float(residual @ residual) / total, 1.0 - float(left_out @ left_out) / total)
