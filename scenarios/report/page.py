@@ -11,14 +11,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from scenarios.plots import svg
-from scenarios.report import figures, numbers, verdict
+from scenarios.report import figures, numbers, paper, verdict
 from scenarios.report.ladder import BASES, MEANINGS, headline_model, ladder, predictive
 from scenarios.report.parameters import coverage, groups, known, left_out
 from scenarios.report.recordings import instruments
 from scenarios.report.results import Results, read
 
 _TEMPLATES = Path(__file__).parent.parent / "templates"
-_NAMES = ("errors", "traces", "parameters", "z_scores")
+_NAMES = ("paper", "errors", "traces", "parameters", "z_scores")
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,8 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
     before, after = predictive(steps, "nominal"), predictive(steps, model)
     has_truth = results.score is not None
     made = {
-        "errors": figures.boxes(results, steps),
+        "paper": paper.boxes(results, steps),
+        "errors": figures.boxes(results, paper.readable(steps)),
         "traces": figures.traces(results, steps),
         "parameters": figures.forest(found, has_truth),
         "z_scores": figures.z_scores(found, has_truth),
@@ -97,8 +98,22 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
         "coverage": coverage(found),
         "left_out": left_out(results.score, results.estimate),
         "picture": _png(results.picture),
+        **_models(results),
     }
     return values, {name: _drawing(name, drawn) for name, drawn in made.items() if drawn is not None}
+
+
+def _models(results: Results) -> dict[str, Any]:
+    """What the section on the paper's models shows beside its figure."""
+    suspension = results.estimate.suspension if results.estimate else None
+    return {
+        "protocols": results.evaluation.protocols,
+        "comparisons": results.evaluation.comparisons,
+        "joint_lines": paper.joint_lines(results),
+        "axis_lines": paper.axis_lines(results),
+        "suspension_sources": paper.suspension_sources(results),
+        "suspension_form": suspension.form if suspension else "",
+    }
 
 
 def _numbered(*parts: tuple[str, object]) -> dict[str, int]:

@@ -69,10 +69,36 @@ class Scored(Entry):
     status: str
 
 
+class Protocol(Entry):
+    """A model under a protocol; see `calibration.protocols`."""
+
+    protocol: str
+    model: str
+    base: str
+    encoder: str
+    constants_removed: bool
+    n: int
+    position_rmse_component_mm: float
+    orientation_rmse_component_deg: float
+
+
+class Compared(Entry):
+    """A row against another; see `calibration.comparison`."""
+
+    a: tuple[str, str]
+    b: tuple[str, str]
+    difference_mm: float
+    low_mm: float
+    high_mm: float
+    finding: str
+
+
 class Evaluation(Entry):
     """The whole of evaluation.json."""
 
     rows: tuple[Row, ...]
+    protocols: tuple[Protocol, ...] = ()
+    comparisons: tuple[Compared, ...] = ()
 
 
 class Score(Entry):
