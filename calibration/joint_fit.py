@@ -2,11 +2,10 @@
 
 Data: motor minus link reading of all calibration trials, rests included, the mean over the static calibration postures
 removed (the zero of readings). Inputs: motor encoders, the geometry's zeros, the nominal robot with its payload.
-Two choices, both by models that have not seen the trial they are judged on: a joint's degree in its own discrepancy
-(`joint_selection`), and whether the joint is corrected at all in the hand's error (`joint_hand`).
+Choices are judged by models that have not seen the trial they are judged on: which degrees are worth trying in the
+joint's own discrepancy (`joint_selection`), which of them, if any, in the hand's error (`joint_hand`).
 """
 
-import logging
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -15,11 +14,12 @@ from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel
 from calibration.joint_correction import JointModels
-from calibration.joint_hand import harmful
+from calibration.joint_hand import nearest_hand
 from calibration.joint_inputs import InputModel, input_model
 from calibration.joint_model import JointModel, Terms
 from calibration.joint_projection import RHO, at_limit
 from calibration.joint_samples import Samples, samples_of
+from calibration.joint_selection import candidates, worthwhile
 from calibration.joint_single import fit_joint, no_correction
 from calibration.joint_zero import link_zeros
 from calibration.recording import Trial
@@ -28,7 +28,6 @@ from calibration.verdict import Verdict
 
 STAGE = "joints"
 TERMS: Terms = "total"
-_log = logging.getLogger(__name__)
 
 
 def fit_joint_models(
@@ -51,20 +50,18 @@ def fit_joint_models(
         unknown = np.full(len(inputs.measured), np.nan)
         return JointModels(inputs, unknown, ()), (Verdict(STAGE, "missing", str(error)),)
     samples = _samples(urdf, description, trials, inputs, hand, zero)
-    models, predicted = {}, {}
-    for joint, of_joint in samples.items():
-        z = float(zero[inputs.measured.index(joint)])
-        models[joint], chosen = fit_joint(joint, of_joint, z, terms)
-        if chosen.degree is not None:
-            left_out = zip(of_joint, chosen.left_out, strict=True)
-            predicted[joint] = {s.trial_id: (s.t, p) for s, p in left_out}
-        _log.info("%s: degree %s of %s, score %.3f", joint, chosen.degree, terms, chosen.score)
-    worse = harmful(description, trials, robot, hand, predicted)
-    for joint in worse:
-        models[joint] = no_correction(joint, samples[joint], models[joint].zero, terms)
-    without = [joint for joint in hand.chain.joints if joint not in models]
-    found = tuple(models.values())
-    return JointModels(inputs, zero, found), tuple(_verdicts(found, worse, without))
+    options = {joint: worthwhile(candidates(of_joint, terms)) for joint, of_joint in samples.items()}
+    chosen = nearest_hand(description, trials, robot, hand, samples, options)
+    zeros = dict(zip(inputs.measured, map(float, zero), strict=True))
+    models = [
+        fit_joint(joint, of_joint, zeros[joint], terms, chosen[joint])
+        if joint in chosen
+        else no_correction(joint, of_joint, zeros[joint], terms)
+        for joint, of_joint in samples.items()
+    ]
+    without = [joint for joint in hand.chain.joints if joint not in samples]
+    worse = [joint for joint, found in options.items() if found and joint not in chosen]
+    return JointModels(inputs, zero, tuple(models)), tuple(_verdicts(models, worse, without))
 
 
 def _samples(
@@ -93,9 +90,7 @@ def _verdicts(models: Sequence[JointModel], worse: Sequence[str], without: Seque
     if used:
         yield Verdict(STAGE, "ok", f"{used[0].terms} terms; {'; '.join(_told(m) for m in used)}")
     if worse:
-        yield Verdict(
-            STAGE, "ok", f"not corrected, since the markers see the hand nearer without it: {', '.join(worse)}"
-        )
+        yield Verdict(STAGE, "ok", f"not corrected, since the hand comes no nearer to its markers: {', '.join(worse)}")
     none = [m.joint for m in models if m.degree is None and m.joint not in worse]
     if none:
         yield Verdict(STAGE, "ok", f"not corrected, since no degree predicts a trial left out: {', '.join(none)}")

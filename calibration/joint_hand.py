@@ -1,10 +1,11 @@
-"""Whether joint corrections bring the hand nearer to where the markers saw it, judged on calibration trials.
+"""Which joints to correct, and by which degree: what brings the hand nearest to where the markers saw it.
 
-    e = W (r - J_joint d)        r = log6(T_measured^-1 T_B_H(q_motor))   local twist of the hand [m, rad]
+    e = W (r - sum_joints J_joint d)        r = log6(T_measured^-1 T_B_H(q_motor))    local twist of the hand [m, rad]
 
-d are the discrepancies predicted by models of the other trials; W divides position and rotation by what the geometry
-alone leaves of them. A link encoder may be worse than the gear it watches (eccentricity): what its joint's model takes
-off then adds to the hand's error. The joint whose model costs most is dropped, again and again, while that helps.
+Judged on calibration trials; d are discrepancies predicted by models that have not seen the trial. W divides position
+and rotation by what the geometry alone leaves of them. From no correction at all, the change of one joint's degree that
+lowers |e|^2 most is made, again and again, while it lowers it by a hundredth. A link encoder may be worse than the gear
+it watches (eccentricity): what its joint's model takes off then adds to the hand's error, and the joint stays as read.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,62 +15,83 @@ import numpy as np
 
 from calibration.clock import Clock
 from calibration.hand import HandModel
+from calibration.joint_samples import Samples
+from calibration.joint_selection import Candidate
 from calibration.map_fit import linearised
 from calibration.markers import base_body, hand_body
-from calibration.postures import read_passing
+from calibration.postures import Postures, read_passing
 from calibration.recording import Trial
 from calibration.schema import Description
 
 _SPACING = 0.2  # [s] between the samples judged
-_HELPS = 0.99  # dropping a joint must bring the cost below this share of what it was [-]
+_HELPS = 0.99  # a change must bring |e|^2 below this share of what it was [-]
 
-Predicted = Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]]
-"""Joint -> trial id -> times (n,) [s, robot clock] and predicted discrepancies (n,) [rad]."""
-
-
-def harmful(
-    description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, predicted: Predicted
-) -> tuple[str, ...]:
-    """Joints whose left-out corrections make the hand's error larger; none where no trial shows the hand."""
-    e, moved = hand_errors(description, trials, robot, hand, predicted)
-    kept, dropped = list(predicted), []
-    while kept and len(e):
-        left = e - sum(moved[joint] for joint in kept)
-        cost = {joint: float(((left + moved[joint]) ** 2).sum()) for joint in kept}
-        worst = min(kept, key=lambda joint: cost[joint])
-        if cost[worst] >= _HELPS * float((left**2).sum()):
-            break
-        kept.remove(worst)
-        dropped.append(worst)
-    return tuple(dropped)
+Options = Mapping[str, Sequence[Candidate]]
+"""Joint -> degrees worth trying, each with its left-out predictions of the joint's samples."""
 
 
-def hand_errors(
-    description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, predicted: Predicted
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """W r (n, 6) [-], and of every joint W J_joint d (n, 6) [-]."""
-    pairs = [(trial, _corrected(trial, predicted)) for trial in trials if _is_seen(description, trial)]
-    if not pairs:
-        return np.zeros((0, 6)), {joint: np.zeros((0, 6)) for joint in predicted}
-    raw, less = (read_passing(description, side, robot, _SPACING) for side in zip(*pairs, strict=True))
+def nearest_hand(
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock,
+    hand: HandModel,
+    samples: Mapping[str, Sequence[Samples]],
+    options: Options,
+) -> dict[str, Candidate]:
+    """Degree of every joint that is to be corrected; the lowest option of each where no trial shows the hand."""
+    seen = [trial for trial in trials if _is_seen(description, trial)]
+    if not seen:
+        return {joint: found[0] for joint, found in options.items() if found}
+    raw = read_passing(description, seen, robot, _SPACING)
     at = linearised(hand, hand.theta, raw)
     size = np.sqrt((at.r.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
     W = np.repeat(1.0 / np.maximum(size, np.finfo(float).tiny), 3)
-    d, chain = raw.q - less.q, hand.chain
-    columns = {joint: (chain.joints.index(joint), chain.measured.index(joint)) for joint in predicted}
-    return W * at.r, {joint: W * at.J_joint[:, :, j] * d[:, [q]] for joint, (j, q) in columns.items()}
+    moved: dict[tuple[str, int], np.ndarray] = {}
+    for layer in range(max(map(len, options.values()), default=0)):
+        present = {joint: found[layer] for joint, found in options.items() if layer < len(found)}
+        d = _predicted(description, seen, robot, raw, samples, present)
+        for joint in present:
+            column = hand.chain.joints.index(joint)
+            moved[joint, layer] = W * at.J_joint[:, :, column] * d[:, [hand.chain.measured.index(joint)]]
+    return {joint: options[joint][layer] for joint, layer in _descend(W * at.r, moved)}
+
+
+def _descend(r: np.ndarray, moved: Mapping[tuple[str, int], np.ndarray]) -> list[tuple[str, int]]:
+    """Choices, at most one of each joint, that bring |r - sum of what they move|^2 down, one change at a time."""
+    chosen: dict[str, int] = {}
+    cost = float((r**2).sum())
+    while True:
+        trials = []
+        for joint, layer in moved:
+            other = {k: v for k, v in chosen.items() if k != joint}
+            trials += [other, other | {joint: layer}]
+        costs = [float(((r - sum((moved[k] for k in t.items()), np.zeros(1))) ** 2).sum()) for t in trials]
+        if not costs or min(costs) >= _HELPS * cost:
+            return [key for key in moved if chosen.get(key[0]) == key[1]]
+        cost, chosen = min(costs), trials[int(np.argmin(costs))]
+
+
+def _predicted(
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock,
+    raw: Postures,
+    samples: Mapping[str, Sequence[Samples]],
+    chosen: Mapping[str, Candidate],
+) -> np.ndarray:
+    """Left-out predictions d (n, n_measured) [rad] at the postures `raw` that were passed through."""
+    less = []
+    for trial in trials:
+        q = np.array(trial.q_motor)
+        for joint, candidate in chosen.items():
+            for s, d in zip(samples[joint], candidate.left_out, strict=True):
+                if s.trial_id == trial.id:
+                    q[:, trial.joint.index(joint)] -= np.interp(trial.t_robot, s.t, d)
+        less.append(replace(trial, q_motor=q))
+    return raw.q - read_passing(description, less, robot, _SPACING).q
 
 
 def _is_seen(description: Description, trial: Trial) -> bool:
     """Whether the trial records three markers of the base and of the hand."""
     bodies = (base_body(description), hand_body(description))
     return all(sum(m.name in trial.marker for m in body.markers) >= 3 for body in bodies)
-
-
-def _corrected(trial: Trial, predicted: Predicted) -> Trial:
-    """The trial with the predicted discrepancies taken off its motor readings."""
-    q = np.array(trial.q_motor)
-    for joint, of_trials in predicted.items():
-        if trial.id in of_trials:
-            q[:, trial.joint.index(joint)] -= np.interp(trial.t_robot, *of_trials[trial.id])
-    return replace(trial, q_motor=q)

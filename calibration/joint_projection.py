@@ -17,7 +17,7 @@ from scipy.special import expit
 
 RHO = (2.0, 1000.0)  # [s/rad] limits of the search
 _GRID = 8
-_RANK = 1e-7  # smallest over largest singular value of the scaled design [-]
+RANK = 1e-7  # smallest over largest singular value of the scaled design [-]
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def project(problem: Problem, rho: float) -> Projection:
     """Best coefficients at rho and the residuals' derivative; of undetermined ones the smallest."""
     M, dM = problem.design(rho), problem.design_slope(rho)
     U, s, Vt = np.linalg.svd(M, full_matrices=False)
-    kept = s > _RANK * s[0]
+    kept = s > RANK * s[0]
     U, s, Vt = U[:, kept], s[kept], Vt[kept]
     x = Vt.T @ ((U.T @ problem.y) / s)
     r = problem.y - M @ x
@@ -111,6 +111,6 @@ def clustered_covariance(J: np.ndarray, r: np.ndarray, groups: Sequence[slice]) 
     H^-1 (sum_g J_g' r_g r_g' J_g) H^-1 G / (G - 1),  H = J' J.  Reference: Liang, Zeger, Biometrika 1986.
     """
     scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
-    pinv = np.linalg.pinv(J / scale, rcond=_RANK)
+    pinv = np.linalg.pinv(J / scale, rcond=RANK)
     scores = np.array([pinv[:, g] @ r[g] for g in groups])
     return (scores.T @ scores) * len(groups) / max(1, len(groups) - 1) / scale / scale[:, None]

@@ -1,27 +1,26 @@
-"""The degree of a joint model, by leaving one trial out.
+"""The degrees of a joint model that predict a trial left out.
 
     score = sum_trials |y_t - model fitted to the other trials (x_t)|^2 / sum_trials |y_t|^2
 
 Each left-out trial is asked inside the others' domain, rho is theirs too. One QR per trial and rho serves all folds
-and degrees: R_t' R_t = [M_t, y_t]' [M_t, y_t], and the lower degrees are columns of the highest one.
-The lowest degree whose score is within a tenth of the best is taken: what a higher one gains on a handful of trials
-does not carry over. The choice "none" scores 1 and stays unless a degree does clearly better.
+and degrees: R_t' R_t = [M_t, y_t]' [M_t, y_t], and the lower degrees are columns of the highest one. A degree whose
+coefficients the trials do not all fix is no candidate: a joint that never moves shows both flanks at once, and neither.
+The choice "none" scores 1 and stays unless a degree does clearly better.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
 
 from calibration.joint_basis import Basis, basis_of, not_zero
 from calibration.joint_model import Exponent, Terms, exponents
-from calibration.joint_projection import Problem, rho_grid
+from calibration.joint_projection import RANK, Problem, rho_grid
 from calibration.joint_samples import Samples, box, pooled
 
 HIGHEST = 5
 _WORTH = 0.95  # a model that leaves more than this share of the mean square is not worth its coefficients [-]
-_TIE = 1.1  # scores within this factor of the best are as good [-]
+_TIE = 1.3  # scores within this factor of the best are as good: a handful of trials tells no better [-]
 
 
 @dataclass(frozen=True)
@@ -50,20 +49,34 @@ def candidates(samples: Sequence[Samples], terms: Terms, highest: int = HIGHEST)
     if not kept or len(samples) < 2 or total == 0.0:
         return tuple(found)
     basis = basis_of(kept, box(whole))
-    factors = {float(rho): [_factor(basis, s, rho) for s in samples] for rho in rho_grid()}
-    for degree in range(highest + 1):
-        powers = tuple(p for p in exponents(terms, degree) if p in kept)
-        if powers and powers != found[-1].powers:
-            left_out = tuple(_left_out(basis, powers, samples, factors, k) for k in range(len(samples)))
-            missed = sum(float(((s.y - p) ** 2).sum()) for s, p in zip(samples, left_out, strict=True))
-            found.append(Candidate(degree, powers, left_out, missed / total))
+    sets = [tuple(p for p in exponents(terms, degree) if p in kept) for degree in range(highest + 1)]
+    factors = [[_factor(basis, s, rho) for rho in rho_grid()] for s in samples]
+    new = (d for d, powers in enumerate(sets) if powers and (d == 0 or powers != sets[d - 1]))
+    degrees = [d for d in new if _is_fixed(basis, sets[d], factors)]
+    folds = [_left_out(basis, [sets[d] for d in degrees], samples, factors, k) for k in range(len(samples))]
+    for degree, left_out in zip(degrees, zip(*folds, strict=True), strict=True):
+        missed = sum(float(((s.y - p) ** 2).sum()) for s, p in zip(samples, left_out, strict=True))
+        found.append(Candidate(degree, sets[degree], left_out, missed / total))
     return tuple(found)
 
 
-def choose(found: Sequence[Candidate]) -> Candidate:
-    """The lowest degree nearly as good as the best; "none", which comes first, unless that is clearly better."""
+def worthwhile(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Degrees nearly as good as the best, lowest first; empty where "none" is no worse."""
     best = min(c.score for c in found)
-    return next(c for c in found[1:] if c.score <= _TIE * best) if best < _WORTH else found[0]
+    return tuple(c for c in found[1:] if c.score <= _TIE * best) if best < _WORTH else ()
+
+
+def _is_fixed(basis: Basis, powers: tuple[Exponent, ...], factors: Sequence[Sequence[np.ndarray]]) -> bool:
+    """Whether all trials together fix every coefficient, at the middle of the search for rho."""
+    R = np.vstack([of_trial[len(of_trial) // 2] for of_trial in factors])
+    s = np.linalg.svd(R[:, _columns(basis, powers)], compute_uv=False)
+    return bool(s[-1] > RANK * s[0])
+
+
+def _columns(basis: Basis, powers: tuple[Exponent, ...]) -> list[int]:
+    """Columns of the design that belong to powers, right flank then left."""
+    own = [basis.powers.index(p) for p in powers]
+    return own + [len(basis.powers) + c for c in own]
 
 
 def _factor(basis: Basis, samples: Samples, rho: float) -> np.ndarray:
@@ -73,20 +86,21 @@ def _factor(basis: Basis, samples: Samples, rho: float) -> np.ndarray:
 
 
 def _left_out(
-    basis: Basis, powers: tuple[Exponent, ...], samples: Sequence[Samples], factors: dict[float, list], k: int
-) -> np.ndarray:
-    """Discrepancy (n,) of trial k predicted by the model of the others."""
-    which = [basis.powers.index(p) for p in powers]
-    columns = which + [len(basis.powers) + w for w in which]
-    best, x_best, rho_best = np.inf, np.zeros(len(columns)), 1.0
-    for rho, R in factors.items():
-        stacked = np.vstack([R_t for t, R_t in enumerate(R) if t != k])
-        x = np.linalg.lstsq(stacked[:, columns], stacked[:, -1], rcond=1e-7)[0]
-        cost = float(((stacked[:, -1] - stacked[:, columns] @ x) ** 2).sum())
-        if cost < best:
-            best, x_best, rho_best = cost, x, rho
-    domain = box(pooled([s for t, s in enumerate(samples) if t != k]))
-    s, n = samples[k], len(which)
-    phi = basis(np.clip(s.theta, *domain[0]), np.clip(s.tau, *domain[1]))[:, which]
-    S = expit(rho_best * s.velocity)
-    return S * (phi @ x_best[:n]) + (1.0 - S) * (phi @ x_best[n:])
+    basis: Basis,
+    sets: Sequence[tuple[Exponent, ...]],
+    samples: Sequence[Samples],
+    factors: Sequence[Sequence[np.ndarray]],
+    k: int,
+) -> list[np.ndarray]:
+    """Discrepancy (n,) of trial k by the models of the others, one for each set of powers."""
+    others = [t for t in range(len(samples)) if t != k]
+    best = [(np.inf, 0.0, np.zeros(0))] * len(sets)
+    for rho, of_others in zip(rho_grid(), zip(*(factors[t] for t in others), strict=True), strict=True):
+        R = np.asarray(np.linalg.qr(np.vstack(of_others), mode="r"))
+        for which, powers in enumerate(sets):
+            M = R[:, _columns(basis, powers)]
+            x = np.linalg.lstsq(M, R[:, -1], rcond=RANK)[0]
+            best[which] = min(best[which], (float(((R[:, -1] - M @ x) ** 2).sum()), float(rho), x), key=lambda b: b[0])
+    domain, s = box(pooled([samples[t] for t in others])), samples[k]
+    whole = Problem(basis(np.clip(s.theta, *domain[0]), np.clip(s.tau, *domain[1])), s.velocity, s.y)
+    return [whole.design(rho)[:, _columns(basis, powers)] @ x for powers, (_, rho, x) in zip(sets, best, strict=True)]

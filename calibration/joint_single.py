@@ -1,8 +1,4 @@
-"""The printed model of one joint from its samples: degree by leaving one trial out, then A, B and rho.
-
-A degree whose coefficients the samples do not all fix is no candidate: a joint that never moves shows both flanks at
-once, and neither.
-"""
+"""The printed model of one joint from its samples, its degree chosen: A, B and rho with their covariance."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,39 +6,24 @@ from itertools import pairwise
 
 import numpy as np
 
-from calibration.errors import NotEnoughData
 from calibration.joint_basis import basis_of, not_zero
 from calibration.joint_model import JointModel, Quality, Terms, exponents
 from calibration.joint_projection import Problem, clustered_covariance, search
 from calibration.joint_samples import Samples, box, pooled
-from calibration.joint_selection import HIGHEST, Candidate, candidates, choose
+from calibration.joint_selection import HIGHEST, Candidate
 
 
-def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms) -> tuple[JointModel, Candidate]:
-    """The model of a joint from its samples, trial by trial, and the candidate that was chosen."""
-    found = candidates(samples, terms)
-    while True:
-        chosen = choose(found)
-        try:
-            return fit_degree(joint, samples, zero, terms, chosen), chosen
-        except NotEnoughData:
-            found = tuple(c for c in found if c is not chosen)
-
-
-def fit_degree(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:
-    """The model of a joint with a degree that was chosen.
-
-    Raises:
-        NotEnoughData: The samples do not fix its coefficients.
-    """
+def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:
+    """The model of a joint with a degree that was chosen; "none" where the samples do not fix its coefficients."""
+    none = no_correction(joint, samples, zero, terms)
     if chosen.degree is None:
-        return no_correction(joint, samples, zero, terms)
+        return none
     whole, powers, k = pooled(samples), chosen.powers, len(chosen.powers)
     basis = basis_of(powers, box(whole))
     problem = Problem(basis(whole.theta, whole.tau), whole.velocity, whole.y)
     found = search(problem)
     if not found.full_rank:
-        raise NotEnoughData(f"{joint}: the trials do not fix the {2 * k} coefficients of degree {chosen.degree}")
+        return none
     J = np.column_stack([problem.design_slope(found.rho) @ found.x, problem.design(found.rho)])
     stops = np.cumsum([0, *(len(s) for s in samples)])
     C = clustered_covariance(J, found.r, [slice(a, b) for a, b in pairwise(stops)])
@@ -51,7 +32,7 @@ def fit_degree(joint: str, samples: Sequence[Samples], zero: float, terms: Terms
     values = to_printed @ np.append(found.rho, found.x)
     missed = np.concatenate([s.y - p for s, p in zip(samples, chosen.left_out, strict=True)])
     return replace(
-        no_correction(joint, samples, zero, terms),
+        none,
         degree=chosen.degree,
         powers=powers,
         dropped=tuple(p for p in exponents(terms, chosen.degree) if p not in powers),
