@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help demo test check slow bench bench-peer clean
+.PHONY: help demo test check slow bench clean
 
 help:
 	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
@@ -13,7 +13,6 @@ help:
 	@echo "make check       format, lint, types"
 	@echo "make slow        the tests that take minutes"
 	@echo "make bench       the benchmarks"
-	@echo "make bench-peer  the benchmarks against other programs"
 	@echo "make clean       remove .venv, caches and built files; runs/ stays"
 
 demo: $(READY)
@@ -32,9 +31,6 @@ slow: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench
-
-bench-peer: $(READY)
-	$(BIN)/python -m pytest -q -s -m "" -o python_files='peer_*.py' tests/bench
 
 $(READY): requirements.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \

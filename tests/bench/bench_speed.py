@@ -1,0 +1,54 @@
+"""Speed, as ratios measured in one run: `make bench` prints them and writes runs/bench.json."""
+
+import json
+import time
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+import mjcf
+from scenarios import load
+from twin import motions
+from twin.build import build
+from twin.campaign import laboratory, measure
+from twin.simulate import _controls, _initial_state, _interpolated, simulate
+
+
+def seconds(function, repeats: int = 3) -> float:
+    """Processor time of the fastest of some calls [s]."""
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        function()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def test_speed_of_the_twin():
+    scenario = load("humanoids2024")
+    lab = laboratory(scenario.twin, 0)
+    path = motions.VALIDATION_SWINGS["xyz"]
+    motion = motions.swing("xyz", "validation", "swing", path, 20.0, scenario.twin.campaign)
+    model = lab.twin.model
+    control = _controls(model, _interpolated(motion.command, model.opt.timestep))
+    first = _initial_state(model, mujoco.MjData(model), motion.command[0], lab.T_lab_base)
+    states = simulate(lab.twin, motion, lab.T_lab_base)
+    bare = seconds(lambda: rollout.rollout(model, mujoco.MjData(model), first[None], control[None]))
+    whole = seconds(lambda: simulate(lab.twin, motion, lab.T_lab_base))
+    figures = {
+        "simulated_seconds_per_second_one_core": len(control) * model.opt.timestep / whole,
+        "simulate_over_bare_rollout_speed": bare / whole,
+        "steps_per_second": len(control) / bare,
+        "model_build_ms": 1e3 * seconds(lambda: build(mjcf.spec(), lab.robot.defects, lab.twin.links)),
+        "instruments_seconds_per_simulated_minute": seconds(lambda: measure(lab, motion, states, 100.0))
+        * 60.0
+        / motion.duration,
+    }
+    Path("runs").mkdir(exist_ok=True)
+    Path("runs/bench.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    print()
+    for name, value in figures.items():
+        print(f"{name:45s} {value:10.3g}")
+    assert all(np.isfinite(v) and v > 0.0 for v in figures.values())
