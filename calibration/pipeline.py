@@ -152,7 +152,9 @@ def _calibrate_joints(work: Work) -> Work:
         joint_models=found.models,
         link_zero=tuple(map(float, found.zero)),
     )
-    return replace(work, estimate=grown) if found.models else work
+    if not found.models:
+        grown = replace(work.estimate, verdicts=(*work.estimate.verdicts, *said))
+    return replace(work, estimate=grown)
 
 
 _RUN: dict[str, Callable[[Work], Work]] = {
