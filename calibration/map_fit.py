@@ -14,12 +14,13 @@ import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from scipy.optimize import minimize
 
 from calibration.hand import HandModel
 from calibration.parameters import ParameterSet
 from calibration.postures import Postures
+from calibration.se3 import inverse
+from calibration.twists import jlog6, log6
 
 _OUTER, _NEWTON = 25, 50
 _PROMISE = 1e-10  # Gauss-Newton stops when a step promises a smaller decrease of the cost [-]: 1e-5 sigma
@@ -117,9 +118,8 @@ def fit_weighted(model: HandModel, parameters: ParameterSet, postures: Postures,
 def linearised(model: HandModel, theta: np.ndarray, postures: Postures) -> Linearised:
     """Residuals and derivatives at theta (p,), p = 12 or all."""
     found = model.with_theta(theta).poses_and_derivatives(postures.q)
-    errors = [pin.SE3(a).actInv(pin.SE3(b)) for a, b in zip(postures.T_base_hand, found.T, strict=True)]
-    J_log = np.array([pin.Jlog6(error) for error in errors])
-    r = np.array([pin.log6(error).vector for error in errors])
+    r = log6(inverse(postures.T_base_hand) @ found.T)
+    J_log = jlog6(r)
     return Linearised(theta, r, J_log @ found.J[:, :, : len(theta)], J_log @ found.J_joint)
 
 

@@ -8,12 +8,15 @@ Joints that are not measured stay at their neutral position. Nothing here edits 
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 
 from calibration.errors import InputError, NoSuchElement, ShapeError
+from calibration.kinematics import Path, path_of
 from calibration.schema import Description
+from calibration.twists import exp6, jexp6
 
 
 @dataclass(frozen=True)
@@ -36,96 +39,103 @@ class Chain:
     """The measured joints between two frames of a robot.
 
     Attributes:
-        model: All measured joints, the others locked at neutral, with `xi` applied.
+        nominal: All measured joints, the others locked at neutral.
         measured: Names of the measured joints, the columns of every `q`.
         joints: Names of those on the way from base to tool, base first.
         base_frame: Name of the frame poses are expressed in.
         tool_frame: Name of the frame whose pose is meant.
-        xi: (k, 6) placement twists already applied [m, rad].
+        xi: (k, 6) placement twists [m, rad].
+        drawn: The nominal path from base to tool.
     """
 
-    model: pin.Model
+    nominal: pin.Model
     measured: tuple[str, ...]
     joints: tuple[str, ...]
     base_frame: str
     tool_frame: str
     xi: np.ndarray
+    drawn: Path
 
     @property
     def columns(self) -> list[int]:
         """Column in `q` of each joint of the chain."""
         return [self.measured.index(name) for name in self.joints]
 
+    @cached_property
+    def model(self) -> pin.Model:
+        """The nominal model with the placement twists applied."""
+        model = self.nominal.copy()
+        for name, xi in zip(self.joints, self.xi, strict=True):
+            i = model.getJointId(name)
+            model.jointPlacements[i] = model.jointPlacements[i] * pin.exp6(xi)
+        return model
+
+    @cached_property
+    def path(self) -> Path:
+        """The path from base to tool with the placement twists applied."""
+        return self.drawn.moved(np.concatenate([exp6(self.xi), np.eye(4)[None]]))
+
     def with_placements(self, xi: np.ndarray) -> "Chain":
         """The chain with placement twists `xi` (k, 6) [m, rad] instead of those it has."""
         if xi.shape != self.xi.shape:
             raise ShapeError("xi", xi.shape, self.xi.shape)
-        model = self.model.copy()
-        for name, old, new in zip(self.joints, self.xi, xi, strict=True):
-            i = model.getJointId(name)
-            model.jointPlacements[i] = model.jointPlacements[i] * pin.exp6(old).inverse() * pin.exp6(new)
-        return replace(self, model=model, xi=np.array(xi))
+        return replace(self, xi=np.array(xi))
 
     def poses(self, q: np.ndarray, frame: str | None = None) -> np.ndarray:
         """T_base_frame (n, 4, 4) at q (n, n_measured) [rad, m]; the tool frame where none is named."""
-        data, base, end = self.model.createData(), self._frame(self.base_frame), self._frame(frame or self.tool_frame)
-        T = np.empty((len(q), 4, 4))
-        for k, q_k in enumerate(self.configurations(q)):
-            pin.forwardKinematics(self.model, data, q_k)
-            T_base = pin.updateFramePlacement(self.model, data, base)
-            T[k] = T_base.actInv(pin.updateFramePlacement(self.model, data, end)).homogeneous
-        return T
+        self._check(q)
+        if frame is None:
+            return self.path.placed(q[:, self.columns]).T
+        end = self._frame(frame)
+        names = [self.model.names[i] for i in self.model.supports[self.model.frames[end].parentJoint] if i != 0]
+        path = path_of(self.model, self._frame(self.base_frame), end)
+        return path.placed(q[:, [self.measured.index(name) for name in names]]).T
 
     def poses_and_derivatives(self, q: np.ndarray) -> ChainPoses:
         """Poses of the tool frame with d(pose)/d(xi) and d(pose)/dq, at q (n, n_measured) [rad, m]."""
-        model, data, tool = self.model, self.model.createData(), self._frame(self.tool_frame)
-        ids = [model.getJointId(name) for name in self.joints]
-        right = [pin.Jexp6(pin.Motion(xi)) for xi in self.xi]
-        J_placement = np.empty((len(q), 6, 6 * len(ids)))
-        for row, q_row in enumerate(self.configurations(q)):
-            # The regressor reads data.oMf: it is garbage unless the frames were updated first.
-            pin.forwardKinematics(model, data, q_row)
-            pin.updateFramePlacements(model, data)
-            regressor = pin.computeFrameKinematicRegressor(model, data, tool, pin.LOCAL)
-            for j, (i, J_exp) in enumerate(zip(ids, right, strict=True)):
-                J_placement[row, :, 6 * j : 6 * j + 6] = regressor[:, 6 * (i - 1) : 6 * i] @ J_exp
-        return ChainPoses(self.poses(q), J_placement, self.joint_jacobians(q))
+        self._check(q)
+        placed = self.path.placed(q[:, self.columns])
+        G, k = placed.to_end(), len(self.joints)
+        J = np.concatenate([G[:, :, i + 1] @ jexp6(xi) for i, xi in enumerate(self.xi)], axis=2)
+        J_joint = np.einsum("nakb,kb->nak", G[:, :, 1:], self.path.twists)
+        return ChainPoses(placed.T, J.reshape(len(q), 6, 6 * k), J_joint)
 
     def joint_jacobians(self, q: np.ndarray) -> np.ndarray:
         """Derivatives of the tool's pose by joint position (n, 6, k), local twists, at q (n, n_measured)."""
-        model, data, tool = self.model, self.model.createData(), self._frame(self.tool_frame)
-        columns = [model.joints[model.getJointId(name)].idx_v for name in self.joints]
-        rows = [pin.computeFrameJacobian(model, data, x, tool, pin.LOCAL)[:, columns] for x in self.configurations(q)]
-        return np.array(rows).reshape(len(q), 6, len(columns))
+        self._check(q)
+        return np.einsum("nakb,kb->nak", self.path.placed(q[:, self.columns]).to_end()[:, :, 1:], self.path.twists)
 
     def configurations(self, q: np.ndarray) -> np.ndarray:
         """Readings q (n, n_measured) in the model's own order and format, (n, nq)."""
-        if q.ndim != 2 or q.shape[1] != len(self.measured):
-            raise ShapeError("q", q.shape, ("n", len(self.measured)))
-        order = [self.measured.index(name) for name in list(self.model.names)[1:]]
-        neutral = pin.neutral(self.model)
-        if self.model.nq == self.model.nv:
+        self._check(q)
+        order = [self.measured.index(name) for name in list(self.nominal.names)[1:]]
+        neutral = pin.neutral(self.nominal)
+        if self.nominal.nq == self.nominal.nv:
             return neutral + q[:, order]
-        return np.array([pin.integrate(self.model, neutral, row) for row in q[:, order]])
+        return np.array([pin.integrate(self.nominal, neutral, row) for row in q[:, order]])
 
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper joint limits of `measured` [rad, m], -inf and inf for a continuous joint."""
         lower, upper = np.full(len(self.measured), -np.inf), np.full(len(self.measured), np.inf)
         for column, name in enumerate(self.measured):
-            joint = self.model.joints[self.model.getJointId(name)]
+            joint = self.nominal.joints[self.nominal.getJointId(name)]
             if joint.nq == 1:
-                lower[column] = self.model.lowerPositionLimit[joint.idx_q]
-                upper[column] = self.model.upperPositionLimit[joint.idx_q]
+                lower[column] = self.nominal.lowerPositionLimit[joint.idx_q]
+                upper[column] = self.nominal.upperPositionLimit[joint.idx_q]
         return lower, upper
 
     def is_prismatic(self, joint: str) -> bool:
         """Whether a joint's reading is a length."""
-        return "JointModelP" in self.model.joints[self.model.getJointId(joint)].shortname()
+        return "JointModelP" in self.nominal.joints[self.nominal.getJointId(joint)].shortname()
+
+    def _check(self, q: np.ndarray) -> None:
+        if q.ndim != 2 or q.shape[1] != len(self.measured):
+            raise ShapeError("q", q.shape, ("n", len(self.measured)))
 
     def _frame(self, name: str) -> int:
-        frame_id = self.model.getFrameId(name)
-        if frame_id == self.model.nframes:
-            raise NoSuchElement("frame", name, [f.name for f in self.model.frames])
+        frame_id = self.nominal.getFrameId(name)
+        if frame_id == self.nominal.nframes:
+            raise NoSuchElement("frame", name, [f.name for f in self.nominal.frames])
         return frame_id
 
 
@@ -166,5 +176,8 @@ def chain_of_frames(urdf: str, measured: tuple[str, ...], base_frame: str, tool_
     joints = tuple(model.names[i] for i in model.supports[tool.parentJoint] if i != 0)
     if not joints:
         raise InputError("dataset.json", f"no measured joint between {base.name!r} and tool_frame {tool.name!r}")
-    xi = np.zeros((len(joints), 6))
-    return Chain(model, measured, joints, base.name, tool.name, xi)
+    several = [name for name in joints if model.joints[model.getJointId(name)].nv != 1]
+    if several:
+        raise InputError("nominal.urdf", f"joints {several} have more than one degree of freedom; none of a chain may")
+    drawn = path_of(model, model.getFrameId(base.name), model.getFrameId(tool.name))
+    return Chain(model, measured, joints, base.name, tool.name, np.zeros((len(joints), 6)), drawn)
