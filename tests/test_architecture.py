@@ -229,7 +229,7 @@ import importlib, sys
 def watch(event, arguments):
     if event == "open" and isinstance(arguments[0], str):
         name = arguments[0]
-        if name.startswith({str(ROOT)!r}) and "/.venv/" not in name and not name.endswith((".py", ".pyc")):
+        if name.startswith({str(ROOT) + "/"!r}) and "/.venv/" not in name and not name.endswith((".py", ".pyc")):
             if ".pyc." not in name:
                 print("opened", name)
 sys.addaudithook(watch)
