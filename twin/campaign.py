@@ -36,6 +36,7 @@ from twin.randomness import generator
 from twin.schedule import schedule
 from twin.simulate import States, simulate
 from twin.truth import TruthTrial
+from twin.uncertain import drawn
 
 Progress = Callable[[str, float], None]
 _EPOCH = 100.0  # [s] on the mocap clock when the first trial starts
@@ -46,7 +47,7 @@ class Laboratory:
     """One robot in its laboratory.
 
     Attributes:
-        config: What the scenario says.
+        config: What the scenario says, its uncertain values drawn.
         seed: Root of every random stream.
         robot: The drawn robot.
         twin: Its model.
@@ -62,7 +63,7 @@ class Laboratory:
 
 def laboratory(config: TwinConfig, seed: int) -> Laboratory:
     """Draw a robot and put it on its plate."""
-    spec = mjcf.spec()
+    config, spec = drawn(config, seed), mjcf.spec()
     robot = draw(config, spec.compile(), seed)
     twin = build(spec, robot.defects, sorted({c.link for c in robot.clusters} | {BASE}), config.timestep)
     x, y, yaw = config.base.pose

@@ -1,91 +1,32 @@
 """What a scenario says about a robot and its laboratory: magnitudes, widths, motions and instruments.
 
 SI units. Every field is validated here once; nothing downstream checks it again. Magnitudes of one robot are values,
-what differs between robots is drawn: placements from zero-mean normals, offsets and gaps within +-spread of theirs.
+what differs between robots is drawn: placements from zero-mean normals, offsets and gaps within +-spread of theirs, and
+any value that is given as a distribution (`twin.uncertain`).
 """
 
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Angle = Annotated[float, Field(ge=-0.5, le=0.5)]
-Count = Annotated[int, Field(ge=1)]
-Vector3 = tuple[float, float, float]
-_strict = ConfigDict(extra="forbid", allow_inf_nan=False)
+from twin.config_arm import ArmJoint, LinkEncoders, Torso
+from twin.config_values import (
+    STRICT,
+    Count,
+    FixedNonNegative,
+    FixedPositive,
+    NonNegative,
+    Point,
+    Positive,
+    Value,
+    Vector3,
+)
+from twin.uncertain import DRAWN
 
 
-@dataclass(frozen=True, config=_strict)
-class ArmJoint:
-    """Drive train and encoders of one arm joint.
-
-    Attributes:
-        offset: Motor encoder's reading at true zero [rad].
-        gap: Total play [rad].
-        stiffness: Mesh [N.m/rad].
-        damping: Mesh [N.m.s/rad].
-        coulomb: Link-side friction [N.m].
-        viscous: Link-side friction [N.m.s/rad].
-        rotor_inertia: Reflected to the joint [kg.m2].
-        servo_stiffness: Position gain [N.m/rad].
-        quantum: Of the motor encoder, at the joint [rad].
-        torque_per_ampere: Of the drive, at the joint [N.m/A].
-    """
-
-    offset: Angle
-    gap: Annotated[float, Field(ge=0.0, le=0.1)]
-    stiffness: Annotated[float, Field(ge=100.0, le=50e3)]
-    damping: NonNegative
-    coulomb: NonNegative
-    viscous: NonNegative
-    rotor_inertia: Annotated[float, Field(ge=0.01)]
-    servo_stiffness: Positive
-    quantum: Positive
-    torque_per_ampere: Positive
-
-
-@dataclass(frozen=True, config=_strict)
-class LinkEncoders:
-    """Absolute encoders on the link side, standard deviations of what is drawn.
-
-    Attributes:
-        offset: Zero [rad].
-        once: Amplitude once per turn [rad].
-        twice: Amplitude twice per turn [rad].
-        quantum: Step of the reading [rad].
-    """
-
-    offset: NonNegative
-    once: NonNegative
-    twice: NonNegative
-    quantum: Positive
-
-
-@dataclass(frozen=True, config=_strict)
-class Torso:
-    """The torso lift, driven without play, and its column's bending.
-
-    Attributes:
-        quantum: Of the motor encoder [m].
-        force_per_ampere: [N/A].
-        servo_stiffness: [N/m].
-        rotor_inertia: Reflected [kg].
-        bending_stiffness: About x and y [N.m/rad].
-        bending_damping: [N.m.s/rad].
-    """
-
-    quantum: Positive
-    force_per_ampere: Positive
-    servo_stiffness: Positive
-    rotor_inertia: Positive
-    bending_stiffness: Annotated[float, Field(ge=1e3)]
-    bending_damping: NonNegative
-
-
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class WheelType:
     """How one type of wheel stands.
 
@@ -104,7 +45,7 @@ class WheelType:
     friction: NonNegative
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class Base:
     """How the base stands.
 
@@ -118,10 +59,10 @@ class Base:
     drive: WheelType
     caster_front: WheelType
     caster_back: WheelType
-    pose: Vector3
+    pose: Point
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class Load:
     """The payload, declared to the laboratory as it stands here.
 
@@ -132,13 +73,13 @@ class Load:
         com_error: Standard deviation of the true centre of mass, per axis [m].
     """
 
-    mass: Annotated[float, Field(ge=0.0, le=3.0)]
+    mass: Annotated[float, Field(ge=0.0, le=3.0), DRAWN]
     com: Vector3
     size: tuple[Positive, Positive, Positive]
     com_error: NonNegative
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class Widths:
     """What differs from one robot of the series to the next, standard deviations unless said.
 
@@ -152,12 +93,12 @@ class Widths:
 
     placement_translation: NonNegative
     placement_rotation: NonNegative
-    link_mass: Annotated[float, Field(ge=0.0, le=0.3)]
+    link_mass: Annotated[float, Field(ge=0.0, le=0.3), DRAWN]
     link_com: NonNegative
-    spread: Annotated[float, Field(ge=0.0, le=0.9)] = 0.0
+    spread: Annotated[float, Field(ge=0.0, le=0.9), DRAWN] = 0.0
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class MarkerBody:
     """A marker cluster: where it should be, and how far off it is mounted.
 
@@ -176,15 +117,15 @@ class MarkerBody:
     marker: NonNegative
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class ClockSetting:
     """t_mocap = t (1 + drift) + offset: offset [s], drift [-]."""
 
-    offset: float
-    drift: Annotated[float, Field(ge=-1e-3, le=1e-3)]
+    offset: Value
+    drift: Annotated[float, Field(ge=-1e-3, le=1e-3), DRAWN]
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class Instruments:
     """Rates [Hz], noises per sample and clocks.
 
@@ -203,19 +144,19 @@ class Instruments:
     """
 
     bodies: dict[Literal["base", "shoulder", "gripper"], MarkerBody]
-    mocap_rate: Positive
+    mocap_rate: FixedPositive
     marker_noise: Positive
-    plate_rate: Positive
+    plate_rate: FixedPositive
     plate_force_noise: Positive
     plate_moment_noise: Positive
-    robot_rate: Positive
+    robot_rate: FixedPositive
     current_quantum: Positive
     link_encoders: LinkEncoders
     robot_clock: ClockSetting
     plate_clock: ClockSetting
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class Campaign:
     """How much is recorded.
 
@@ -240,30 +181,30 @@ class Campaign:
     dwell: Annotated[float, Field(ge=0.8, le=10.0)]
     calibration_postures: Count
     validation_postures: Count
-    sweep: Positive
-    calibration_swing: Positive
-    validation_swing: Positive
-    pause: NonNegative
+    sweep: FixedPositive
+    calibration_swing: FixedPositive
+    validation_swing: FixedPositive
+    pause: FixedNonNegative
     payloads: tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...] = ()
     push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class Datasheet:
     """Tolerances declared to the laboratory, standard deviations; see `calibration.schema.Tolerances`."""
 
-    joint_translation: Positive
-    joint_rotation: Positive
-    encoder_offset: Positive
-    joint_play: Positive
-    body_translation: Positive
-    body_rotation: Positive
-    link_mass: Positive
-    link_com: Positive
-    payload_mass: NonNegative
+    joint_translation: FixedPositive
+    joint_rotation: FixedPositive
+    encoder_offset: FixedPositive
+    joint_play: FixedPositive
+    body_translation: FixedPositive
+    body_rotation: FixedPositive
+    link_mass: FixedPositive
+    link_com: FixedPositive
+    payload_mass: FixedNonNegative
 
 
-@dataclass(frozen=True, config=_strict)
+@dataclass(frozen=True, config=STRICT)
 class TwinConfig:
     """Everything `record` needs beside a seed.
 

@@ -1,0 +1,76 @@
+"""What a scenario says about the arm and the torso: drive trains and encoders; SI units."""
+
+from typing import Annotated
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from twin.config_values import STRICT, Angle, NonNegative, Positive
+from twin.uncertain import DRAWN
+
+
+@dataclass(frozen=True, config=STRICT)
+class ArmJoint:
+    """Drive train and encoders of one arm joint.
+
+    Attributes:
+        offset: Motor encoder's reading at true zero [rad].
+        gap: Total play [rad].
+        stiffness: Mesh [N.m/rad].
+        damping: Mesh [N.m.s/rad].
+        coulomb: Link-side friction [N.m].
+        viscous: Link-side friction [N.m.s/rad].
+        rotor_inertia: Reflected to the joint [kg.m2].
+        servo_stiffness: Position gain [N.m/rad].
+        quantum: Of the motor encoder, at the joint [rad].
+        torque_per_ampere: Of the drive, at the joint [N.m/A].
+    """
+
+    offset: Angle
+    gap: Annotated[float, Field(ge=0.0, le=0.1), DRAWN]
+    stiffness: Annotated[float, Field(ge=100.0, le=50e3), DRAWN]
+    damping: NonNegative
+    coulomb: NonNegative
+    viscous: NonNegative
+    rotor_inertia: Annotated[float, Field(ge=0.01), DRAWN]
+    servo_stiffness: Positive
+    quantum: Positive
+    torque_per_ampere: Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class LinkEncoders:
+    """Absolute encoders on the link side, standard deviations of what is drawn.
+
+    Attributes:
+        offset: Zero [rad].
+        once: Amplitude once per turn [rad].
+        twice: Amplitude twice per turn [rad].
+        quantum: Step of the reading [rad].
+    """
+
+    offset: NonNegative
+    once: NonNegative
+    twice: NonNegative
+    quantum: Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class Torso:
+    """The torso lift, driven without play, and its column's bending.
+
+    Attributes:
+        quantum: Of the motor encoder [m].
+        force_per_ampere: [N/A].
+        servo_stiffness: [N/m].
+        rotor_inertia: Reflected [kg].
+        bending_stiffness: About x and y [N.m/rad].
+        bending_damping: [N.m.s/rad].
+    """
+
+    quantum: Positive
+    force_per_ampere: Positive
+    servo_stiffness: Positive
+    rotor_inertia: Positive
+    bending_stiffness: Annotated[float, Field(ge=1e3), DRAWN]
+    bending_damping: NonNegative
