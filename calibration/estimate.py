@@ -10,6 +10,7 @@ from calibration.clock import Clock
 from calibration.errors import NoSuchElement
 from calibration.hand import HandModel, nominal_hand
 from calibration.identifiability import Combination, Status
+from calibration.options import Options
 from calibration.parameters import parameter_names
 from calibration.robot import Chain
 from calibration.verdict import Verdict
@@ -118,6 +119,7 @@ class Estimate:
         suspension: Base under a wrench, of row `model_1`; None where there is none.
         joint_models: Printed joint models, of row `model_3`.
         link_zero: Motor minus link reading of each measured joint over the calibration postures [rad, m].
+        options: What was chosen.
     """
 
     status: Literal["calibrated", "not_calibrated"]
@@ -130,6 +132,7 @@ class Estimate:
     suspension: "Suspension | None" = None
     joint_models: "tuple[JointModel, ...]" = ()
     link_zero: tuple[float, ...] = ()
+    options: Options = field(default_factory=Options)
 
     def model(self, name: str) -> Model:
         """The model of that name.

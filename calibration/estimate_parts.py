@@ -7,7 +7,9 @@ from pydantic import BaseModel, ConfigDict
 from scipy.linalg import block_diag
 
 from calibration.estimate import Model, Parameter
+from calibration.identifiability import Status
 from calibration.joint_model import JointModel, Quality, Terms
+from calibration.joint_projection import at_limit
 from calibration.suspension import Source, Suspension
 from calibration.suspension_held_out import HeldOut
 
@@ -139,7 +141,7 @@ def joints_model(geometry: Model, models: tuple[JointModel, ...]) -> Model:
         covariance = model.covariance if model.powers else np.zeros((0, 0))
         sigma = np.sqrt(np.diag(covariance))
         added += [
-            Parameter(f"sigmoid.{model.joint}.{n}", u, 0.0, float(v), float(s), "estimated")
+            Parameter(f"sigmoid.{model.joint}.{n}", u, 0.0, float(v), float(s), _status(n, float(v)))
             for n, u, v, s in zip(names, units, values, sigma, strict=False)
         ]
         blocks.append(covariance)
@@ -150,6 +152,11 @@ def joints_model(geometry: Model, models: tuple[JointModel, ...]) -> Model:
         joints=geometry.joints,
         play=geometry.play,
     )
+
+
+def _status(name: str, value: float) -> Status:
+    """A rho at a limit of its search is where the search ended, not what the data say."""
+    return "not_identifiable" if name == "rho" and at_limit(value) else "estimated"
 
 
 def _rows(matrix: np.ndarray) -> Rows:

@@ -17,6 +17,7 @@ from calibration.estimate_parts import (
     suspension_of,
 )
 from calibration.identifiability import Combination, Status
+from calibration.options import Options
 from calibration.verdict import Verdict
 
 
@@ -103,6 +104,7 @@ class EstimateFile(Entry):
     suspension: SuspensionEntry | None = None
     joint_models: tuple[JointEntry, ...] = ()
     link_zero: tuple[float | None, ...] = ()
+    options: Options = Field(default_factory=Options)
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore", validate_by_name=True)
 
@@ -133,6 +135,7 @@ def to_file(estimate: Estimate) -> EstimateFile:
         suspension=None if estimate.suspension is None else suspension_entry(estimate.suspension),
         joint_models=tuple(joint_entry(m) for m in estimate.joint_models),
         link_zero=tuple(_finite(z) for z in estimate.link_zero),
+        options=estimate.options,
     )
 
 
@@ -150,6 +153,7 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
         None if file.suspension is None else suspension_of(file.suspension),
         tuple(joint_model(entry) for entry in file.joint_models),
         tuple(float("nan") if z is None else z for z in file.link_zero),
+        file.options,
     )
 
 

@@ -6,7 +6,7 @@ The geometry was fitted to motor readings whose mean discrepancy over its postur
 what departs from that mean.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,10 @@ class JointModels:
     inputs: InputModel
     zero: np.ndarray
     models: tuple[JointModel, ...]
+
+    def of_trial(self, trial_id: str) -> "JointModels":
+        """The same models, asked with the payload of one trial."""
+        return replace(self, inputs=self.inputs.of_trial(trial_id))
 
     def model(self, joint: str) -> JointModel:
         """The model of a joint.

@@ -49,7 +49,7 @@ def fit_joint_models(
     except NotEnoughData as error:
         unknown = np.full(len(inputs.measured), np.nan)
         return JointModels(inputs, unknown, ()), (Verdict(STAGE, "missing", str(error)),)
-    samples = _samples(urdf, description, trials, inputs, hand, zero)
+    samples = _samples(trials, inputs, hand, zero)
     options = {joint: worthwhile(candidates(of_joint, terms)) for joint, of_joint in samples.items()}
     chosen = nearest_hand(description, trials, robot, hand, samples, options)
     zeros = dict(zip(inputs.measured, map(float, zero), strict=True))
@@ -65,19 +65,10 @@ def fit_joint_models(
 
 
 def _samples(
-    urdf: str,
-    description: Description,
-    trials: Sequence[Trial],
-    inputs: InputModel,
-    hand: HandModel,
-    zero: np.ndarray,
+    trials: Sequence[Trial], inputs: InputModel, hand: HandModel, zero: np.ndarray
 ) -> dict[str, tuple[Samples, ...]]:
     """Samples of every joint of the chain with a link encoder, trial by trial, each with its own payload."""
-    entries = {entry.id: entry for entry in description.trials}
-    rows = []
-    for trial in trials:
-        own = description.loaded(entries[trial.id]) if trial.id in entries else description
-        rows.append(samples_of(inputs if own is description else input_model(urdf, own, hand), trial, zero))
+    rows = [samples_of(inputs.of_trial(trial.id), trial, zero) for trial in trials]
     columns = dict(zip(inputs.measured, zip(*rows, strict=True), strict=True))
     found = {joint: tuple(s for s in columns[joint] if s is not None) for joint in hand.chain.joints}
     return {joint: of_joint for joint, of_joint in found.items() if of_joint}

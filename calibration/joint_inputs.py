@@ -7,7 +7,7 @@ back, central differences; it looks half a second ahead, so it is for recordings
 passes a velocity of its own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -45,11 +45,22 @@ class InputModel:
         model: Floating model with the declared payload.
         measured: The joints of the columns of q.
         offset: (n_measured,) zeros of the motor-side readings [rad, m].
+        urdf: Text the model was built from.
+        description: Of the dataset.
     """
 
     model: pin.Model
     measured: tuple[str, ...]
     offset: np.ndarray
+    urdf: str
+    description: Description
+
+    def of_trial(self, trial_id: str) -> "InputModel":
+        """The robot with the payload of one trial of the dataset; of another trial, the campaign's."""
+        entry = next((t for t in self.description.trials if t.id == trial_id), None)
+        if entry is None or self.description.loaded(entry) is self.description:
+            return self
+        return replace(self, model=floating_model(self.urdf, self.description.loaded(entry)))
 
     def inputs(self, t: np.ndarray, q_motor: np.ndarray, velocity: np.ndarray | None = None) -> JointInputs:
         """Inputs at readings q_motor (n, n_measured) taken at t (n,) [s], every clock will do.
@@ -73,7 +84,7 @@ def input_model(urdf: str, description: Description, hand: HandModel) -> InputMo
     """The input model of a dataset, with the zeros of a calibrated hand model."""
     measured, offset = hand.chain.measured, np.zeros(len(hand.chain.measured))
     offset[hand.chain.columns] = hand.offset
-    return InputModel(floating_model(urdf, description), measured, offset)
+    return InputModel(floating_model(urdf, description), measured, offset, urdf, description)
 
 
 def velocities(t: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ class Explained:
 def on_repetitions(models: JointModels, trials: Sequence[Trial], terms: Terms) -> tuple[Explained, ...]:
     """What the model explains of motions it has seen, in repetitions it has not: moving calibration trials."""
     moving = [trial for trial in trials if not len(trial.dwell_start)]
-    of_trials = [samples_of(models.inputs, trial, models.zero) for trial in moving]
+    of_trials = [samples_of(models.inputs.of_trial(trial.id), trial, models.zero) for trial in moving]
     return tuple(
         found
         for joint, column in zip(models.inputs.measured, zip(*of_trials, strict=True), strict=True)
@@ -100,7 +100,7 @@ def _on_others(models: JointModels, regime: Regime, trials: Sequence[Trial], rob
 
 def _errors(models: JointModels, j: int, regime: Regime, trial: Trial, robot: Clock) -> np.ndarray:
     """Discrepancy, what is left of it, whether it was outside the domain: (n, 3); empty where j is not excited."""
-    corrected = correct(models, trial.t_robot, trial.q_motor)
+    corrected = correct(models.of_trial(trial.id), trial.t_robot, trial.q_motor)
     if np.ptp(trial.q_motor[:, j]) < _EXCITED:
         return np.zeros((0, 3))
     sides = trial, replace(trial, q_motor=corrected.q), replace(trial, q_motor=trial.q_link + corrected.outside)

@@ -8,7 +8,7 @@ import numpy as np
 
 from calibration.joint_basis import basis_of, not_zero
 from calibration.joint_model import JointModel, Quality, Terms, exponents
-from calibration.joint_projection import Problem, clustered_covariance, search
+from calibration.joint_projection import RHO, Problem, Projection, at_limit, clustered_covariance, search
 from calibration.joint_samples import Samples, box, pooled
 from calibration.joint_selection import HIGHEST, Candidate
 
@@ -24,9 +24,7 @@ def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms,
     found = search(problem)
     if not found.full_rank:
         return none
-    J = np.column_stack([problem.design_slope(found.rho) @ found.x, problem.design(found.rho)])
-    stops = np.cumsum([0, *(len(s) for s in samples)])
-    C = clustered_covariance(J, found.r, [slice(a, b) for a, b in pairwise(stops)])
+    C = _covariance(problem, found, np.cumsum([0, *(len(s) for s in samples)]))
     to_printed = np.eye(1 + 2 * k)
     to_printed[1 : 1 + k, 1 : 1 + k] = to_printed[1 + k :, 1 + k :] = basis.to_printed()
     values = to_printed @ np.append(found.rho, found.x)
@@ -42,6 +40,21 @@ def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms,
         covariance=to_printed @ C @ to_printed.T,
         quality=_quality(whole.y, found.r, missed),
     )
+
+
+def _covariance(problem: Problem, found: Projection, stops: np.ndarray) -> np.ndarray:
+    """Covariance (1 + 2 k, 1 + 2 k) of rho, a, b, samples of a trial between two stops.
+
+    At a limit of its search rho is no estimate: given, its variance that of a rho anywhere between the limits.
+    """
+    groups = [slice(a, b) for a, b in pairwise(stops)]
+    M = problem.design(found.rho)
+    if not at_limit(found.rho):
+        return clustered_covariance(np.column_stack([problem.design_slope(found.rho) @ found.x, M]), found.r, groups)
+    C = np.zeros((1 + M.shape[1], 1 + M.shape[1]))
+    C[0, 0] = (RHO[1] - RHO[0]) ** 2 / 12.0
+    C[1:, 1:] = clustered_covariance(M, found.r, groups)
+    return C
 
 
 def no_correction(joint: str, samples: Sequence[Samples], zero: float, terms: Terms) -> JointModel:

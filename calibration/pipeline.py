@@ -16,6 +16,7 @@ from calibration.estimate import Estimate, Model, RobotNames
 from calibration.estimate_parts import joints_model, suspension_model
 from calibration.geometry import calibrate_geometry
 from calibration.joint_fit import fit_joint_models
+from calibration.options import Options
 from calibration.parameters import nominal_frames
 from calibration.plausibility import implausible_inputs
 from calibration.postures import Postures, read_passing, read_postures
@@ -23,7 +24,7 @@ from calibration.recording import Trial
 from calibration.registration import register
 from calibration.robot import Chain, chain_of
 from calibration.schema import Description
-from calibration.suspension_fit import fit_suspension
+from calibration.suspension_fit import Form, fit_suspension
 from calibration.verdict import Verdict
 
 Progress = Callable[[str, float], None]
@@ -68,8 +69,13 @@ class Work:
         return replace(self, estimate=grown)
 
 
-def calibrate(dataset: Dataset, stages: Sequence[str] | None = None, progress: Progress | None = None) -> Estimate:
-    """Run the stages (all where none is named) on the calibration trials of a dataset.
+def calibrate(
+    dataset: Dataset,
+    stages: Sequence[str] | None = None,
+    progress: Progress | None = None,
+    options: Options | None = None,
+) -> Estimate:
+    """Run the stages (all where none is named) on the calibration trials of a dataset, as the options say.
 
     The result says itself whether it may be used: `status` and `verdicts`.
 
@@ -88,12 +94,13 @@ def calibrate(dataset: Dataset, stages: Sequence[str] | None = None, progress: P
             dataset.folder / "dataset.json",
             "trials: no calibration trial; record static postures and one moving trial with that role",
         )
+    empty = _empty(dataset, options or Options())
     refused = [Verdict("reading", "refused", m) for m in implausible_inputs(dataset.description, chain, trials)]
     if refused:
-        return _estimate(dataset, refused, ())
+        return replace(empty, verdicts=tuple(refused))
     tell("clocks", 0.2)
     clocks, said = synchronise(dataset.urdf, dataset.description, trials)
-    estimate = _estimate(dataset, list(said), clocks)
+    estimate = replace(empty, verdicts=tuple(said), clocks=clocks)
     fits = [name for name in STAGES[1:] if name in wanted]
     if not fits:
         return estimate
@@ -128,7 +135,8 @@ def _register(work: Work) -> Work:
 
 def _suspend(work: Work) -> Work:
     robot, plate = work.clocks[0], next((c for c in work.clocks if c.instrument == "plate"), None)
-    found, said = fit_suspension(work.dataset.urdf, work.description, work.trials, robot, plate)
+    form = Form(full=work.estimate.options.suspension == "full")
+    found, said = fit_suspension(work.dataset.urdf, work.description, work.trials, robot, plate, form=form)
     if found is None:
         return replace(work, estimate=replace(work.estimate, verdicts=(*work.estimate.verdicts, *said)))
     return work.with_model(suspension_model(found), said, suspension=found)
@@ -143,7 +151,8 @@ def _calibrate_joints(work: Work) -> Work:
         return work
     geometry = work.estimate.model("model_2")
     hand = geometry.hand(work.chain, nominal_frames(work.chain, work.description))
-    found, said = fit_joint_models(work.dataset.urdf, work.description, work.trials, work.clocks[0], hand)
+    terms = work.estimate.options.terms
+    found, said = fit_joint_models(work.dataset.urdf, work.description, work.trials, work.clocks[0], hand, terms)
     model = joints_model(geometry, found.models)
     grown = replace(
         work.estimate,
@@ -173,8 +182,8 @@ def _concluded(estimate: Estimate) -> Estimate:
     return replace(estimate, main=main, status="calibrated" if usable else "not_calibrated")
 
 
-def _estimate(dataset: Dataset, verdicts: list[Verdict], clocks: tuple[Clock, ...]) -> Estimate:
+def _empty(dataset: Dataset, options: Options) -> Estimate:
     """Nothing to be used so far."""
     d = dataset.description
     names = RobotNames(d.joint_names, d.base_frame, d.tool_frame)
-    return Estimate("not_calibrated", tuple(verdicts), clocks, (), "", dataset.urdf, names)
+    return Estimate("not_calibrated", (), (), (), "", dataset.urdf, names, options=options)

@@ -121,7 +121,7 @@ class Predictor:
         if encoder == "link" and self.joints is not None:
             return readings_at(trial, self.robot, trial.t_mocap, aligned_link_readings(trial, self.joints.zero))
         if name == "model_3" and self.joints is not None:
-            corrected = correct(self.joints, trial.t_robot, trial.q_motor).q
+            corrected = correct(self.joints.of_trial(trial.id), trial.t_robot, trial.q_motor).q
             return readings_at(trial, self.robot, trial.t_mocap, corrected)
         return readings_at(trial, self.robot, trial.t_mocap, trial.q_motor)
 

@@ -91,13 +91,20 @@ def calibrate(
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder, the twin's or a real one.")],
     out: Out,
     stages: Annotated[str | None, typer.Option(metavar="A,B,...", help="Only these stages, in this order.")] = None,
+    terms: Annotated[
+        str | None, typer.Option(metavar="printed|tensor|total", help="Terms of the joint models; total by default.")
+    ] = None,
+    suspension: Annotated[
+        str | None, typer.Option(metavar="diagonal|full", help="Each wheel's springs; diagonal by default.")
+    ] = None,
 ) -> None:
     """Write an estimate from a dataset folder alone."""
     from scenarios import console, steps
 
     chosen = None if stages is None else [stage.strip() for stage in stages.split(",")]
     with console.progress() as progress:
-        estimate = steps.calibrate(dataset, out, chosen, progress)
+        options = steps.options(terms=terms, suspension=suspension)
+        estimate = steps.calibrate(dataset, out, chosen, progress, options)
     console.show(console.verdicts(estimate.verdicts))
     typer.echo(f"\nEstimate: {out}")
     if not estimate.calibrated:

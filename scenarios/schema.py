@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from calibration.options import Options
 from twin import TwinConfig
 
 
@@ -16,6 +17,7 @@ class Scenario(BaseModel):
         description: One line.
         seed: Root of all randomness.
         twin: Robot and laboratory.
+        calibration: What is chosen about the calibration.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -24,6 +26,7 @@ class Scenario(BaseModel):
     description: str
     seed: Annotated[int, Field(ge=0)] = 0
     twin: TwinConfig
+    calibration: Annotated[Options, Field(default_factory=Options)]
 
     def quick(self) -> "Scenario":
         """The same robot and laboratory, a campaign of about 180 s: for tests, its figures are of less data."""

@@ -21,6 +21,7 @@ from scenarios.errors import ScenarioError
 
 if TYPE_CHECKING:
     from calibration import Estimate, Evaluation
+    from calibration.options import Options
     from scenarios.schema import Scenario
     from scenarios.score import Score
 
@@ -95,7 +96,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
     scenario = scenario.quick() if quick else scenario
     with folder.replacing(out, folder.RUN) as new, _one_blas_thread():
         _simulate(scenario, new, progress)
-        estimate = _calibrate(new / "dataset", new / "estimate", None, progress)
+        estimate = _calibrate(new / "dataset", new / "estimate", None, scenario.calibration, progress)
         evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
         score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation, progress)
         _report(new, progress)
@@ -109,7 +110,11 @@ def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent)
 
 
 def calibrate(
-    dataset: Path | str, out: Path | str, stages: Sequence[str] | None = None, progress: Progress = silent
+    dataset: Path | str,
+    out: Path | str,
+    stages: Sequence[str] | None = None,
+    progress: Progress = silent,
+    options: "Options | None" = None,
 ) -> "Estimate":
     """Write the estimate folder `out` from a dataset folder alone.
 
@@ -120,6 +125,7 @@ def calibrate(
         out: The estimate folder; an earlier one there is replaced.
         stages: Only these; None runs every stage.
         progress: Told how far it is.
+        options: What is chosen; None: the defaults.
 
     Raises:
         ScenarioError: `out` must not be overwritten, or a stage does not exist.
@@ -131,7 +137,26 @@ def calibrate(
     if unknown:
         raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
     with folder.replacing(out, folder.ESTIMATE) as new, _one_blas_thread():
-        return _calibrate(Path(dataset), new, stages, progress)
+        return _calibrate(Path(dataset), new, stages, options, progress)
+
+
+def options(**chosen: str | None) -> "Options":
+    """Options of a calibration from the command line's words; those that are None stay at their defaults.
+
+    Raises:
+        ScenarioError: A word is not one of those possible.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    from calibration.options import Options
+
+    given = {name: value for name, value in chosen.items() if value is not None}
+    try:
+        found: Options = TypeAdapter(Options).validate_python(given)
+    except ValidationError as error:
+        lines = [f"--{e['loc'][0]}: {e['msg']} (got {e['input']!r})" for e in error.errors()]
+        raise ScenarioError("\n".join(lines)) from error
+    return found
 
 
 def evaluate(
@@ -187,12 +212,14 @@ def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
     picture(scenario.twin, scenario.seed, out / "figures" / "twin.png")
 
 
-def _calibrate(dataset: Path, out: Path, stages: Sequence[str] | None, progress: Progress) -> "Estimate":
+def _calibrate(
+    dataset: Path, out: Path, stages: Sequence[str] | None, options: "Options | None", progress: Progress
+) -> "Estimate":
     import calibration
 
     progress("calibrate", "", 0.0)
     estimate = calibration.calibrate(
-        calibration.load(dataset), stages, lambda at, fraction: progress("calibrate", at, fraction)
+        calibration.load(dataset), stages, lambda at, fraction: progress("calibrate", at, fraction), options
     )
     calibration.save_estimate(estimate, out)
     return estimate

@@ -21,6 +21,7 @@ import calibration
 import scenarios
 import twin.picture
 from calibration.errors import CalibrationError, InputError
+from calibration.options import Options
 from scenarios import cli, registry
 from scenarios.errors import ScenarioError
 from scenarios.folder import RUN
@@ -50,6 +51,7 @@ class Scenario(BaseModel):
     description: str
     seed: Annotated[int, Field(ge=0)]
     twin: Twin
+    calibration: Options = Options(terms="tensor")
 
     def quick(self) -> "Scenario":
         return self.model_copy(update={"description": "short"})
@@ -83,8 +85,9 @@ class Engines:
     def load(self, dataset):
         return Path(dataset)
 
-    def calibrate(self, dataset, stages=None, progress=None):
+    def calibrate(self, dataset, stages=None, progress=None, options=None):
         self.step("calibrate", dataset, stages)
+        self.calls["options"] = (options,)
         self.calls["blas"] = blas_threads()
         return self.load_estimate(dataset)
 
@@ -228,6 +231,15 @@ def test_simulate_writes_dataset_and_truth(engines, tiago_twin):
     assert {path.name for path in Path("x").iterdir()} == {"scenario.yaml", "dataset", "truth", "figures"}
 
 
+def test_the_calibration_is_told_what_the_scenario_or_the_command_line_chose(engines, tiago_twin):
+    tiago_twin("run", "small", "--out", "x")
+    assert engines.calls["options"] == (Options(terms="tensor"),)
+    tiago_twin("calibrate", "x/dataset", "--out", "x/estimate", "--terms", "printed", "--suspension", "full")
+    assert engines.calls["options"] == (Options("printed", "full"),)
+    tiago_twin("calibrate", "x/dataset", "--out", "x/estimate")
+    assert engines.calls["options"] == (Options(),)
+
+
 def test_calibrate_takes_stages_and_prints_verdicts(engines, tiago_twin):
     tiago_twin("simulate", "small", "--out", "x")
     code, out, _ = tiago_twin("calibrate", "x/dataset", "--out", "x/estimate", "--stages", "clocks, geometry")
@@ -330,6 +342,10 @@ def test_a_bad_scenario_file_ends_with_2_and_every_place(engines, tiago_twin, co
         (["simulate", "small"], ["--out"]),
         (["calibrate", "d", "--out", "x", "--stages", "clocks,geometri"], ["no stage 'geometri'", "clocks, regis"]),
         (["calibrate", "d", "--out", "x", "--stages", ""], ["no stage ''"]),
+        (
+            ["calibrate", "d", "--out", "x", "--terms", "cubic"],
+            ["--terms", "'printed', 'tensor' or 'total'", "'cubic'"],
+        ),
         (["launch"], ["No such command"]),
     ],
 )
