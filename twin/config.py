@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from twin.config_arm import ArmJoint, LinkEncoders, Torso
+from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
 from twin.config_values import (
     STRICT,
     Count,
@@ -141,6 +141,7 @@ class Instruments:
         link_encoders: Absolute encoders.
         robot_clock: The robot's.
         plate_clock: The plate's.
+        motor_encoders: Eccentricity on the motor side.
     """
 
     bodies: dict[Literal["base", "shoulder", "gripper"], MarkerBody]
@@ -154,6 +155,7 @@ class Instruments:
     link_encoders: LinkEncoders
     robot_clock: ClockSetting
     plate_clock: ClockSetting
+    motor_encoders: MotorEncoders = field(default_factory=MotorEncoders)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -218,6 +220,9 @@ class TwinConfig:
         campaign: What is recorded.
         datasheet: What is declared.
         timestep: Of the simulation [s].
+        gear_form: dead_zone: load torque decides the flank; friction_held: friction holds the play, the mesh slips.
+        friction_held: What that form adds, by joint; joints not named keep the dead zone.
+        coupled_wrist: Whether arm_6 and arm_7 are driven by one differential.
     """
 
     arm: dict[str, ArmJoint]
@@ -229,3 +234,6 @@ class TwinConfig:
     campaign: Campaign
     datasheet: Datasheet
     timestep: Annotated[float, Field(gt=0.0, le=0.002)] = field(default=0.001)
+    gear_form: Literal["dead_zone", "friction_held"] = "dead_zone"
+    friction_held: dict[str, FrictionHeld] = field(default_factory=lambda: dict(FRICTION_HELD))
+    coupled_wrist: bool = False

@@ -39,6 +39,32 @@ class ArmJoint:
 
 
 @dataclass(frozen=True, config=STRICT)
+class FrictionHeld:
+    """What the form `friction_held` adds to a joint's gear; see `twin.defects.hysteresis`.
+
+    Attributes:
+        holding: Further Coulomb friction of the link [N.m].
+        slip: Torque at which the mesh's friction slips [N.m].
+        stiffness: Of the mesh below it, beside the mesh's own [N.m/rad].
+    """
+
+    holding: NonNegative
+    slip: NonNegative
+    stiffness: Positive
+
+
+FRICTION_HELD = {
+    **{f"arm_{i}_joint": FrictionHeld(holding=0.4, slip=3.0, stiffness=9000.0) for i in (1, 2)},
+    **{f"arm_{i}_joint": FrictionHeld(holding=0.5, slip=2.0, stiffness=6000.0) for i in (3, 4)},
+    **{f"arm_{i}_joint": FrictionHeld(holding=3.0, slip=0.4, stiffness=1000.0) for i in (5, 6)},
+    "arm_7_joint": FrictionHeld(holding=1.0, slip=0.4, stiffness=1000.0),
+}
+"""Links held with the friction the URDF states, 1 N.m, and geared wrist joints with more than the gravity they carry,
+1.2 N.m and as much again of payload; slip such that the unloaded loop is 0.7-0.8 mrad wide, 2 arc minutes, a
+strain-wave catalogue's hysteresis loss."""
+
+
+@dataclass(frozen=True, config=STRICT)
 class LinkEncoders:
     """Absolute encoders on the link side, standard deviations of what is drawn.
 
@@ -53,6 +79,19 @@ class LinkEncoders:
     once: NonNegative
     twice: NonNegative
     quantum: Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class MotorEncoders:
+    """Eccentricity of the motor-side encoders as seen at the joint, standard deviations of what is drawn.
+
+    Attributes:
+        once: Amplitude once per turn of the joint [rad].
+        twice: Amplitude twice per turn [rad].
+    """
+
+    once: NonNegative = 0.0
+    twice: NonNegative = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)

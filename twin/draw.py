@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 from twin.build import HAND
 from twin.config import MarkerBody, TwinConfig
 from twin.defects.base import Defect
+from twin.defects.differential import Differential
 from twin.defects.gear import DirectDrive, Gear
 from twin.defects.ground import Wheel
+from twin.defects.hysteresis import Hysteresis
 from twin.defects.loads import Flexibility, LinkMass, Payload
 from twin.defects.placements import Placement
 from twin.defects.sensing import Cluster, Encoder
@@ -19,6 +21,7 @@ from twin.randomness import generator
 TORSO = "torso_lift_joint"
 TOOL = HAND
 BASE = "base_footprint"
+WRIST = ("arm_6_joint", "arm_7_joint")
 _LINK_INERTIA = 0.004  # [kg.m2] output gear of an arm joint
 _DAMPING_RATIO = 1.2  # servo velocity gain over sqrt(kp J)
 
@@ -85,22 +88,38 @@ def _factor(config: TwinConfig, seed: int, *names: str) -> float:
     return 1.0 + config.widths.spread * float(generator(seed, "spread", *names).uniform(-1.0, 1.0))
 
 
-def _gears(config: TwinConfig, seed: int) -> tuple[Gear, ...]:
-    return tuple(
-        Gear(
-            joint_name=name,
-            gap=j.gap * _factor(config, seed, "gap", name),
-            stiffness=j.stiffness,
-            damping=j.damping,
-            coulomb=j.coulomb,
-            viscous=j.viscous,
-            rotor_inertia=j.rotor_inertia,
-            link_inertia=_LINK_INERTIA,
-            servo_stiffness=j.servo_stiffness,
-            servo_damping=_DAMPING_RATIO * float(np.sqrt(j.servo_stiffness * j.rotor_inertia)),
-        )
-        for name, j in config.arm.items()
+def _gears(config: TwinConfig, seed: int) -> tuple[Defect, ...]:
+    """Drive trains base to tip, then what friction adds to them."""
+    alone = [_gear(config, seed, name) for name in config.arm]
+    trains: list[Defect] = [g for g in alone if not (config.coupled_wrist and g.joint_name in WRIST)]
+    if config.coupled_wrist:
+        first, second = (g for g in alone if g.joint_name in WRIST)
+        trains.append(Differential((first, second)))
+    if config.gear_form == "friction_held":
+        trains += [_hysteresis(config, name) for name in config.friction_held]
+    return tuple(trains)
+
+
+def _gear(config: TwinConfig, seed: int, name: str) -> Gear:
+    j = config.arm[name]
+    return Gear(
+        joint_name=name,
+        gap=j.gap * _factor(config, seed, "gap", name),
+        stiffness=j.stiffness,
+        damping=j.damping,
+        coulomb=j.coulomb,
+        viscous=j.viscous,
+        rotor_inertia=j.rotor_inertia,
+        link_inertia=_LINK_INERTIA,
+        servo_stiffness=j.servo_stiffness,
+        servo_damping=_DAMPING_RATIO * float(np.sqrt(j.servo_stiffness * j.rotor_inertia)),
     )
+
+
+def _hysteresis(config: TwinConfig, name: str) -> Hysteresis:
+    """A mesh of a differential carries half of its joint's torque."""
+    h, share = config.friction_held[name], 0.5 if config.coupled_wrist and name in WRIST else 1.0
+    return Hysteresis(name, share * h.stiffness, share * h.slip, h.holding)
 
 
 def _torso_drive(config: TwinConfig) -> DirectDrive:
@@ -128,14 +147,21 @@ def _payload(config: TwinConfig, seed: int) -> Payload:
 
 def _encoders(config: TwinConfig, seed: int) -> tuple[Encoder, ...]:
     still = (0.0, 0.0, 0.0, 0.0)
-    link = config.instruments.link_encoders
+    link, motor = config.instruments.link_encoders, config.instruments.motor_encoders
     found = [Encoder(TORSO, "motor", 0.0, still, config.torso.quantum, prismatic=True)]
     for name, j in config.arm.items():
-        found.append(Encoder(name, "motor", j.offset * _factor(config, seed, "offset", name), still, j.quantum))
+        waves = _harmonics(generator(seed, "motor encoder", name), motor.once, motor.twice)
+        found.append(Encoder(name, "motor", j.offset * _factor(config, seed, "offset", name), waves, j.quantum))
         rng = generator(seed, "link encoder", name)
-        offset, *waves = rng.normal(size=5) * [link.offset, *np.repeat([link.once, link.twice], 2) / np.sqrt(2.0)]
-        found.append(Encoder(name, "link", float(offset), (waves[0], waves[1], waves[2], waves[3]), link.quantum))
+        offset = link.offset * float(rng.normal())
+        found.append(Encoder(name, "link", offset, _harmonics(rng, link.once, link.twice), link.quantum))
     return tuple(found)
+
+
+def _harmonics(rng: np.random.Generator, once: float, twice: float) -> tuple[float, float, float, float]:
+    """cos1, sin1, cos2, sin2 [rad] of standard deviation `once`, `twice` in amplitude."""
+    c1, s1, c2, s2 = rng.normal(size=4) * np.repeat([once, twice], 2) / np.sqrt(2.0) + 0.0  # no -0.0
+    return float(c1), float(s1), float(c2), float(s2)
 
 
 def _cluster(name: str, body: MarkerBody, seed: int) -> Cluster:

@@ -1,4 +1,4 @@
-"""A drive train with play: rotor, mesh with a dead zone, link.
+"""A drive train with play: rotor, mesh with a dead zone, link. The load's torque decides which flank is in contact.
 
     rotor: J_m dd q_m = kp (u - q_m) - kv d q_m - tau        motor side; the motor encoder reads q_m
     mesh:  tau = K dz(q_m - q_l; gap) + D d/dt(...)          in contact only, dz the dead zone of TOTAL width gap
@@ -7,6 +7,7 @@
 The rotor is a sibling body of the link on the same axis, so that the reaction acts on the parent; the mesh is a fixed
 tendon q_l - q_m limited to +-gap/2 whose soft limit is the spring. With constant impedance d the limit's stiffness is
 K = S / ((1 - d) iw) with iw the tendon's inverse weight in the compiled model: S is set from it after each compile.
+`twin.defects.hysteresis` adds the friction of the mesh, `twin.defects.differential` couples two such trains.
 """
 
 from dataclasses import dataclass
@@ -25,6 +26,11 @@ _OPEN = 1e-9  # [rad] half width that stands for no play at all
 def rotor_joint(joint_name: str) -> str:
     """Name of the motor-side joint of a geared joint."""
     return f"{joint_name}.motor"
+
+
+def mesh_tendon(joint_name: str) -> str:
+    """Name of the tendon that is the mesh of a geared joint; its length is link minus motor [rad]."""
+    return f"{joint_name}.mesh"
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,13 @@ class Gear(Defect):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add the rotor, the mesh and the servo."""
+        self.add_rotor(spec)
+        mesh = {self.joint_name: 1.0, rotor_joint(self.joint_name): -1.0}
+        add_mesh(spec, mesh_tendon(self.joint_name), mesh, self.gap)
+        add_servo(spec, rotor_joint(self.joint_name), self.servo_stiffness, self.servo_damping)
+
+    def add_rotor(self, spec: mujoco.MjSpec) -> None:
+        """Give the link its friction and output gear, and add the rotor beside it."""
         link_joint = joint(spec, self.joint_name)
         link_joint.frictionloss = self.coulomb
         link_joint.damping = np.array([self.viscous, 0.0, 0.0])
@@ -67,18 +80,10 @@ class Gear(Defect):
         rotor.ipos, rotor.iquat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         name = rotor_joint(self.joint_name)
         rotor.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=link_joint.axis, armature=self.rotor_inertia)
-        mesh = spec.add_tendon(name=f"{self.joint_name}.mesh", limited=True)
-        mesh.wrap_joint(self.joint_name, 1.0)
-        mesh.wrap_joint(name, -1.0)
-        mesh.range = np.array([-0.5, 0.5]) * max(self.gap, 2.0 * _OPEN)
-        mesh.solimp_limit = np.array([_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0])
-        add_servo(spec, name, self.servo_stiffness, self.servo_damping)
 
     def tune(self, model: mujoco.MjModel) -> None:
         """Turn stiffness and damping into the limit's reference parameters."""
-        i = model.tendon(f"{self.joint_name}.mesh").id
-        scale = (1.0 - _IMPEDANCE) * model.tendon_invweight0[i]
-        model.tendon_solref_lim[i] = -self.stiffness * scale, -self.damping * scale
+        tune_mesh(model, mesh_tendon(self.joint_name), self.stiffness, self.damping)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Play, compliance and friction."""
@@ -89,6 +94,8 @@ class Gear(Defect):
             Parameter(f"gear.{j}.damping", "N.m.s/rad", self.damping),
             Parameter(f"gear.{j}.rotor_inertia", "kg.m2", self.rotor_inertia),
             Parameter(f"gear.{j}.link_inertia", "kg.m2", self.link_inertia),
+            Parameter(f"gear.{j}.servo_stiffness", "N.m/rad", self.servo_stiffness),
+            Parameter(f"gear.{j}.servo_damping", "N.m.s/rad", self.servo_damping),
             Parameter(f"friction.{j}.coulomb", "N.m", self.coulomb),
             Parameter(f"friction.{j}.viscous", "N.m.s/rad", self.viscous),
         )
@@ -114,6 +121,22 @@ class DirectDrive(Defect):
         """Add rotor inertia and servo."""
         joint(spec, self.joint_name).armature = self.rotor_inertia
         add_servo(spec, self.joint_name, self.servo_stiffness, self.servo_damping)
+
+
+def add_mesh(spec: mujoco.MjSpec, name: str, coefficients: dict[str, float], gap: float) -> None:
+    """Limit a linear combination of joint positions to +-gap/2."""
+    mesh = spec.add_tendon(name=name, limited=True)
+    for joint_name, coefficient in coefficients.items():
+        mesh.wrap_joint(joint_name, coefficient)
+    mesh.range = np.array([-0.5, 0.5]) * max(gap, 2.0 * _OPEN)
+    mesh.solimp_limit = np.array([_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0])
+
+
+def tune_mesh(model: mujoco.MjModel, name: str, stiffness: float, damping: float) -> None:
+    """Give the limit of a mesh its stiffness [N.m/rad] and damping [N.m.s/rad]."""
+    i = model.tendon(name).id
+    scale = (1.0 - _IMPEDANCE) * model.tendon_invweight0[i]
+    model.tendon_solref_lim[i] = -stiffness * scale, -damping * scale
 
 
 def add_servo(spec: mujoco.MjSpec, joint_name: str, stiffness: float, damping: float) -> None:
