@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from calibration.arm import PREFIX, first_joint, placement_derivative
 from calibration.errors import InputError, NotCalibrated, ShapeError
 from calibration.estimate import Estimate
 from calibration.estimate_files import load_estimate
 from calibration.hand import HandModel
-from calibration.parameters import parameter_names
+from calibration.parameters import AXES, parameter_names
 from calibration.robot import chain_of_frames
 
 
@@ -68,12 +69,14 @@ class Compensator:
         chain = chain_of_frames(estimate.urdf, robot.joints, robot.base_frame, robot.tool_frame)
         model = estimate.model(estimate.main)
         names, known = parameter_names(chain), [p.name for p in model.parameters]
-        covariance = np.zeros((len(names), len(names)))
-        mine = [i for i, name in enumerate(names) if name in known]
-        theirs = [known.index(names[i]) for i in mine]
-        covariance[np.ix_(mine, mine)] = model.covariance[np.ix_(theirs, theirs)]
+        G = np.array([[float(name == other) for other in known] for name in names])
+        if f"{PREFIX}.x" in known:
+            arm = [known.index(f"{PREFIX}.{axis}") for axis in AXES]
+            first = names.index(f"geometry.{first_joint(chain)}.x")
+            vector = np.array([model.parameters[i].value for i in arm])
+            G[first : first + 6, arm] = placement_derivative(chain, vector)
         play = model.play if len(model.play) else np.zeros(len(chain.joints))
-        return cls(model.hand(chain, np.zeros(12)), covariance, play)
+        return cls(model.hand(chain, np.zeros(12)), G @ model.covariance @ G.T, play)
 
     def predict(
         self,

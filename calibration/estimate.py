@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from calibration.arm import PREFIX, as_placements
 from calibration.clock import Clock
 from calibration.errors import NoSuchElement
 from calibration.hand import HandModel, nominal_hand
 from calibration.identifiability import Combination, Status
 from calibration.options import Options
-from calibration.parameters import parameter_names
+from calibration.parameters import AXES, parameter_names
 from calibration.robot import Chain
+from calibration.se3 import from_vector
 from calibration.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -73,8 +75,11 @@ class Model:
         """The robot with this model's values; nominal chain and marker frames (12,) [m, rad] where it has none."""
         nominal = nominal_hand(chain, frames)
         values = {p.name: p.value for p in self.parameters}
-        theta = [values.get(n, x) for n, x in zip(parameter_names(chain), nominal.theta, strict=True)]
-        return nominal.with_theta(np.array(theta))
+        theta = np.array([values.get(n, x) for n, x in zip(parameter_names(chain), nominal.theta, strict=True)])
+        if f"{PREFIX}.x" in values:
+            arm = from_vector(np.array([values[f"{PREFIX}.{axis}"] for axis in AXES]))
+            theta[12 : 12 + 6 * len(chain.joints)] = as_placements(chain, arm).ravel()
+        return nominal.with_theta(theta)
 
     def with_clocks(self, clocks: Iterable[Clock]) -> "Model":
         """The model with `clock.<instrument>.{offset,drift}` after its own parameters."""

@@ -13,10 +13,9 @@ with L = diag(R', Jr(phi)) from (dp, dphi) to the local twist of a frame given a
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from calibration.robot import Chain
-from calibration.se3 import adjoint, from_vector, inverse
+from calibration.se3 import adjoint, from_vector, inverse, local_twist
 
 
 @dataclass(frozen=True)
@@ -95,10 +94,3 @@ class HandModel:
 def nominal_hand(chain: Chain, frames: np.ndarray) -> HandModel:
     """The datasheet's robot with marker frames (12,) [m, rad]."""
     return HandModel(chain, np.zeros(len(chain.joints)), frames[:6], frames[6:])
-
-
-def local_twist(vector: np.ndarray) -> np.ndarray:
-    """L (6, 6): change of translation and rotation vector -> local twist of that frame."""
-    L = np.zeros((6, 6))
-    L[:3, :3], L[3:, 3:] = pin.exp3(vector[3:]).T, pin.Jexp3(vector[3:])
-    return L

@@ -24,7 +24,7 @@ from calibration.schema import Body, Description
 from calibration.se3 import adjoint, inverse, to_vector
 
 _MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
-_BLOCKS = 4
+BLOCKS = 4
 _REST = 1.0  # [s] at the start of every trial
 _log = logging.getLogger(__name__)
 
@@ -71,7 +71,7 @@ def read_postures(description: Description, trials: Iterable[Trial], robot: Cloc
         raise NotEnoughData("no static calibration posture shows base and hand; record a static trial with dwells")
     q, T, quarters, unit, misfit = (np.array(x) for x in zip(*found, strict=True))
     unit = unit * description.sigmas.marker**2
-    factor = _inflation(quarters, unit)
+    factor = inflation(quarters, unit)
     _log.info("%d postures, noise of their means %.1f times that of independent samples", len(q), np.sqrt(factor))
     return Postures(q, T, factor * unit, misfit)
 
@@ -107,11 +107,11 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
     for k, (start, stop) in enumerate(dwell_windows(trial)):
         rows = (t_robot >= start) & (t_robot <= stop)
         seen = np.flatnonzero((trial.t_mocap >= start) & (trial.t_mocap <= stop))
-        if not rows.any() or len(seen) < _BLOCKS:
+        if not rows.any() or len(seen) < BLOCKS:
             _log.info("%s: dwell %d has no samples", trial.id, k)
             continue
-        whole, blocks = [seen], np.array_split(seen, _BLOCKS)
-        base, hand = (_mean_poses(body, trial, whole + blocks) for body in bodies)
+        whole, blocks = [seen], np.array_split(seen, BLOCKS)
+        base, hand = (mean_poses(body, trial, whole + blocks) for body in bodies)
         T = inverse(base.T) @ hand.T
         if not np.isfinite(T).all():
             _log.info("%s: base or hand not seen throughout dwell %d", trial.id, k)
@@ -122,7 +122,7 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
         yield trial.q_motor[rows].mean(axis=0), T[0], to_vector(inverse(T[:1]) @ T[1:]), covariance, misfit
 
 
-def _mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
+def mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
     """Poses of a body from its markers averaged over each group of samples."""
     names = [m.name for m in body.markers if m.name in trial.marker]
     xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
@@ -137,8 +137,8 @@ def _mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses
     return body_poses(xyz, means)
 
 
-def _inflation(quarters: np.ndarray, unit: np.ndarray) -> float:
+def inflation(quarters: np.ndarray, unit: np.ndarray) -> float:
     """Mean squared Mahalanobis distance, per degree of freedom, of quarter means (n, 4, 6) about their mean."""
     d = quarters - quarters.mean(axis=1, keepdims=True)
-    squared = np.einsum("nki,nij,nkj->n", d, np.linalg.inv(unit * _BLOCKS), d)
-    return max(1.0, float(squared.mean()) / (6 * (_BLOCKS - 1)))
+    squared = np.einsum("nki,nij,nkj->n", d, np.linalg.inv(unit * BLOCKS), d)
+    return max(1.0, float(squared.mean()) / (6 * (BLOCKS - 1)))

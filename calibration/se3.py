@@ -7,6 +7,7 @@ T is (n, 4, 4), a twist (n, 6) is linear then angular, local: T exp6(xi) perturb
 """
 
 import numpy as np
+import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 
@@ -63,3 +64,10 @@ def mean(T: np.ndarray) -> np.ndarray:
     """Mean pose (4, 4) of poses close to each other (n, 4, 4), samples with NaN left out."""
     T = T[np.isfinite(T).all(axis=(1, 2))]
     return compose(Rotation.from_matrix(T[:, :3, :3]).mean().as_matrix(), T[:, :3, 3].mean(axis=0))
+
+
+def local_twist(vector: np.ndarray) -> np.ndarray:
+    """L (6, 6): change of translation and rotation vector -> local twist of that frame."""
+    L = np.zeros((6, 6))
+    L[:3, :3], L[3:, 3:] = pin.exp3(vector[3:]).T, pin.Jexp3(vector[3:])
+    return L
