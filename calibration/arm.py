@@ -7,11 +7,11 @@ chain are a lift or a rail of the base. An increment on the right, T_base_arm ex
 """
 
 import numpy as np
-import pinocchio as pin
 
 from calibration.errors import InputError
 from calibration.robot import Chain
 from calibration.se3 import from_vector, inverse, local_twist
+from calibration.twists import jlog6, log6
 
 PREFIX = "frame.base.arm"
 
@@ -46,11 +46,10 @@ def nominal_arm(chain: Chain) -> np.ndarray:
 def as_placements(chain: Chain, T_base_arm: np.ndarray) -> np.ndarray:
     """Placement twists (k, 6) of a nominal chain [m, rad] that put its arm at T_base_arm (4, 4)."""
     xi = np.zeros((len(chain.joints), 6))
-    xi[chain.joints.index(first_joint(chain))] = pin.log6(inverse(nominal_arm(chain)) @ T_base_arm).vector
+    xi[chain.joints.index(first_joint(chain))] = log6(inverse(nominal_arm(chain)) @ T_base_arm)
     return xi
 
 
 def placement_derivative(chain: Chain, vector: np.ndarray) -> np.ndarray:
     """Derivative (6, 6) of that joint's twist by translation and rotation vector (6,) of T_base_arm."""
-    increment = pin.SE3(inverse(nominal_arm(chain)) @ from_vector(vector))
-    return pin.Jlog6(increment) @ local_twist(vector)
+    return jlog6(log6(inverse(nominal_arm(chain)) @ from_vector(vector))) @ local_twist(vector)

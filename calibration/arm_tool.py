@@ -4,9 +4,9 @@
     minimise over T_base_arm, T_e_t    sum_i  r_i' S_i^-1 r_i,      r_i = log6(M_i^-1  X A_i Y)        [m, rad]
 
 with X = T_nominal^-1 T_base_arm the increment on a nominal guess (his footnote; any guess, the identity too),
-Y = T_e_t, A_i = T_arm_e(q_i) of the factory's arm, M_i = (T_lab_base T_nominal)^-1 T_lab_t as measured, S_i the covariance
-of its local twist. The text prints T_wt under the argmin; T_e_t is what is varied. Both are kept on the manifold,
-X <- X exp6(x), Y <- Y exp6(y), with
+Y = T_e_t, A_i = T_arm_e(q_i) of the factory's arm, M_i = (T_lab_base T_nominal)^-1 T_lab_t as measured, S_i the
+covariance of its local twist. The text prints T_wt under the argmin; T_e_t is what is varied. Both are kept on
+the manifold, X <- X exp6(x), Y <- Y exp6(y), with
 
     dr_i = J_log6(r_i) (Ad((A_i Y)^-1) dx + dy)
 
@@ -19,11 +19,11 @@ References: Heins 2022; Park, Martin, IEEE TRA 1994 (the start); Lange, Little, 
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from calibration.errors import NotEnoughData
 from calibration.se3 import adjoint, compose, inverse, rotation_vector
+from calibration.twists import exp6, jlog6, log6
 
 _STEPS = 100
 _REST = 1e-12  # [m, rad]
@@ -80,7 +80,7 @@ def fit_arm_tool(M: np.ndarray, A: np.ndarray, covariance: np.ndarray, robust: b
             weight = _weights(distance)
         normal = np.einsum("n,nij,nik->jk", weight, J, J)
         step = -np.linalg.solve(normal, np.einsum("n,nij,ni->j", weight, J, r))
-        X, Y = X @ pin.exp6(step[:6]).homogeneous, Y @ pin.exp6(step[6:]).homogeneous
+        X, Y = X @ exp6(step[:6]), Y @ exp6(step[6:])
         if np.abs(step).max() < _REST:
             converged = True
             break
@@ -90,9 +90,8 @@ def fit_arm_tool(M: np.ndarray, A: np.ndarray, covariance: np.ndarray, robust: b
 def residuals(X: np.ndarray, Y: np.ndarray, M: np.ndarray, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """r (n, 6) and its derivative (n, 6, 12) by local twists of X and Y."""
     AY = A @ Y
-    errors = [pin.SE3(m).actInv(pin.SE3(x)) for m, x in zip(M, X @ AY, strict=True)]
-    J_log = np.array([pin.Jlog6(error) for error in errors])
-    r = np.array([pin.log6(error).vector for error in errors])
+    r = log6(inverse(M) @ X @ AY)
+    J_log = jlog6(r)
     return r, np.concatenate([J_log @ adjoint(inverse(AY)), J_log], axis=2)
 
 
@@ -106,7 +105,8 @@ def start(M: np.ndarray, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     turns = np.linalg.svd(b, compute_uv=False)
     if len(M) < 3 or turns[1] < _TURNED * turns[0]:
         raise NotEnoughData(
-            f"{len(M)} postures turn the arm about one axis only; a turn of arm base and tool about it cannot be told apart"
+            f"{len(M)} postures turn the arm about one axis only; a turn of arm base "
+            "and tool about it cannot be told apart"
         )
     U, _, Vt = np.linalg.svd(a.T @ b)
     R_X = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt

@@ -1,4 +1,4 @@
-"""Stage `arm_tool`: where the arm stands in the base frame and the hand in the tool frame, the arm as the factory left it.
+"""Stage `arm_tool`: the arm in the base frame and the hand in the tool frame, the arm itself as the factory left it.
 
 See `arm_tool` for the fit. Gauge: while only the arm moves, the postures see T_B_arm = T_base_B^-1 T_base_arm and
 T_tool_hand, twelve directions of eighteen; T_base_B from spins and drives splits the first. Its error moves T_base_arm
@@ -104,9 +104,7 @@ def _covariance(theta: np.ndarray, T_B_arm: np.ndarray, base: np.ndarray, twists
     return G @ block_diag(base, twists) @ G.T
 
 
-def _whitened(
-    theta: np.ndarray, found: ArmTool, A: np.ndarray, postures: Postures, T_B_arm: np.ndarray
-) -> np.ndarray:
+def _whitened(theta: np.ndarray, found: ArmTool, A: np.ndarray, postures: Postures, T_B_arm: np.ndarray) -> np.ndarray:
     """Derivative (6 n, 18) of the hand's whitened pose in the base body by the three frames."""
     AY = A @ found.Y
     J = np.concatenate(
@@ -134,7 +132,7 @@ def _verdicts(
         yield Verdict(
             STAGE,
             "warning",
-            f"the arm is not as the factory drew it ({left}); sigmas are widened, and stage geometry would calibrate it",
+            f"the arm is not as the factory drew it ({left}); sigmas are widened; stage geometry would calibrate it",
         )
     if len(stray):
         yield Verdict(STAGE, "warning", f"postures {stray.tolist()} do not belong to the others and count less")

@@ -6,14 +6,10 @@
     E        pose of the base frame on the floor, a nuisance of every rest
     T_base_B the marker body B in the base frame, what is asked for, (x, y, z, rx, ry, rz)
 
-Motion ties the rests of a trial together, in base axes and from one rest to the next:
-
-    spin     (dx, dy) = w,                         w ~ N(0, s^2)     a free centre that wanders by s a step
-    drive    dy cos(phi) - dx sin(phi) = w         phi the mean heading: no side slip on any arc
-
-s is estimated, one a trial, by restricted maximum likelihood (Fisher scoring, the linearised T_base_B integrated out);
-s = 0 is the rigid spin of a turntable. Spins give the axis; rz, the forward direction, needs a drive; z needs the floor.
-Reference: Heins, calibration of a mobile manipulator, 2022, eq. 3-4; Patterson, Thompson, Biometrika 1971 (REML).
+Motion ties the rests of a trial together (`base_ties`), up to a wander of s a step that is estimated, one s a trial
+(`base_wander`); s = 0 is the rigid spin of a turntable. Spins give the axis; rz, the forward direction, needs a drive;
+z the floor.
+Reference: Heins, mobile_manipulation_central, calibration notes, 2022, eq. 3-4, for the question.
 """
 
 from dataclasses import dataclass, replace
@@ -22,13 +18,13 @@ import numpy as np
 import pinocchio as pin
 
 from calibration.base_motion import Stations
-from calibration.se3 import local_twist
-from calibration.se3 import adjoint, compose, from_vector, inverse, rotation_vector
+from calibration.base_ties import ties
+from calibration.base_wander import wander_of
+from calibration.se3 import adjoint, compose, from_vector, inverse, local_twist, rotation_vector
 
 _BASE, _TILT = slice(0, 6), slice(6, 8)  # of the common parameters
-_STEPS, _SCORING = 40, 30
-_REST = 1e-12  # steps smaller than this end the iteration [m, rad]
-_TOWARDS_REST = 1e-3  # relative change of s^2 below which it stands still [-]
+_STEPS = 40
+_REST = 1e-5  # steps smaller than this, in standard deviations, end the iteration [-]
 
 
 @dataclass(frozen=True)
@@ -52,21 +48,6 @@ class BaseFrame:
     covariance: np.ndarray
     chi2: float
     converged: bool
-
-
-@dataclass(frozen=True)
-class Ties:
-    """Linearised constraints between rests: c(d + dd) = c + C dd.
-
-    Attributes:
-        c: (m,) value [m].
-        C: (m, n, 3) derivative by every rest's planar pose.
-        trial: (m,) index of the trial each row is of.
-    """
-
-    c: np.ndarray
-    C: np.ndarray
-    trial: np.ndarray
 
 
 def fit_base_frame(stations: Stations, start: np.ndarray, floor: np.ndarray, free: np.ndarray) -> BaseFrame:
@@ -94,42 +75,93 @@ def _planar(stations: Stations, base: np.ndarray, floor: np.ndarray) -> np.ndarr
     return np.column_stack([T[:, :2, 3] - floor[:2], np.arctan2(T[:, 1, 0], T[:, 0, 0])])
 
 
-def _step(
-    stations: Stations, state: BaseFrame, floor: np.ndarray, columns: np.ndarray, v: np.ndarray
-) -> tuple[BaseFrame, np.ndarray, float]:
-    """One Gauss-Newton step for all, with s^2 = v estimated at the linearisation; and its largest entry.
+@dataclass(frozen=True)
+class Reduced:
+    """The linearised problem with every rest eliminated, d = d0 - D g - G slip; g are the free common parameters.
 
-    Rests are eliminated one by one: d = d0 - D g, so that g sees the ties through V = C H^-1 C' + diag(v), and the
-    postures alone through U.
+        ties         c + X g = -n,      n ~ N(0, V + diag(s^2))
+        rests alone  h + R g = n,       n ~ N(0, 1)
+
+    Attributes:
+        d0: (n, 3) steps of the planar poses by the markers alone.
+        sigma: (n, 3) their standard deviations [m, rad].
+        D: (n, 3, p).
+        G: (m, n, 3).
+        c: (m,) [m].
+        X: (m, p).
+        V: (m, m) [m2].
+        trial: (m,) of each tie.
+        h: (p,) [-].
+        R: (p, p).
+        left: Squared whitened residual that no g explains [-].
     """
+
+    d0: np.ndarray
+    sigma: np.ndarray
+    D: np.ndarray
+    G: np.ndarray
+    c: np.ndarray
+    X: np.ndarray
+    V: np.ndarray
+    trial: np.ndarray
+    h: np.ndarray
+    R: np.ndarray
+    left: float
+
+
+def _reduced(stations: Stations, state: BaseFrame, floor: np.ndarray, columns: np.ndarray) -> Reduced:
     W = np.linalg.inv(np.linalg.cholesky(stations.covariance))
     r, J_g, J_d = residuals(state.base, state.tilt, state.planar, stations, floor)
     r, J_g, J_d = (W @ r[..., None])[..., 0], (W @ J_g)[:, :, columns], W @ J_d
-    H = np.linalg.inv(np.swapaxes(J_d, 1, 2) @ J_d)
-    d0, D = -(H @ np.swapaxes(J_d, 1, 2) @ r[..., None])[..., 0], H @ np.swapaxes(J_d, 1, 2) @ J_g
-    left_r, left_J = (r + (J_d @ d0[..., None])[..., 0]).ravel(), (J_g - J_d @ D).reshape(-1, columns.sum())
+    J_t = np.swapaxes(J_d, 1, 2)
+    H = np.linalg.inv(J_t @ J_d)
+    d0, D = -(H @ J_t @ r[..., None])[..., 0], H @ J_t @ J_g
+    rest = (r + (J_d @ d0[..., None])[..., 0]).ravel()
+    Q, R = np.linalg.qr((J_g - J_d @ D).reshape(len(rest), -1))
+    h = Q.T @ rest
     tied = ties(stations, state.planar)
-    c, X = tied.c + np.einsum("mnk,nk->m", tied.C, d0), -np.einsum("mnk,nkg->mg", tied.C, D)
-    gain = np.einsum("mnk,nkl->mnl", tied.C, H)
-    V = np.einsum("mnl,pnl->mp", gain, tied.C)
-    Q, R = np.linalg.qr(left_J)
-    v = _wander(np.concatenate([c, Q.T @ left_r]), np.vstack([X, R]), V, tied.trial, v)
-    V_inv = np.linalg.inv(V + np.diag(v[tied.trial]))
-    information = X.T @ V_inv @ X + R.T @ R
-    covariance = np.linalg.inv(information)
-    g = -covariance @ (X.T @ V_inv @ c + R.T @ (Q.T @ left_r))
-    slip = V_inv @ (c + X @ g)
-    d = d0 - D @ g - np.einsum("mnl,m->nl", gain, slip)
-    common = np.zeros(8)
-    common[columns] = g
-    padded = np.zeros((8, 8))
-    padded[np.ix_(columns, columns)] = covariance
-    chi2 = float(slip @ (c + X @ g) + ((left_r + left_J @ g) ** 2).sum()) / max(1, r.size - 3 * len(r) + len(c) - len(g))
-    step = float(max(np.abs(common).max(), np.abs(d).max()))
-    grown = BaseFrame(
-        state.base + common[_BASE], state.tilt + common[_TILT], state.planar + d, np.sqrt(v), padded, chi2, False
+    G = np.einsum("mnk,nkl->mnl", tied.C, H)
+    return Reduced(
+        d0=d0,
+        sigma=np.sqrt(np.diagonal(H, axis1=1, axis2=2)),
+        D=D,
+        G=G,
+        c=tied.c + np.einsum("mnk,nk->m", tied.C, d0),
+        X=-np.einsum("mnk,nkg->mg", tied.C, D),
+        V=np.einsum("mnl,pnl->mp", G, tied.C),
+        trial=tied.trial,
+        h=h,
+        R=R,
+        left=float(rest @ rest - h @ h),
     )
-    return grown, v, step
+
+
+def _step(
+    stations: Stations, state: BaseFrame, floor: np.ndarray, columns: np.ndarray, v: np.ndarray
+) -> tuple[BaseFrame, np.ndarray, float]:
+    """One Gauss-Newton step for all, s^2 = v estimated at the linearisation; its largest entry, in sigmas [-]."""
+    p = _reduced(stations, state, floor, columns)
+    v = wander_of(np.concatenate([p.c, p.h]), np.vstack([p.X, p.R]), p.V, p.trial, v)
+    V_inv = np.linalg.inv(p.V + np.diag(v[p.trial]))
+    covariance = np.linalg.inv(p.X.T @ V_inv @ p.X + p.R.T @ p.R)
+    g = -covariance @ (p.X.T @ V_inv @ p.c + p.R.T @ p.h)
+    slip = V_inv @ (p.c + p.X @ g)
+    d = p.d0 - p.D @ g - np.einsum("mnl,m->nl", p.G, slip)
+    common, padded = np.zeros(8), np.zeros((8, 8))
+    common[columns], padded[np.ix_(columns, columns)] = g, covariance
+    squared = p.left + float(slip @ (p.c + p.X @ g) + ((p.h + p.R @ g) ** 2).sum())
+    dof = 3 * len(p.d0) + len(p.c) - len(g)
+    grown = BaseFrame(
+        base=state.base + common[_BASE],
+        tilt=state.tilt + common[_TILT],
+        planar=state.planar + d,
+        wander=np.sqrt(v),
+        covariance=padded,
+        chi2=squared / max(1, dof),
+        converged=False,
+    )
+    step = max(np.abs(g / np.sqrt(np.diag(covariance))).max(), np.abs(d / p.sigma).max())
+    return grown, v, float(step)
 
 
 def residuals(
@@ -145,7 +177,9 @@ def residuals(
     T = compose(pin.exp3(turn), floor) @ E @ T_base_B
     R_t = np.swapaxes(stations.T[:, :3, :3], 1, 2)
     error = R_t @ T[:, :3, :3]
-    r = np.concatenate([(R_t @ (T[:, :3, 3] - stations.T[:, :3, 3])[..., None])[..., 0], rotation_vector(error)], axis=1)
+    r = np.concatenate(
+        [(R_t @ (T[:, :3, 3] - stations.T[:, :3, 3])[..., None])[..., 0], rotation_vector(error)], axis=1
+    )
     twist_d = np.zeros((len(E), 6, 3))
     twist_d[:, :3, :2], twist_d[:, 5, 2] = np.swapaxes(E[:, :3, :3], 1, 2)[:, :, :2], 1.0
     twist_tilt = np.vstack([np.zeros((3, 2)), pin.Jexp3(turn)[:, :2]])
@@ -166,49 +200,3 @@ def from_planar(planar: np.ndarray) -> np.ndarray:
     """E (n, 4, 4) of x, y [m] and heading [rad] (n, 3)."""
     zeros = np.zeros(len(planar))
     return from_vector(np.column_stack([planar[:, :2], zeros, zeros, zeros, planar[:, 2]]))
-
-
-def ties(stations: Stations, planar: np.ndarray) -> Ties:
-    """Constraints between consecutive rests of each trial, see the head of this file."""
-    n, values, rows, trials = len(planar), [], [], []
-    for i in range(1, n):
-        trial = stations.trial[i]
-        if stations.trial[i - 1] != trial:
-            continue
-        dx, dy = planar[i, :2] - planar[i - 1, :2]
-        if stations.kinds[trial] == "spin":
-            row = np.zeros((2, n, 3))
-            row[:, i, :2], row[:, i - 1, :2] = np.eye(2), -np.eye(2)
-            values += [dx, dy]
-        else:
-            phi = 0.5 * (planar[i, 2] + planar[i - 1, 2])
-            s, k = np.sin(phi), np.cos(phi)
-            turning = -0.5 * (dx * k + dy * s)
-            row = np.zeros((1, n, 3))
-            row[0, i], row[0, i - 1] = (-s, k, turning), (s, -k, turning)
-            values.append(dy * k - dx * s)
-        rows.append(row)
-        trials += [trial] * len(row)
-    return Ties(np.array(values), np.concatenate(rows), np.array(trials))
-
-
-def _wander(y: np.ndarray, X: np.ndarray, V: np.ndarray, trial: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """s^2 of each trial [m2]: restricted likelihood of y = -X g + n, n ~ N(0, diag(V + v, 1)), by Fisher scoring.
-
-    y and X hold the m ties first, then what the postures say alone, whitened.
-    """
-    m = len(trial)
-    member = (trial[:, None] == np.arange(len(v))).astype(float)
-    for _ in range(_SCORING):
-        inverse_V = np.eye(len(y))
-        inverse_V[:m, :m] = np.linalg.inv(V + np.diag(v[trial]))
-        seen = inverse_V @ X
-        P = (inverse_V - seen @ np.linalg.solve(X.T @ seen, seen.T))[:m]
-        score = 0.5 * member.T @ ((P @ y) ** 2 - np.diag(P[:, :m]))
-        information = 0.5 * member.T @ P[:, :m] ** 2 @ member
-        new = np.maximum(0.0, v + np.linalg.pinv(information) @ score)
-        still = np.abs(new - v) <= _TOWARDS_REST * new
-        v = new
-        if still.all():
-            break
-    return v

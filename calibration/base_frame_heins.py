@@ -3,8 +3,8 @@
     centre    minimise over r   sum_i |R_i r + p_i - R_0 r - p_0|^2       linear: (R_i - R_0) r = p_0 - p_i
     forward   mean over i of    atan2(y_i, x_i),   (x_i, y_i) = R_0' (c_i - c_0)
 
-with T_lab_B(i) = (R_i, p_i), r the centre in the axes of B, so A = C_i - C_0 as in his code. Read with an offset that is
-constant in the world, as the text prints it, the minimiser is the mean of the p_i and no centre. Every row
+with T_lab_B(i) = (R_i, p_i), r the centre in the axes of B, so A = C_i - C_0 as in his code. Read with an offset
+that is constant in the world, as the text prints it, the minimiser is the mean of the p_i and no centre. Every row
 leans on rest 0, whose noise all of them share, and every sample of the drive counts alike, the first as the last.
 Reference: Heins, mobile_manipulation_central, calibration notes and code, 2022.
 """

@@ -77,8 +77,8 @@ def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarr
     yield Verdict(
         STAGE,
         "ok",
-        f"{len(stations)} rests in {stations.kinds.count('spin')} spins and {stations.kinds.count('drive')} drives; floor "
-        f"tilted {1e3 * float(np.hypot(*found.tilt)):.2f} mrad; the printed estimator's centre is "
+        f"{len(stations)} rests, {stations.kinds.count('spin')} spins and {stations.kinds.count('drive')} drives; "
+        f"floor tilted {1e3 * float(np.hypot(*found.tilt)):.2f} mrad; the printed estimator's centre is "
         f"{1e3 * float(np.hypot(*away[:2])):.3f} mm away{forward}",
     )
     for index, (name, kind) in enumerate(zip(stations.ids, stations.kinds, strict=True)):
@@ -94,5 +94,7 @@ def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarr
     if missing:
         yield Verdict(STAGE, "warning", f"held at nominal: {', '.join(missing)}")
     if found.chi2 > _CHI2:
-        message = f"rests differ by {np.sqrt(found.chi2):.1f} times the markers' noise in tilt and height; sigmas say so"
+        message = (
+            f"rests differ by {np.sqrt(found.chi2):.1f} times the markers' noise in tilt and height; sigmas say so"
+        )
         yield Verdict(STAGE, "warning", message)

@@ -1,17 +1,21 @@
 """From recordings to an estimate: the stages, in their order.
 
-    clocks -> registration -> suspension -> geometry -> joints
+    clocks -> registration -> base_frame -> arm_tool -> suspension -> geometry -> joints
 
-A stage that needs another runs it. Only calibration trials are opened.
+A stage that needs another runs it. Only calibration trials are opened. Spins and drives, where the base moves on
+purpose, are for `base_frame` alone; all other stages see the trials in which it stands.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from calibration.arm_tool_stage import locate_arm
+from calibration.base_frame_stage import locate_base
+from calibration.base_motion import MOVES, read_stations
 from calibration.clock import Clock
 from calibration.clocks import synchronise
 from calibration.dataset import Dataset
-from calibration.errors import InputError, NoSuchElement
+from calibration.errors import InputError, NoSuchElement, NotEnoughData
 from calibration.estimate import Estimate, Model, RobotNames
 from calibration.estimate_parts import joints_model, suspension_model
 from calibration.geometry import calibrate_geometry
@@ -29,9 +33,10 @@ from calibration.verdict import Verdict
 
 Progress = Callable[[str, float], None]
 
-STAGES = ("clocks", "registration", "suspension", "geometry", "joints")
-MAIN = ("model_2", "registration")  # rows an estimate can stand for, the best first
-_NEEDS = {"joints": "geometry"}
+STAGES = ("clocks", "registration", "base_frame", "arm_tool", "suspension", "geometry", "joints")
+_FRAMES = ("base_frame", "arm_tool")  # run where there is a spin; alone where the arm only ever posed
+MAIN = ("model_2", "arm_tool", "registration")  # rows an estimate can stand for, the best first
+_NEEDS = {"joints": "geometry", "arm_tool": "base_frame"}
 _SPACING = 0.5  # [s] of the swings' postures the registration sees beside the static ones
 
 
@@ -42,7 +47,7 @@ class Work:
     Attributes:
         dataset: The recordings.
         chain: The nominal chain.
-        trials: All calibration trials.
+        trials: Calibration trials in which the base stands.
         clocks: Of the instruments, the robot's first.
         postures: The static ones.
         passing: Those of the swings, None where there is no swing.
@@ -68,6 +73,10 @@ class Work:
         grown = replace(e, models=(*e.models, model.with_clocks(self.clocks)), verdicts=(*e.verdicts, *said), **parts)  # type: ignore[arg-type]
         return replace(self, estimate=grown)
 
+    def saying(self, *said: Verdict) -> "Work":
+        """With something to say and no model."""
+        return replace(self, estimate=replace(self.estimate, verdicts=(*self.estimate.verdicts, *said)))
+
 
 def calibrate(
     dataset: Dataset,
@@ -75,7 +84,7 @@ def calibrate(
     progress: Progress | None = None,
     options: Options | None = None,
 ) -> Estimate:
-    """Run the stages (all where none is named) on the calibration trials of a dataset, as the options say.
+    """Run the stages (all the data are for, where none is named) on the calibration trials, as the options say.
 
     The result says itself whether it may be used: `status` and `verdicts`.
 
@@ -84,7 +93,7 @@ def calibrate(
         InputError: There is no calibration trial.
         NotEnoughData: There is none from which the clocks can be told.
     """
-    wanted = _wanted(stages)
+    wanted = _wanted(_usual(dataset) if stages is None else stages)
     tell = progress or (lambda stage, share: None)
     chain = chain_of(dataset.urdf, dataset.description)
     tell("reading", 0.0)
@@ -99,14 +108,15 @@ def calibrate(
     if refused:
         return replace(empty, verdicts=tuple(refused))
     tell("clocks", 0.2)
-    clocks, said = synchronise(dataset.urdf, dataset.description, trials)
+    standing = _standing(dataset, trials)
+    clocks, said = synchronise(dataset.urdf, dataset.description, standing)
     estimate = replace(empty, verdicts=tuple(said), clocks=clocks)
     fits = [name for name in STAGES[1:] if name in wanted]
     if not fits:
         return estimate
     tell("postures", 0.5)
-    postures = read_postures(dataset.description, trials, clocks[0])
-    work = Work(dataset, chain, trials, clocks, postures, _passing(dataset, trials, clocks[0]), estimate)
+    postures = read_postures(dataset.description, standing, clocks[0])
+    work = Work(dataset, chain, standing, clocks, postures, _passing(dataset, trials, clocks[0]), estimate)
     for k, name in enumerate(fits):
         tell(name, 0.55 + 0.45 * k / len(fits))
         work = _RUN[name](work)
@@ -114,12 +124,33 @@ def calibrate(
     return _concluded(work.estimate)
 
 
-def _wanted(stages: Sequence[str] | None) -> set[str]:
-    wanted = set(STAGES if stages is None else stages)
+def _usual(dataset: Dataset) -> tuple[str, ...]:
+    """The stages a dataset was recorded for."""
+    kinds = {entry.kind for entry in dataset.entries("calibration")}
+    if "spin" not in kinds:
+        return tuple(name for name in STAGES if name not in _FRAMES)
+    return STAGES if kinds & {"sweep", "swing"} else ("clocks", "registration", *_FRAMES)
+
+
+def _wanted(stages: Sequence[str]) -> set[str]:
+    wanted = set(stages)
     for name in sorted(wanted):
         if name not in STAGES:
             raise NoSuchElement("stage", name, STAGES)
     return wanted | {_NEEDS[name] for name in wanted & _NEEDS.keys()}
+
+
+def _standing(dataset: Dataset, trials: Sequence[Trial]) -> tuple[Trial, ...]:
+    """Those in which the base stands.
+
+    Raises:
+        NotEnoughData: There is none.
+    """
+    pairs = zip(dataset.entries("calibration"), trials, strict=True)
+    found = tuple(trial for entry, trial in pairs if entry.kind not in MOVES)
+    if not found:
+        raise NotEnoughData("in every calibration trial the base moves; record static postures of the arm too")
+    return found
 
 
 def _passing(dataset: Dataset, trials: Sequence[Trial], robot: Clock) -> Postures | None:
@@ -133,12 +164,25 @@ def _register(work: Work) -> Work:
     return work.with_model(*register(work.chain, work.description, data))
 
 
+def _locate_base(work: Work) -> Work:
+    moves = [(entry.kind, trial) for entry, trial in work.dataset.trials("calibration", *MOVES)]
+    if not moves:
+        return work.saying(Verdict("base_frame", "missing", "no trial of kind spin: T_base_B stays as drawn"))
+    model, said = locate_base(work.chain, work.description, read_stations(work.description, moves))
+    return work.saying(*said) if model is None else work.with_model(model, said)
+
+
+def _locate_arm(work: Work) -> Work:
+    base_frame = next((m for m in work.estimate.models if m.name == "base_frame"), None)
+    return work.with_model(*locate_arm(work.chain, work.description, work.postures, base_frame))
+
+
 def _suspend(work: Work) -> Work:
     robot, plate = work.clocks[0], next((c for c in work.clocks if c.instrument == "plate"), None)
     form = Form(full=work.estimate.options.suspension == "full")
     found, said = fit_suspension(work.dataset.urdf, work.description, work.trials, robot, plate, form=form)
     if found is None:
-        return replace(work, estimate=replace(work.estimate, verdicts=(*work.estimate.verdicts, *said)))
+        return work.saying(*said)
     return work.with_model(suspension_model(found), said, suspension=found)
 
 
@@ -162,12 +206,14 @@ def _calibrate_joints(work: Work) -> Work:
         link_zero=tuple(map(float, found.zero)),
     )
     if not found.models:
-        grown = replace(work.estimate, verdicts=(*work.estimate.verdicts, *said))
+        return work.saying(*said)
     return replace(work, estimate=grown)
 
 
 _RUN: dict[str, Callable[[Work], Work]] = {
     "registration": _register,
+    "base_frame": _locate_base,
+    "arm_tool": _locate_arm,
     "suspension": _suspend,
     "geometry": _calibrate_geometry,
     "joints": _calibrate_joints,

@@ -6,11 +6,12 @@ from calibration.base_frame import from_planar
 from calibration.base_motion import Stations
 from calibration.bodies import body_poses
 from calibration.se3 import compose, from_vector
+from tests.calibration import matched
 
 MARKERS = np.array([[0.21, 0.17, 0.31], [0.21, -0.17, 0.31], [-0.20, -0.17, 0.32], [-0.20, 0.17, 0.30]])
 TRUE = np.array([4e-3, -3e-3, 1.5e-3, 6e-3, -4e-3, 12e-3])
 TILT = np.array([1.5e-3, -0.8e-3])
-FLOOR = np.array([0.9, 0.45, 0.0])
+FLOOR = np.array(matched.described().plates[0].centre)
 EVERY = np.ones(6, dtype=bool)
 SIGMA = 1e-4 / np.sqrt(80.0)
 
