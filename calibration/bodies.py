@@ -60,17 +60,24 @@ def body_poses(xyz: np.ndarray, positions: np.ndarray) -> BodyPoses:
 
 
 def poses_of(body: Body, trial: Trial) -> BodyPoses:
-    """Poses of a marker body throughout a trial, at its `t_mocap`.
+    """Poses of a marker body throughout a trial, at its `t_mocap`; a body without markers is the positions' own frame.
 
     Raises:
         NotEnoughData: The trial does not record three of its markers.
     """
+    if not body.markers:
+        return still_poses(len(trial.t_mocap))
     recorded = {name: i for i, name in enumerate(trial.marker)}
     markers = [m for m in body.markers if m.name in recorded]
     if len(markers) < 3:
         raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {[m.name for m in markers]} are recorded")
     columns = [recorded[m.name] for m in markers]
     return body_poses(np.array([m.xyz for m in markers]), trial.marker_position[:, columns])
+
+
+def still_poses(n: int) -> BodyPoses:
+    """Poses of the body whose frame the marker positions are in: the identity, exactly, n times."""
+    return BodyPoses(np.tile(np.eye(4), (n, 1, 1)), np.full((n, 0, 3), np.nan), np.zeros((n, 6, 6)))
 
 
 def _covariances(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

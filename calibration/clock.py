@@ -51,6 +51,11 @@ class Clock:
         return (t - self.offset) / (1.0 + self.drift)
 
 
+def shared_clock(instrument: str) -> Clock:
+    """The clock of an instrument that one machine samples together with the motion capture."""
+    return Clock(instrument, 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class TrialLag:
     """Lag of one trial, at time s [s] of the instrument's clock."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.bodies import poses_of
-from calibration.clock import Clock, TrialLag, fit_clock
+from calibration.clock import Clock, TrialLag, fit_clock, shared_clock
 from calibration.clock_refinement import Provisional, link_angles, provisional, refined
 from calibration.errors import NotEnoughData
 from calibration.inverse_dynamics import (
@@ -60,25 +60,51 @@ def synchronise(
     """Clocks of the instruments recorded in these trials, the robot's first.
 
     Raises:
-        NotEnoughData: The robot's clock cannot be told from the motion capture's.
+        NotEnoughData: There are encoder readings, but their clock cannot be told from the motion capture's.
     """
-    chain = chain_of(urdf, description)
+    with_robot, with_plate = ([t for t in trials if len(getattr(t, f"t_{name}"))] for name in ("robot", "plate"))
+    robot, model, said = None, None, _missing("robot", "no encoder readings")
+    if with_robot:
+        robot, model, said = _robot_clock(chain_of(urdf, description), description, with_robot)
+    plate, more = None, _missing("plate", "no force plate")
+    if with_plate:
+        plate, more = _plate_clock(urdf, description, with_plate, robot, model)
+    return tuple(c for c in (robot, plate) if c is not None), (*said, *more)
+
+
+def _missing(instrument: str, why: str) -> tuple[Verdict, ...]:
+    lost = {"robot": "no hand pose to predict or calibrate", "plate": "no plate wrench"}[instrument]
+    return (Verdict("clocks", "missing", f"{why}: no {instrument} clock, {lost}"),)
+
+
+def _robot_clock(
+    chain: Chain, description: Description, trials: Sequence[Trial]
+) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
+    """The robot's clock, and the provisional robot the plate's is told with."""
+    if "robot" in description.mocap_clock:
+        return shared_clock("robot"), None, (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
     robot, verdicts = _clock("robot", _robot_motions(description, chain, trials), 1)
-    model = None
     try:
         model = provisional(chain, description, trials, robot)
         robot, verdicts = _concluded("robot", refined(model, description, trials, robot))
     except NotEnoughData as error:
-        verdicts = (*verdicts, Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}"))
-    with_plate = [trial for trial in trials if len(trial.t_plate)]
-    if not with_plate:
-        return (robot,), (*verdicts, Verdict("clocks", "missing", "no force plate: no plate clock, no plate wrench"))
-    parts = carriers(floating_model(urdf, description), description, with_plate)
+        warning = Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}")
+        return robot, None, (*verdicts, warning)
+    return robot, model, verdicts
+
+
+def _plate_clock(
+    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock | None, model: Provisional | None
+) -> tuple[Clock | None, tuple[Verdict, ...]]:
+    if "plate" in description.mocap_clock:
+        return shared_clock("plate"), (Verdict("clocks", "ok", "plate: on the motion capture's clock"),)
+    if robot is None:
+        return None, _missing("plate", "the plate's clock is told from encoder readings, and there are none")
+    parts = carriers(floating_model(urdf, description), description, trials)
     try:
-        plate, more = _clock("plate", _plate_motions(parts, description, with_plate, robot, model), 2)
+        return _clock("plate", _plate_motions(parts, description, trials, robot, model), 2)
     except NotEnoughData as error:
-        return (robot,), (*verdicts, Verdict("clocks", "missing", f"no plate clock: {error}"))
-    return (robot, plate), (*verdicts, *more)
+        return None, (Verdict("clocks", "missing", f"no plate clock: {error}"),)
 
 
 def _clock(instrument: str, motions: Iterator[Motion], passes: int) -> tuple[Clock, tuple[Verdict, ...]]:

@@ -9,6 +9,7 @@ import pinocchio as pin
 from pydantic import ValidationError
 
 from calibration.errors import InputError, NoSuchElement
+from calibration.means import PostureMeans, holds_means, read_means
 from calibration.recording import Trial, read_trial, sha256
 from calibration.schema import Description, Role, TrialEntry
 
@@ -32,23 +33,51 @@ class Dataset:
         return tuple(t for t in self.description.trials if t.role == role and (not kinds or t.kind in kinds))
 
     def read(self, entry: TrialEntry) -> Trial:
-        """Read one trial and check it against dataset.json.
+        """Read one continuous trial and check it against dataset.json.
 
         Raises:
-            InputError: The file is damaged, changed since it was listed, or names other joints.
+            InputError: The file is damaged, changed since it was listed, names other joints, or holds means only.
         """
+        trial = read_trial(self._unchanged(entry), entry.id)
+        self._check_joints(entry, trial.joint)
+        return trial
+
+    def read_means(self, entry: TrialEntry) -> PostureMeans:
+        """Read one trial that holds posture means, and check it against dataset.json.
+
+        Raises:
+            InputError: As `read`.
+        """
+        means = read_means(self._unchanged(entry), entry.id)
+        self._check_joints(entry, means.joint)
+        return means
+
+    def has_means(self, entry: TrialEntry) -> bool:
+        """Whether a trial's file holds posture means instead of a continuous recording."""
+        return entry.kind == "static" and holds_means(self.folder / entry.file)
+
+    def trials(self, role: Role, *kinds: str) -> Iterator[tuple[TrialEntry, Trial]]:
+        """Read the continuous trials of a role one after the other."""
+        for entry in self.entries(role, *kinds):
+            if not self.has_means(entry):
+                yield entry, self.read(entry)
+
+    def means(self, role: Role) -> Iterator[tuple[TrialEntry, PostureMeans]]:
+        """Read the trials of a role that hold posture means one after the other."""
+        for entry in self.entries(role, "static"):
+            if self.has_means(entry):
+                yield entry, self.read_means(entry)
+
+    def _unchanged(self, entry: TrialEntry) -> Path:
         path = self.folder / entry.file
         if path.is_file() and sha256(path) != entry.sha256:
             raise InputError(path, "its sha256 is not the one in dataset.json: truncated or changed; copy it again")
-        trial = read_trial(path, entry.id)
-        if trial.joint != self.description.joint_names:
-            raise InputError(path, f"joints {trial.joint}, dataset.json has {self.description.joint_names}")
-        return trial
+        return path
 
-    def trials(self, role: Role, *kinds: str) -> Iterator[tuple[TrialEntry, Trial]]:
-        """Read the trials of a role one after the other."""
-        for entry in self.entries(role, *kinds):
-            yield entry, self.read(entry)
+    def _check_joints(self, entry: TrialEntry, joints: tuple[str, ...]) -> None:
+        if joints != self.description.joint_names:
+            path = self.folder / entry.file
+            raise InputError(path, f"joints {joints}, dataset.json has {self.description.joint_names}")
 
 
 def load(folder: Path | str) -> Dataset:

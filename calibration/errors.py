@@ -20,6 +20,19 @@ class InputError(CalibrationError):
         super().__init__(f"{path}: {message}")
 
 
+class InputErrors(InputError):
+    """Several files that cannot be used, each finding on a line of its own.
+
+    Attributes:
+        errors: The findings.
+    """
+
+    def __init__(self, errors: Sequence[InputError]) -> None:
+        self.errors = tuple(errors)
+        super().__init__(errors[0].path, "")
+        self.args = ("\n".join(str(error) for error in errors),)
+
+
 class ShapeError(CalibrationError):
     """An array whose shape is not the one its definition says."""
 

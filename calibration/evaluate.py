@@ -123,6 +123,11 @@ def evaluate(
     for k, entry in enumerate(entries):
         if progress is not None:
             progress(f"evaluating {entry.id}", k / len(entries))
+        if dataset.has_means(entry):
+            means = dataset.read_means(entry)
+            T_measured = means.poses_of(body).T
+            traces += [_means_trace(p, pose_errors(p.T_lab_hand, T_measured)) for p in predict.of_means(entry, means)]
+            continue
         trial = dataset.read(entry)
         T_measured = poses_of(body, trial).T
         traces += [_trace(p, trial, pose_errors(p.T_lab_hand, T_measured)) for p in predict(entry, trial)]
@@ -181,6 +186,10 @@ def trial_entry(trace: Trace) -> dict[str, Any]:
 def _trace(p: Prediction, trial: Trial, errors: PoseErrors) -> Trace:
     scored = scored_errors(p.t, errors, trial, p.kind == "static")
     return Trace(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
+
+
+def _means_trace(p: Prediction, errors: PoseErrors) -> Trace:
+    return Trace(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, errors)
 
 
 def _write_traces(path: Path, traces: tuple[Trace, ...]) -> None:

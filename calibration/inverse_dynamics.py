@@ -145,7 +145,7 @@ def _action(T_lab_frame: np.ndarray, trial: Trial) -> np.ndarray:
 
 def _link_poses(body: Body, trial: Trial, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """T_lab_link (n, 4, 4) at t with the link where the body's markers are, smooth, and validity (n,)."""
-    T = poses_of(body, trial).T
+    T = poses_of(body, trial).T @ inverse(from_vector(np.array(body.placement)))
     if not np.isfinite(T).any():
         raise NotEnoughData(f"{trial.id}: body {body.name!r} is never in view")
     middle = mean(T)

@@ -15,7 +15,7 @@ import numpy as np
 from calibration.markers import BASE, base_body, hand_body
 from calibration.robot import Chain
 from calibration.schema import Description
-from calibration.se3 import to_vector
+from calibration.se3 import from_vector, to_vector
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 METRES_PER_RAD = 0.1  # a prismatic joint's tolerances are an angle's times this
@@ -92,9 +92,12 @@ def geometry_parameters(chain: Chain, description: Description) -> ParameterSet:
 def nominal_frames(chain: Chain, description: Description) -> np.ndarray:
     """T_base_B and T_tool_H with every marker body on its link as drawn, (12,) [m, rad]."""
     q = np.zeros((1, len(chain.measured)))
-    base, hand = base_body(description).link, hand_body(description).link
-    T_base_tool, T_base_hand = chain.poses(q)[0], chain.poses(q, hand)[0]
-    return np.concatenate([to_vector(chain.poses(q, base)[0]), to_vector(np.linalg.solve(T_base_tool, T_base_hand))])
+    base, hand = base_body(description), hand_body(description)
+    T_base_tool, T_base_B, T_base_H = (
+        chain.poses(q)[0],
+        *(chain.poses(q, body.link)[0] @ from_vector(np.array(body.placement)) for body in (base, hand)),
+    )
+    return np.concatenate([to_vector(T_base_B), to_vector(np.linalg.solve(T_base_tool, T_base_H))])
 
 
 def play_start(chain: Chain, description: Description) -> np.ndarray:

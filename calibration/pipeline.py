@@ -7,29 +7,26 @@ purpose, are for `base_frame` alone; all other stages see the trials in which it
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from calibration.arm_tool_stage import locate_arm
 from calibration.base_frame_stage import locate_base
 from calibration.base_motion import MOVES, read_stations
-from calibration.clock import Clock
 from calibration.clocks import synchronise
 from calibration.dataset import Dataset
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
-from calibration.estimate import Estimate, Model, RobotNames
+from calibration.estimate import Estimate, RobotNames
 from calibration.estimate_parts import joints_model, suspension_model
 from calibration.geometry import calibrate_geometry
 from calibration.joint_fit import fit_joint_models
 from calibration.options import Options
 from calibration.parameters import nominal_frames
 from calibration.plausibility import implausible_inputs
-from calibration.postures import Postures, read_passing, read_postures
-from calibration.recording import Trial
 from calibration.registration import register
-from calibration.robot import Chain, chain_of
-from calibration.schema import Description
+from calibration.robot import chain_of
 from calibration.suspension_fit import Form, fit_suspension
 from calibration.verdict import Verdict
+from calibration.work import Work, lacking, postures_of, with_postures
 
 Progress = Callable[[str, float], None]
 
@@ -37,45 +34,7 @@ STAGES = ("clocks", "registration", "base_frame", "arm_tool", "suspension", "geo
 _FRAMES = ("base_frame", "arm_tool")  # run where there is a spin; alone where the arm only ever posed
 MAIN = ("model_2", "arm_tool", "registration")  # rows an estimate can stand for, the best first
 _NEEDS = {"joints": "geometry", "arm_tool": "base_frame"}
-_SPACING = 0.5  # [s] of the swings' postures the registration sees beside the static ones
-
-
-@dataclass(frozen=True)
-class Work:
-    """What the stages have in common, and what they have found so far.
-
-    Attributes:
-        dataset: The recordings.
-        chain: The nominal chain.
-        trials: Calibration trials in which the base stands.
-        clocks: Of the instruments, the robot's first.
-        postures: The static ones.
-        passing: Those of the swings, None where there is no swing.
-        estimate: So far.
-    """
-
-    dataset: Dataset
-    chain: Chain
-    trials: tuple[Trial, ...]
-    clocks: tuple[Clock, ...]
-    postures: Postures
-    passing: Postures | None
-    estimate: Estimate
-
-    @property
-    def description(self) -> Description:
-        """Of the dataset."""
-        return self.dataset.description
-
-    def with_model(self, model: Model, said: Sequence[Verdict], **parts: object) -> "Work":
-        """With one more model."""
-        e = self.estimate
-        grown = replace(e, models=(*e.models, model.with_clocks(self.clocks)), verdicts=(*e.verdicts, *said), **parts)  # type: ignore[arg-type]
-        return replace(self, estimate=grown)
-
-    def saying(self, *said: Verdict) -> "Work":
-        """With something to say and no model."""
-        return replace(self, estimate=replace(self.estimate, verdicts=(*self.estimate.verdicts, *said)))
+_NO_CLOCKS = (Verdict("clocks", "missing", "posture means only: there is no time, and no clock to tell"),)
 
 
 def calibrate(
@@ -97,29 +56,35 @@ def calibrate(
     tell = progress or (lambda stage, share: None)
     chain = chain_of(dataset.urdf, dataset.description)
     tell("reading", 0.0)
-    trials = tuple(trial for _, trial in dataset.trials("calibration"))
-    if not trials:
+    pairs, means = tuple(dataset.trials("calibration")), tuple(m for _, m in dataset.means("calibration"))
+    trials = tuple(trial for _, trial in pairs)
+    if not trials and not means:
         raise InputError(
             dataset.folder / "dataset.json",
             "trials: no calibration trial; record static postures and one moving trial with that role",
         )
     empty = _empty(dataset, options or Options())
-    refused = [Verdict("reading", "refused", m) for m in implausible_inputs(dataset.description, chain, trials)]
+    refused = [
+        Verdict("reading", "refused", m) for m in implausible_inputs(dataset.description, chain, (*trials, *means))
+    ]
     if refused:
         return replace(empty, verdicts=tuple(refused))
     tell("clocks", 0.2)
-    standing = _standing(dataset, trials)
-    clocks, said = synchronise(dataset.urdf, dataset.description, standing)
+    standing = tuple((entry, trial) for entry, trial in pairs if entry.kind not in MOVES)
+    if not standing and not means:
+        raise NotEnoughData("in every calibration trial the base moves; record static postures of the arm too")
+    trials = tuple(trial for _, trial in standing)
+    clocks, said = synchronise(dataset.urdf, dataset.description, trials) if trials else ((), _NO_CLOCKS)
     estimate = replace(empty, verdicts=tuple(said), clocks=clocks)
     fits = [name for name in STAGES[1:] if name in wanted]
     if not fits:
         return estimate
     tell("postures", 0.5)
-    postures = read_postures(dataset.description, standing, clocks[0])
-    work = Work(dataset, chain, standing, clocks, postures, _passing(dataset, trials, clocks[0]), estimate)
+    work = with_postures(Work(dataset, chain, trials, clocks, None, None, estimate), standing, means)
     for k, name in enumerate(fits):
         tell(name, 0.55 + 0.45 * k / len(fits))
-        work = _RUN[name](work)
+        absent = lacking(work, name)
+        work = work.saying(Verdict(name, "missing", absent)) if absent else _RUN[name](work)
     tell("done", 1.0)
     return _concluded(work.estimate)
 
@@ -140,27 +105,9 @@ def _wanted(stages: Sequence[str]) -> set[str]:
     return wanted | {_NEEDS[name] for name in wanted & _NEEDS.keys()}
 
 
-def _standing(dataset: Dataset, trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """Those in which the base stands.
-
-    Raises:
-        NotEnoughData: There is none.
-    """
-    pairs = zip(dataset.entries("calibration"), trials, strict=True)
-    found = tuple(trial for entry, trial in pairs if entry.kind not in MOVES)
-    if not found:
-        raise NotEnoughData("in every calibration trial the base moves; record static postures of the arm too")
-    return found
-
-
-def _passing(dataset: Dataset, trials: Sequence[Trial], robot: Clock) -> Postures | None:
-    pairs = zip(dataset.entries("calibration"), trials, strict=True)
-    swings = [trial for entry, trial in pairs if entry.kind == "swing"]
-    return read_passing(dataset.description, swings, robot, _SPACING) if swings else None
-
-
 def _register(work: Work) -> Work:
-    data = work.postures if work.passing is None else work.postures.joined(work.passing)
+    postures = postures_of(work)
+    data = postures if work.passing is None else postures.joined(work.passing)
     return work.with_model(*register(work.chain, work.description, data))
 
 
@@ -174,12 +121,12 @@ def _locate_base(work: Work) -> Work:
 
 def _locate_arm(work: Work) -> Work:
     base_frame = next((m for m in work.estimate.models if m.name == "base_frame"), None)
-    return work.with_model(*locate_arm(work.chain, work.description, work.postures, base_frame))
+    return work.with_model(*locate_arm(work.chain, work.description, postures_of(work), base_frame))
 
 
 def _suspend(work: Work) -> Work:
-    robot, plate = work.clocks[0], next((c for c in work.clocks if c.instrument == "plate"), None)
     form = Form(full=work.estimate.options.suspension == "full")
+    robot, plate = work.clock("robot"), work.clock("plate")
     found, said = fit_suspension(work.dataset.urdf, work.description, work.trials, robot, plate, form=form)
     if found is None:
         return work.saying(*said)
@@ -187,7 +134,7 @@ def _suspend(work: Work) -> Work:
 
 
 def _calibrate_geometry(work: Work) -> Work:
-    return work.with_model(*calibrate_geometry(work.chain, work.description, work.postures))
+    return work.with_model(*calibrate_geometry(work.chain, work.description, postures_of(work)))
 
 
 def _calibrate_joints(work: Work) -> Work:
@@ -195,8 +142,12 @@ def _calibrate_joints(work: Work) -> Work:
         return work
     geometry = work.estimate.model("model_2")
     hand = geometry.hand(work.chain, nominal_frames(work.chain, work.description))
-    terms = work.estimate.options.terms
-    found, said = fit_joint_models(work.dataset.urdf, work.description, work.trials, work.clocks[0], hand, terms)
+    robot = work.clock("robot")
+    if robot is None:
+        raise NotEnoughData("no robot clock")
+    found, said = fit_joint_models(
+        work.dataset.urdf, work.description, work.trials, robot, hand, work.estimate.options.terms
+    )
     model = joints_model(geometry, found.models)
     grown = replace(
         work.estimate,

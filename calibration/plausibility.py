@@ -1,9 +1,10 @@
 """Recordings that cannot be what they say: wrong units, told before anything is fitted."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from calibration.means import PostureMeans
 from calibration.recording import Trial
 from calibration.robot import Chain
 from calibration.schema import Body, Description
@@ -13,7 +14,7 @@ _BEYOND = 0.3  # a reading may be outside its joint's limits by this much [rad, 
 _SHARE = 0.05  # of the samples that may be farther out
 
 
-def implausible_inputs(description: Description, chain: Chain, trials: tuple[Trial, ...]) -> Iterator[str]:
+def implausible_inputs(description: Description, chain: Chain, trials: Sequence[Trial | PostureMeans]) -> Iterator[str]:
     """Why the recordings of these trials cannot be used, each finding once."""
     for body in description.bodies:
         ratio = _scale(body, trials)
@@ -21,6 +22,8 @@ def implausible_inputs(description: Description, chain: Chain, trials: tuple[Tri
             unit = " (recorded in millimetres?)" if 500.0 < ratio < 2000.0 else ""
             yield f"markers of body {body.name!r} are {ratio:.3g} times as far apart as dataset.json says{unit}"
     q = np.concatenate([trial.q_motor for trial in trials])
+    if not len(q):
+        return
     for name, column, low, high in zip(chain.measured, q.T, *chain.limits(), strict=True):
         margin = _BEYOND * (1.0 + (high - low))
         outside = float(((column < low - margin) | (column > high + margin)).mean())
@@ -33,12 +36,14 @@ def implausible_inputs(description: Description, chain: Chain, trials: tuple[Tri
             )
 
 
-def _scale(body: Body, trials: tuple[Trial, ...]) -> float:
+def _scale(body: Body, trials: Sequence[Trial | PostureMeans]) -> float:
     """Median over pairs and samples of measured over nominal distance between markers [-]; NaN without a pair."""
     ratios = []
     for trial in trials:
         markers = [m for m in body.markers if m.name in trial.marker]
-        p = trial.marker_position[:: max(1, len(trial.t_mocap) // 50), [trial.marker.index(m.name) for m in markers]]
+        p = trial.marker_position[
+            :: max(1, len(trial.marker_position) // 50), [trial.marker.index(m.name) for m in markers]
+        ]
         for i, a in enumerate(markers):
             for j in range(i):
                 nominal = float(np.linalg.norm(np.subtract(a.xyz, markers[j].xyz)))

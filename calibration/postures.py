@@ -15,10 +15,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from calibration.bodies import BodyPoses, body_poses, poses_of
+from calibration.bodies import BodyPoses, body_poses, poses_of, still_poses
 from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.markers import base_body, hand_body
+from calibration.means import PostureMeans
 from calibration.recording import Trial
 from calibration.schema import Body, Description
 from calibration.se3 import adjoint, inverse, to_vector
@@ -76,6 +77,17 @@ def read_postures(description: Description, trials: Iterable[Trial], robot: Cloc
     return Postures(q, T, factor * unit, misfit)
 
 
+def mean_postures(description: Description, means: PostureMeans) -> Postures:
+    """Postures of a file that only has means, those that show base and hand; their covariance is the file's own."""
+    base, hand = (means.poses_of(body(description)) for body in (base_body, hand_body))
+    T = inverse(base.T) @ hand.T
+    Ad = adjoint(inverse(T))
+    S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
+    squares = (np.concatenate([base.residual, hand.residual], axis=1) ** 2).sum(axis=2)
+    good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(means.q_motor).all(axis=1)
+    return Postures(means.q_motor[good], T[good], S[good], np.sqrt(np.nanmean(squares[good], axis=1)))
+
+
 def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
     """Postures passed through every `spacing` [s] of these trials, one sample each, their first second left out."""
     found = [_passed(description, trial, robot, spacing) for trial in trials]
@@ -124,6 +136,8 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
 
 def mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
     """Poses of a body from its markers averaged over each group of samples."""
+    if not body.markers:
+        return still_poses(len(groups))
     names = [m.name for m in body.markers if m.name in trial.marker]
     xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
     if len(names) < 3:

@@ -30,6 +30,7 @@ from calibration.joint_correction import JointModels, correct
 from calibration.joint_inputs import input_model
 from calibration.joint_zero import aligned_link_readings
 from calibration.markers import base_body
+from calibration.means import PostureMeans
 from calibration.parameters import nominal_frames
 from calibration.postures import readings_at
 from calibration.recording import Trial
@@ -84,7 +85,7 @@ class Predictor:
         models: Robots by row.
         urdf: Nominal robot.
         description: Of the dataset.
-        robot: Clock of the encoders.
+        robot: Clock of the encoders, None where there is no continuous recording.
         plate: Clock of the plate, None where there is none.
         suspension: None where there is none.
         joints: None where there is none.
@@ -93,7 +94,7 @@ class Predictor:
     models: dict[str, HandModel]
     urdf: str
     description: Description
-    robot: Clock
+    robot: Clock | None
     plate: Clock | None = None
     suspension: Suspension | None = None
     joints: JointModels | None = None
@@ -110,6 +111,17 @@ class Predictor:
                 if T_lab_B is not None:
                     yield Prediction(name, base, encoder, entry.id, entry.kind, trial.t_mocap, T_lab_B @ T_B_H)
 
+    def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
+        """Predictions of posture means, one a posture in `t`: the base measured or its markers' own frame, motor side.
+
+        A model of the joints' hysteresis needs the motion before a posture, which means do not show: no `model_3`.
+        """
+        T_lab_B = means.poses_of(base_body(self.description)).T
+        for name, hand, encoder, _ in self._rows():
+            if encoder == "motor" and name in ("nominal", "registration", "model_2"):
+                T = T_lab_B @ hand.poses(means.q_motor)
+                yield Prediction(name, "measured", "motor", entry.id, entry.kind, np.arange(float(len(means))), T)
+
     def _rows(self) -> Iterator[tuple[str, HandModel, Encoder, tuple[Base, ...]]]:
         for name, bases, encoders in _ROWS:
             if name in self.models:
@@ -118,6 +130,8 @@ class Predictor:
 
     def _positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is asked with, at the motion capture's times."""
+        if self.robot is None or not len(trial.t_robot):
+            raise NotEnoughData(f"{trial.id}: no joint readings on a known clock, so no hand pose can be predicted")
         if encoder == "link" and self.joints is not None:
             return readings_at(trial, self.robot, trial.t_mocap, aligned_link_readings(trial, self.joints.zero))
         if name == "model_3" and self.joints is not None:
@@ -160,9 +174,9 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     if estimate.suspension is not None:
         models["model_1"] = models["nominal"]
     robot = estimate.clock("robot")
-    if robot is None:
-        trials = tuple(trial for _, trial in dataset.trials("calibration"))
-        robot = synchronise(dataset.urdf, description, trials)[0][0]
+    trials = () if robot is not None else tuple(trial for _, trial in dataset.trials("calibration"))
+    if trials:
+        robot = next((c for c in synchronise(dataset.urdf, description, trials)[0] if c.instrument == "robot"), None)
     joints = None
     if estimate.joint_models and "model_3" in models:
         inputs = input_model(dataset.urdf, description, models["model_3"])
@@ -175,3 +189,5 @@ def predictions(estimate: Estimate, dataset: Dataset, role: Role = "validation")
     predict = predictor(estimate, dataset)
     for entry, trial in dataset.trials(role):
         yield from predict(entry, trial)
+    for entry, means in dataset.means(role):
+        yield from predict.of_means(entry, means)

@@ -9,6 +9,7 @@ Each instrument keeps its own clock; t_mocap = t_i (1 + drift_i) + offset_i is e
 """
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -126,27 +127,38 @@ def write_trial(path: Path, trial: Trial) -> str:
             file.dimensions[clock] = len(getattr(trial, clock))
         for label in ("joint", "marker", "plate"):
             file.dimensions[label] = len(getattr(trial, label))
-        for label in _LABELS:
-            dims: tuple[str, ...] = ("marker" if label == "marker_body" else label,)
-            names = np.array(getattr(trial, label), dtype=object)
-            file.create_variable(label, dims, dtype=h5py.string_dtype(), data=names if len(names) else None)
+        write_labels(file, {label: getattr(trial, label) for label in _LABELS})
         for name, (dims, units, meaning, frame) in _LAYOUT.items():
-            _write_variable(
-                file, name, getattr(trial, name), dims, {"units": units, "long_name": meaning, "frame": frame}
-            )
+            kind = "i1" if name == "approach" else "f8" if name in _EXACT else "f4"
+            clock = _CLOCKS.get(dims[0], "mocap" if name.startswith("dwell") else "")
+            attributes = {"units": units, "long_name": meaning, "frame": frame, "clock": clock}
+            write_variable(file, name, getattr(trial, name), dims, kind, attributes)
     return sha256(path)
 
 
-def _write_variable(
-    file: h5netcdf.File, name: str, data: np.ndarray, dims: tuple[str, ...], attributes: dict[str, str]
+def write_labels(file: h5netcdf.File, names: Mapping[str, tuple[str, ...]]) -> None:
+    """Write names along their dimension; `marker_body` lies along `marker`."""
+    for label, values in names.items():
+        dims = ("marker" if label == "marker_body" else label,)
+        data = np.array(values, dtype=object) if values else None
+        file.create_variable(label, dims, dtype=h5py.string_dtype(), data=data)
+
+
+def write_variable(
+    file: h5netcdf.File, name: str, data: np.ndarray, dims: tuple[str, ...], kind: str, attributes: Mapping[str, str]
 ) -> None:
-    kind = "i1" if name == "approach" else "f8" if name in _EXACT else "f4"
+    """Write an array, packed, with those attributes that are not empty."""
     packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if data.size else {}
     variable = file.create_variable(name, dims, dtype=kind, data=data.astype(kind), **packing)
-    clock = _CLOCKS.get(dims[0], "mocap" if name.startswith("dwell") else "")
-    for key, value in (attributes | {"clock": clock}).items():
+    for key, value in attributes.items():
         if value:
             variable.attrs[key] = value
+
+
+def labels(file: h5netcdf.File, name: str) -> tuple[str, ...]:
+    """Names along a dimension; none where the file has no such variable."""
+    values = file.variables[name][...] if name in file.variables else ()
+    return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
 
 
 def sha256(path: Path) -> str:
@@ -177,10 +189,6 @@ def read_trial(path: Path, trial_id: str | None = None) -> Trial:
 
 
 def _trial_from(file: h5netcdf.File, trial_id: str) -> Trial:
-    def labels(name: str) -> tuple[str, ...]:
-        values = file.variables[name][...] if name in file.variables else ()
-        return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
-
     n = {d: v.size for d, v in file.dimensions.items()} | {"axis": 3, "wrench": 6}
 
     def array(name: str) -> np.ndarray:
@@ -189,7 +197,7 @@ def _trial_from(file: h5netcdf.File, trial_id: str) -> Trial:
             return np.asarray(file.variables[name][...], dtype=np.int8 if name == "approach" else np.float64)
         return np.full([n.get(d, 0) for d in dims], np.nan if "t_robot" in dims else 0.0)
 
-    fields: dict[str, Any] = {k: labels(k) for k in _LABELS} | {k: array(k) for k in _LAYOUT}
+    fields: dict[str, Any] = {k: labels(file, k) for k in _LABELS} | {k: array(k) for k in _LAYOUT}
     return Trial(id=trial_id, **fields)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Role = Literal["calibration", "validation", "confirmation"]
@@ -36,11 +37,15 @@ class Marker(Declaration):
 
 
 class Body(Declaration):
-    """A rigid marker cluster; its frame nominally coincides with the frame of `link`."""
+    """A rigid marker cluster; its frame nominally coincides with the frame of `link`, but for `placement`.
+
+    `placement` is the translation [m] and rotation vector [rad] of T_link_body where no drawing puts the two together.
+    """
 
     name: str
     link: str
     markers: tuple[Marker, ...]
+    placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Wheel(Declaration):
@@ -125,21 +130,38 @@ class TrialEntry(Declaration):
     payload: NonNegative | None = None
 
 
-class Description(Declaration):
-    """The whole of dataset.json."""
+class Setup(Declaration):
+    """The robot and its instruments.
 
-    schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
+    `marker_frame` is the frame of the marker positions: `lab`, or the name of a marker body without markers, for files
+    whose positions were already brought into a frame fixed on that body (the base's motion removed).
+    `mocap_clock` names the instruments whose times are the motion capture's own, sampled together by one machine.
+    """
+
     robot: str
     base_frame: str
     tool_frame: str
     joints: tuple[Joint, ...]
-    bodies: tuple[Body, ...]
     wheels: tuple[Wheel, ...] = ()
     plates: tuple[Plate, ...] = ()
     payload: Payload | None = None
     gravity: Vector3 = (0.0, 0.0, -9.81)
+    marker_frame: str = "lab"
+    mocap_clock: tuple[Literal["robot", "plate"], ...] = ()
     sigmas: Sigmas
     tolerances: Tolerances
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the measured joints, base to tip."""
+        return tuple(j.name for j in self.joints)
+
+
+class Description(Setup):
+    """The whole of dataset.json."""
+
+    schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
+    bodies: tuple[Body, ...]
     trials: tuple[TrialEntry, ...]
 
     model_config = ConfigDict(
@@ -161,10 +183,16 @@ class Description(Declaration):
                 raise ValueError(f"{group} named more than once: {twice}")
         return self
 
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the measured joints, base to tip."""
-        return tuple(j.name for j in self.joints)
+    @model_validator(mode="after")
+    def _marker_frame_is_known(self) -> "Description":
+        bare = [b.name for b in self.bodies if not b.markers]
+        allowed = [] if self.marker_frame == "lab" else [self.marker_frame]
+        if bare != allowed:
+            raise ValueError(
+                f"bodies without markers: {bare}, marker_frame: {self.marker_frame!r}; positions are in the lab, or in "
+                "the frame of the one body that has no markers"
+            )
+        return self
 
     def loaded(self, entry: TrialEntry) -> "Description":
         """The description with the payload of one trial."""

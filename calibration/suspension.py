@@ -33,7 +33,8 @@ class Suspension:
         sigma_K: (6, 6) standard deviations; NaN where they are not known.
         sigma_C: (6, 6).
         tangent: (6, 6) of preload, for wrenches the floor feels.
-        gravity: (6, 6) stiffness that the robot's weight adds, of the nominal robot; not in K.
+        gravity: (6, 6) stiffness that the robot's weight adds, of the nominal robot; not in K. Zeros where there are no
+            joint readings to tell its posture.
         held_out: Leave-one-trial-out, one for each source that was tried.
         parameters: `suspension.{K,C}.<i><j>`, i <= j of x y z rx ry rz as 1 to 6, then those of wheels.
         combinations: Of the wheels' parameters, as far as one wrench tells them; coefficients in the order of

@@ -33,15 +33,23 @@ _NAMES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
 def wrong_plate(description: Description, plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> Iterator[Verdict]:
-    """What is wrong with the plate's wrench; trials in the same order in both."""
+    """What is wrong with the plate's wrench; trials in the same order in both, or no dynamics at all."""
     rest = np.median([f.rest for f in plate], axis=0)
-    weight = -float(np.median([f.rest[2] for f in dynamics]))
     if rest[2] > 0.0:
         message = (
             f"plate sign: Fz = {rest[2]:+.0f} N at rest, it must be the action of the robot ON the plate; negate it"
         )
         yield Verdict(STAGE, "refused", message)
-        return
+    elif dynamics:
+        yield from _against_dynamics(description, rest, plate, dynamics)
+    elif (outside := _outside(description, np.array([-rest[4], rest[3]]) / rest[2])) > _OUTSIDE:
+        yield Verdict(STAGE, "refused", _misplaced(outside))
+
+
+def _against_dynamics(
+    description: Description, rest: np.ndarray, plate: Sequence[Forcing], dynamics: Sequence[Forcing]
+) -> Iterator[Verdict]:
+    weight = -float(np.median([f.rest[2] for f in dynamics]))
     if not 1.0 / _WEIGHT < -rest[2] / weight < _WEIGHT:
         message = f"plate scale: it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} N"
         yield Verdict(STAGE, "refused", message)
@@ -57,11 +65,14 @@ def wrong_plate(description: Description, plate: Sequence[Forcing], dynamics: Se
         message = f"plate sign: {', '.join(mirrored)} mirror what the robot's motion does; negate them"
         yield Verdict(STAGE, "refused", message)
     elif outside > _OUTSIDE:
-        message = f"plate place: its centre of pressure is {1e3 * outside:.0f} mm outside the wheels; see plate_centre"
-        yield Verdict(STAGE, "refused", message)
+        yield Verdict(STAGE, "refused", _misplaced(outside))
     elif abs(psi) > _TURNED:
         message = f"plate rotated by {np.degrees(psi):.1f} deg about the vertical against the lab"
         yield Verdict(STAGE, "warning", message)
+
+
+def _misplaced(outside: float) -> str:
+    return f"plate place: its centre of pressure is {1e3 * outside:.0f} mm outside the wheels; see plate_centre"
 
 
 def moved_bases(sways: Sequence[Sway]) -> dict[str, str]:

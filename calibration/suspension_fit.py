@@ -49,7 +49,7 @@ def fit_suspension(
     urdf: str,
     description: Description,
     trials: Sequence[Trial],
-    robot: Clock,
+    robot: Clock | None,
     plate: Clock | None,
     T_base_B: np.ndarray | None = None,
     form: Form | None = None,
@@ -61,13 +61,14 @@ def fit_suspension(
     lab = laboratory(urdf, description, robot, plate, T_base_B)
     sways = read_sways(lab, trials)
     found = list(wrong_plate(description, *sways.forcings)) if sways.plate else []
-    moved = moved_bases(sways.dynamics)
+    moved = moved_bases(sways.dynamics or sways.plate)
     told = ", ".join(f"{name} by {how}" for name, how in moved.items())
     if moved:
         found.append(Verdict(STAGE, "warning", f"base moved during {told}: left out; brake it, or record again"))
     sways = sways.without(moved)
-    if any(v.verdict == "refused" for v in found) or len(sways.dynamics) < 2:
-        if len(sways.dynamics) < 2:
+    usable = len(sways.dynamics or sways.plate)
+    if any(v.verdict == "refused" for v in found) or usable < 2:
+        if usable < 2:
             found.append(
                 Verdict(STAGE, "missing", "no suspension: it takes two trials that show the base and its load")
             )
@@ -103,7 +104,7 @@ def _fitted(lab: Laboratory, sways: Sways, form: Form) -> tuple[Suspension, list
         springs.C,
         *springs.sigmas,
         preload,
-        np.mean([s.forcing.tangent for s in sways.dynamics], axis=0) - preload,
+        np.mean([s.forcing.tangent for s in sways.dynamics], axis=0) - preload if sways.dynamics else np.zeros((6, 6)),
         tried,
         parameters,
         combinations,

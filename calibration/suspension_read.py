@@ -1,7 +1,7 @@
 """Trials as sways, by the plate's wrench and by that of inverse dynamics."""
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,14 +30,14 @@ class Laboratory:
         description: Of the dataset.
         model: Nominal floating-base model.
         T_base_B: (4, 4) the base's marker body on the base.
-        robot: Clock of the encoders.
+        robot: Clock of the encoders, None where there are none.
         plate: Clock of the force plate, None where there is none.
     """
 
     description: Description
     model: pin.Model
     T_base_B: np.ndarray
-    robot: Clock
+    robot: Clock | None
     plate: Clock | None
 
     def plate_load(self, trial: Trial, T_lab_0: np.ndarray) -> Load:
@@ -51,13 +51,19 @@ class Laboratory:
         return plate_load(trial, self.plate, T_lab_0)
 
     def dynamics_load(self, trial: Trial, T_lab_0: np.ndarray) -> Load:
-        """The wrench by inverse dynamics."""
+        """The wrench by inverse dynamics.
+
+        Raises:
+            NotEnoughData: There are no encoder readings on a known clock.
+        """
+        if self.robot is None or len(trial.t_robot) == 0:
+            raise NotEnoughData(f"{trial.id}: no encoder readings on a known clock")
         return dynamics_load(self.model, self.description, trial, self.robot, T_lab_0)
 
 
 @dataclass(frozen=True)
 class Sways:
-    """Sways of the usable trials; `plate` is empty where there is none, else in the same order."""
+    """Sways of the usable trials; either is empty where there is no such instrument, else in the same order."""
 
     plate: tuple[Sway, ...]
     dynamics: tuple[Sway, ...]
@@ -78,7 +84,7 @@ class Sways:
 
 
 def laboratory(
-    urdf: str, description: Description, robot: Clock, plate: Clock | None, T_base_B: np.ndarray | None = None
+    urdf: str, description: Description, robot: Clock | None, plate: Clock | None, T_base_B: np.ndarray | None = None
 ) -> Laboratory:
     """The laboratory of a dataset; the marker body where it is drawn, unless T_base_B says otherwise."""
     if T_base_B is None:
@@ -87,18 +93,18 @@ def laboratory(
 
 
 def read_sways(lab: Laboratory, trials: Sequence[Trial]) -> Sways:
-    """Sways of the trials that show the base and its wrench; with a plate, of those that have it."""
-    with_plate = lab.plate is not None and any(len(t.t_plate) for t in trials)
-    plate, dynamics = [], []
+    """Sways of the trials that show the base and its wrench, by every instrument the campaign has."""
+    sources: dict[str, Callable[[Trial, np.ndarray], Load]] = {}
+    if lab.robot is not None and any(len(t.t_robot) for t in trials):
+        sources["dynamics"] = lab.dynamics_load
+    if lab.plate is not None and any(len(t.t_plate) for t in trials):
+        sources["plate"] = lab.plate_load
+    rows = []
     for trial in trials:
         try:
             rest = rest_of(lab.description, trial, lab.T_base_B)
-            both = [lab.dynamics_load(trial, rest.T_lab_0)]
-            both += [lab.plate_load(trial, rest.T_lab_0)] if with_plate else []
-            found = [sway_of(lab.description, trial, rest, load) for load in both]
+            rows.append([sway_of(lab.description, trial, rest, load(trial, rest.T_lab_0)) for load in sources.values()])
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
-            continue
-        dynamics.append(found[0])
-        plate += found[1:]
-    return Sways(tuple(plate), tuple(dynamics))
+    columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(sources)}
+    return Sways(columns.get("plate", ()), columns.get("dynamics", ()))

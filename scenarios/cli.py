@@ -137,6 +137,30 @@ def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
     typer.echo(f"Report: {page}")
 
 
+importing = typer.Typer(no_args_is_help=True, help="Write a dataset from laboratory files.")
+app.add_typer(importing, name="import")
+
+Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Each belongs to the trial of its name.")]
+MapFile = Annotated[Path, typer.Option("--map", metavar="YAML", help="What the files do not say: docs/recording.md.")]
+AddTo = Annotated[
+    Path | None, typer.Option(metavar="DATASET", help="Add these instruments to the trials of an imported dataset.")
+]
+
+
+@importing.command("csv")
+def import_csv(files: Files, mapping: MapFile, out: Out, add_to: AddTo = None) -> None:
+    """Samples on a clock, or static postures."""
+    _import("csv", files, mapping, out, add_to)
+
+
+def _import(kind: str, files: Sequence[Path], mapping: Path, out: Path, add_to: Path | None) -> None:
+    from scenarios import exchange
+
+    for note in exchange.import_files(kind, files, mapping, out, add_to):
+        typer.echo(note)
+    typer.echo(f"Dataset: {out}")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command and exit with its code; what a user can mend or must know is told without a traceback."""
     before = signal.signal(signal.SIGTERM, _terminate)

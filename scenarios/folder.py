@@ -38,6 +38,7 @@ ESTIMATE = Kind(
     "estimate.json",
     frozenset({"estimate.json", "estimate.nc", "nominal.urdf", "calibrated.urdf", "master_calibration.yaml"}),
 )
+DATASET = Kind("dataset", "dataset.json", frozenset({"dataset.json", "nominal.urdf", "trials"}))
 
 
 @contextmanager

@@ -1,0 +1,112 @@
+"""The marker bodies of a mapping with all coordinates: drawn ones as they are, undrawn ones from the recording."""
+
+from collections.abc import Mapping as Lookup
+from collections.abc import Sequence
+
+import numpy as np
+
+from calibration.bodies import body_poses
+from calibration.errors import InputError, NotEnoughData
+from calibration.io.mapping import MappedBody, Mapping
+from calibration.io.place_bodies import hand_eye, mean_shape, standing_shape
+from calibration.io.recorded import Recorded
+from calibration.markers import BASE, HAND
+from calibration.robot import Chain
+from calibration.schema import Body, Marker
+from calibration.se3 import inverse, to_vector
+
+_REST = 1.0  # [s]
+
+
+def placed_bodies(mapping: Mapping, chain: Chain, calibration: Sequence[Recorded]) -> tuple[Body, ...]:
+    """All bodies, those to be placed by the calibration trials placed.
+
+    Raises:
+        InputError: The recordings do not allow it.
+    """
+    bodies = {b.name: _with_shape(b, calibration) for b in mapping.bodies}
+    if any(b.fitted for b in mapping.bodies):
+        bodies |= _fitted(mapping, chain, bodies, calibration)
+    return tuple(bodies.values())
+
+
+def _with_shape(body: MappedBody, calibration: Sequence[Recorded]) -> Body:
+    if not body.undrawn:
+        return body.drawn()
+    if not calibration:
+        raise InputError("mapping", f"bodies.{body.name}: undrawn, and there is no calibration trial to take it from")
+    try:
+        if body.standing is None:
+            xyz = mean_shape(np.concatenate([_positions(r, body.undrawn) for r in calibration]))
+        else:
+            s, first = body.standing, calibration[0]
+            xyz = standing_shape(_positions(first, body.undrawn, rest=True), s.x, s.y, s.heading)
+    except NotEnoughData as error:
+        raise InputError(calibration[0].file, f"body {body.name!r}: {error}") from error
+    coordinates = [(float(x), float(y), float(z)) for x, y, z in xyz]
+    markers = tuple(Marker(name=n, xyz=p) for n, p in zip(body.undrawn, coordinates, strict=True))
+    return Body(name=body.name, link=body.link, markers=markers)
+
+
+def _positions(recorded: Recorded, names: Sequence[str], rest: bool = False) -> np.ndarray:
+    """Positions (n, m, 3) of some markers, at rest those of the first second."""
+    group = recorded.means or recorded.markers
+    known: Sequence[str] = () if group is None else group.markers if recorded.means else group.names  # type: ignore[union-attr]
+    missing = [name for name in names if name not in known]
+    if group is None or missing:
+        raise InputError(recorded.file, f"markers {missing} of an undrawn body are not in the file")
+    p = group.position[:, [known.index(name) for name in names]]
+    if rest and recorded.markers is not None:
+        p = p[recorded.markers.t <= recorded.markers.t[0] + _REST]
+    return p
+
+
+def _fitted(
+    mapping: Mapping, chain: Chain, bodies: Lookup[str, Body], calibration: Sequence[Recorded]
+) -> dict[str, Body]:
+    """Base and hand with placements from the nominal robot at the postures."""
+    postures = [r for r in calibration if r.means is not None]
+    missing = [name for name in (BASE, HAND) if name not in bodies]
+    if missing or not postures:
+        why = f"bodies: no {missing[0]!r}" if missing else "trials: no calibration file of static postures"
+        raise InputError("mapping", f"{why}; a fitted body is placed by base and hand in static postures")
+    base, hand = bodies[BASE], bodies[HAND]
+    A, B = [], []
+    for r in postures:
+        q = in_order(r, chain.measured)
+        A.append(inverse(chain.poses(q, base.link)) @ chain.poses(q, hand.link))
+        B.append(inverse(_poses(base, r)) @ _poses(hand, r))
+    try:
+        X, Y = hand_eye(np.concatenate(A), np.concatenate(B))
+    except NotEnoughData as error:
+        raise InputError(postures[0].file, str(error)) from error
+    fitted = {b.name for b in mapping.bodies if b.fitted}
+    T = {BASE: inverse(X), HAND: Y}
+    return {n: bodies[n].model_copy(update={"placement": _six(T[n])}) for n in (BASE, HAND) if n in fitted}
+
+
+def in_order(recorded: Recorded, joints: Sequence[str]) -> np.ndarray:
+    """Readings of static postures (n, k) in the order of `joints`."""
+    means = recorded.means
+    if means is None:
+        raise InputError(recorded.file, "holds no static postures")
+    missing, unknown = unmatched(means.joints, joints)
+    if missing or unknown:
+        what = f"{missing} of the setup are not mapped, {unknown} are not in the setup"
+        raise InputError(recorded.file, f"joints: {what}")
+    return means.q[:, [means.joints.index(name) for name in joints]]
+
+
+def unmatched(found: Sequence[str], wanted: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Names that are wanted but not found, and found but not wanted."""
+    return [n for n in wanted if n not in found], [n for n in found if n not in wanted]
+
+
+def _poses(body: Body, recorded: Recorded) -> np.ndarray:
+    if not body.markers:
+        return np.eye(4)[None]
+    return body_poses(np.array([m.xyz for m in body.markers]), _positions(recorded, [m.name for m in body.markers])).T
+
+
+def _six(T: np.ndarray) -> tuple[float, ...]:
+    return tuple(map(float, to_vector(T)))

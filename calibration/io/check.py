@@ -1,0 +1,152 @@
+"""What cannot be true of an imported trial, told by file and channel before anything is written.
+
+Units show in sizes: a body of markers against its drawing, a reading against its joint's limits, the plate's load
+against the robot's weight. Swapped or mislabelled columns show in bodies that are not rigid and, in static postures, in
+a hand that is not where the nominal robot has it.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from calibration.errors import InputError
+from calibration.hand import nominal_hand
+from calibration.io.place_bodies import hand_eye
+from calibration.means import PostureMeans
+from calibration.parameters import nominal_frames
+from calibration.plausibility import implausible_inputs
+from calibration.postures import mean_postures
+from calibration.recording import Trial
+from calibration.robot import Chain
+from calibration.schema import Body, Description
+
+_FAR = 30.0  # [m] no marker of a laboratory is that far from its origin
+_SAME = 1e-3  # [m] two markers are never closer
+_SIZE = (0.02, 2.0)  # [m] believable largest distance within a body of markers
+_FLEX = 0.01  # [m] a distance within a body may scatter by this much
+_DRAWN = 0.03  # [m] a distance within a body may be off its drawing by this much
+_LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or its inverse
+_HAND = 0.05  # [m] rms distance between the hand and the nominal robot's, their frames fitted
+
+
+def check(file: str, trial: Trial | PostureMeans, description: Description, chain: Chain, mass: float) -> None:
+    """Refuse what cannot be true.
+
+    Args:
+        file: Where the trial came from, for the message.
+        trial: What is to be written.
+        description: Of the dataset it is to be written in.
+        chain: The nominal chain.
+        mass: Of the nominal robot [kg].
+
+    Raises:
+        InputError: With everything that was found.
+    """
+    found = [*_markers(trial, description), *_readings(trial)]
+    found += [] if found else [*implausible_inputs(description, chain, (trial,))]
+    found += [] if found else [*_rigid(trial, description)]
+    if isinstance(trial, Trial):
+        found += [*_clocks(trial), *_load(trial, mass * float(np.linalg.norm(description.gravity)))]
+    elif not found:
+        found += [*_hand(trial, description, chain)]
+    if found:
+        raise InputError(file, "; ".join(found))
+
+
+def _markers(trial: Trial | PostureMeans, description: Description) -> Iterator[str]:
+    p = trial.marker_position
+    for k, name in enumerate(trial.marker):
+        if len(p) and not np.isfinite(p[:, k]).all(axis=1).any():
+            yield f"marker {name} is never seen; take it out of the mapping file"
+    if np.isfinite(p).any() and (far := float(np.nanmax(np.abs(p)))) > _FAR:
+        yield f"markers are up to {far:.0f} m from the laboratory's origin; in millimetres? see marker_unit"
+    for body in description.bodies:
+        for a, b, d in _pairs(body, trial):
+            if np.isfinite(d).any() and np.nanmedian(d) < _SAME:
+                yield f"markers {b} and {a} are at the same place; the same columns are mapped twice, or copied"
+        size = _size(body, trial)
+        if np.isfinite(size) and not _SIZE[0] < size < _SIZE[1]:
+            yield f"markers of body {body.name} are {size:.2g} m apart; see marker_unit"
+
+
+def _readings(trial: Trial | PostureMeans) -> Iterator[str]:
+    for k, name in enumerate(trial.joint):
+        bad = np.flatnonzero(~np.isfinite(trial.q_motor[:, k]))
+        if len(bad):
+            yield f"joint {name}: {len(bad)} readings are missing, the first in sample {bad[0]}; cut them out"
+    if isinstance(trial, Trial):
+        bad = np.flatnonzero(~np.isfinite(trial.plate_wrench).all(axis=(1, 2)))
+        if len(bad):
+            yield f"plate: {len(bad)} samples are missing, the first is {bad[0]}; cut them out, or leave the plate out"
+
+
+def _clocks(trial: Trial) -> Iterator[str]:
+    for name in ("t_robot", "t_mocap", "t_plate"):
+        t = getattr(trial, name)
+        back = np.flatnonzero(~(np.diff(t) > 0.0))
+        if len(back):
+            k = int(back[0])
+            yield f"{name} does not increase at sample {k + 1} ({t[k]:.6f} s, then {t[k + 1]:.6f} s); sort it"
+
+
+def _load(trial: Trial, weight: float) -> Iterator[str]:
+    if not len(trial.t_plate):
+        return
+    load = -float(np.median(trial.plate_wrench[:, :, 2].sum(axis=1)))
+    if load < 0.0:
+        yield (
+            f"plate: Fz is {-load:+.0f} N on a robot that weighs {weight:.0f} N: its wrench is the reaction, or the "
+            "plate is upside down; see convention and axes"
+        )
+    elif not weight / _LOAD < load < weight * _LOAD:
+        yield f"plate carries {load:.3g} N, the nominal robot weighs {weight:.0f} N; see the plate's units and labels"
+
+
+def _pairs(body: Body, trial: Trial | PostureMeans) -> Iterator[tuple[str, str, np.ndarray]]:
+    names = [m.name for m in body.markers if m.name in trial.marker]
+    for i, a in enumerate(names):
+        for b in names[:i]:
+            d = trial.marker_position[:, trial.marker.index(a)] - trial.marker_position[:, trial.marker.index(b)]
+            yield a, b, np.linalg.norm(d, axis=1)
+
+
+def _size(body: Body, trial: Trial | PostureMeans) -> float:
+    sizes = [float(np.nanmedian(d)) for *_, d in _pairs(body, trial) if np.isfinite(d).any()]
+    return max(sizes, default=float("nan"))
+
+
+def _rigid(trial: Trial | PostureMeans, description: Description) -> Iterator[str]:
+    for body in description.bodies:
+        scatter = [(float(np.nanstd(d)), a, b) for a, b, d in _pairs(body, trial) if np.isfinite(d).any()]
+        worst, a, b = max(scatter, default=(0.0, "", ""))
+        if worst > _FLEX:
+            yield (
+                f"body {body.name} is not rigid: {b} and {a} move by {1e3 * worst:.0f} mm against each other; columns "
+                "swapped, or markers mislabelled: correct the mapping file or leave those markers out"
+            )
+            return
+        drawn = {m.name: np.array(m.xyz) for m in body.markers}
+        for a, b, d in _pairs(body, trial):
+            apart, nominal = float(np.nanmedian(d)), float(np.linalg.norm(drawn[a] - drawn[b]))
+            if abs(apart - nominal) > _DRAWN:
+                yield (
+                    f"body {body.name}: {a} and {b} are {1e3 * apart:.0f} mm apart, drawn {1e3 * nominal:.0f} mm; "
+                    "columns swapped, or another marker: correct the mapping file"
+                )
+                return
+
+
+def _hand(means: PostureMeans, description: Description, chain: Chain) -> Iterator[str]:
+    postures = mean_postures(description, means)
+    if len(postures) < 4:
+        return
+    hand = nominal_hand(chain, nominal_frames(chain, description))
+    predicted = hand.poses(postures.q)
+    X, Y = hand_eye(predicted, postures.T_base_hand)
+    error = (X @ predicted @ Y)[:, :3, 3] - postures.T_base_hand[:, :3, 3]
+    rms = float(np.sqrt((error**2).sum(axis=1).mean()))
+    if rms > _HAND:
+        yield (
+            f"the hand is {1e3 * rms:.0f} mm (rms) from where the readings put it, its frames fitted: columns of "
+            "joints or markers are swapped, signs reversed, or this is another robot's URDF"
+        )

@@ -1,0 +1,133 @@
+"""CSV files of one trial, read by the tables of the mapping: samples on a clock, or static postures."""
+
+from collections.abc import Sequence
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+
+from calibration.errors import InputError
+from calibration.io.assemble import Reader
+from calibration.io.csv_text import CsvText, read_text
+from calibration.io.mapping import ANGLES, LENGTHS, MOMENTS, CsvTable, Mapping, PlateChannels
+from calibration.io.plate_convention import checked_against_cop, to_action
+from calibration.io.recorded import Joints, Markers, Means, Plates, Recorded
+from calibration.schema import Plate, Setup
+
+_UNITS = ANGLES | LENGTHS
+
+
+def read_csv(files: Sequence[Path], tables: Sequence[CsvTable], setup: Setup) -> Recorded:
+    """What the files of one trial hold; each is of the table with the longest matching suffix.
+
+    Raises:
+        InputError: Something in a file is not as the mapping says.
+    """
+    return reduce(Recorded.with_channels_of, (_read(path, table_of(path, tables), setup) for path in files))
+
+
+def table_of(path: Path, tables: Sequence[CsvTable]) -> CsvTable:
+    """The table a file belongs to.
+
+    Raises:
+        InputError: None has its suffix.
+    """
+    fitting = [t for t in tables if path.name.endswith(t.suffix)]
+    if not fitting:
+        raise InputError(path, f"csv: no table of the mapping has its suffix; there are {[t.suffix for t in tables]}")
+    return max(fitting, key=lambda t: len(t.suffix))
+
+
+def _read(path: Path, table: CsvTable, setup: Setup) -> Recorded:
+    text = read_text(path)
+    position = _positions(text, table) if table.markers else None
+    if table.time is None:
+        q = np.stack([text.numbers([c.motor], _UNITS[c.unit])[:, 0] for c in table.joints.values()], axis=1)
+        means = Means(
+            tuple(table.joints), q, tuple(table.markers), np.asarray(position), float(table.marker_std or 0.0)
+        )
+        return Recorded(str(path), means=means, notes=_unused(text, table))
+    t = text.seconds(table.time.column, table.time.unit)
+    _check_times(text, table.time.column, t)
+    markers = None if position is None else Markers(t, tuple(table.markers), position)
+    plates, notes = _plates(text, table, setup, t)
+    joints = _joints(text, table, t) if table.joints else None
+    others = {"robot": joints, "plate": plates}
+    together = tuple(name for name, group in others.items() if markers is not None and group is not None)
+    return Recorded(str(path), markers, joints, plates, together=together, notes=(*notes, *_unused(text, table)))
+
+
+def _positions(text: CsvText, table: CsvTable) -> np.ndarray:
+    """Marker positions (n, m, 3) [m], NaN where occluded."""
+    factor = LENGTHS[table.marker_unit]
+    found = np.stack([text.numbers(c, factor, gaps=True) for c in table.markers.values()], axis=1)
+    zero = (found == 0.0).all(axis=2)
+    if table.gaps == "zero":
+        found[zero] = np.nan
+    elif zero.any():
+        row, k = np.argwhere(zero)[0]
+        column = list(table.markers.values())[k][0]
+        raise text.error(row, column, "the marker is at exactly (0, 0, 0); if that is a gap, map `gaps: zero`")
+    return found
+
+
+def _check_times(text: CsvText, column: str, t: np.ndarray) -> None:
+    back = np.flatnonzero(~(np.diff(t) > 0.0))
+    if len(back):
+        row = int(back[0]) + 1
+        said = "is the same as in the row before" if t[row] == t[row - 1] else "does not increase"
+        raise text.error(row, column, f"time {text.cells[row, text.index(column)]} {said}; remove or sort such rows")
+
+
+def _joints(text: CsvText, table: CsvTable, t: np.ndarray) -> Joints:
+    def of(field: str, per_second: bool = True) -> np.ndarray:
+        columns = []
+        for channel in table.joints.values():
+            name = getattr(channel, field)
+            factor = _UNITS[channel.unit] if per_second else 1.0
+            columns.append(np.full(len(t), np.nan) if name is None else text.numbers([name], factor)[:, 0])
+        return np.stack(columns, axis=1)
+
+    return Joints(
+        t, tuple(table.joints), of("motor"), of("link"), of("velocity"), of("effort", per_second=False), of("command")
+    )
+
+
+def _plates(text: CsvText, table: CsvTable, setup: Setup, t: np.ndarray) -> tuple[Plates | None, tuple[str, ...]]:
+    if not table.plates:
+        return None, ()
+    known, wrenches, notes = {p.name: p for p in setup.plates}, [], []
+    for name, channels in table.plates.items():
+        if name not in known:
+            raise InputError(text.path, f"plate {name!r} of the mapping is not in its setup, which has {sorted(known)}")
+        wrench, note = _wrench(text, channels, known[name])
+        wrenches.append(wrench)
+        notes.append(note)
+    centre = np.array([known[name].centre for name in table.plates])
+    return Plates(t, tuple(table.plates), np.stack(wrenches, axis=1), centre), tuple(notes)
+
+
+def _wrench(text: CsvText, channels: PlateChannels, plate: Plate) -> tuple[np.ndarray, str]:
+    force = text.numbers(channels.force)
+    moment = text.numbers(channels.moment, MOMENTS[channels.moment_unit])
+    wrench = to_action(force, moment, channels, plate)
+    cop = text.numbers(channels.cop, LENGTHS[channels.cop_unit]) if channels.cop else None
+    place = f"{text.path}: {', '.join((*channels.force, *channels.moment))}"
+    return wrench, checked_against_cop(place, force, moment, cop, channels, plate)
+
+
+def _unused(text: CsvText, table: CsvTable) -> tuple[str, ...]:
+    used = {c for columns in table.markers.values() for c in columns}
+    used |= {c for j in table.joints.values() for c in (j.motor, j.link, j.velocity, j.effort, j.command) if c}
+    used |= {c for p in table.plates.values() for c in (*p.force, *p.moment, *(p.cop or ()))}
+    used |= {table.time.column} if table.time else set()
+    left = [name for name in text.header if name not in used]
+    return (f"{text.path.name}: columns not used: {', '.join(left)}",) if left else ()
+
+
+def csv_reader(mapping: Mapping) -> Reader:
+    """CSV files by the tables of a mapping."""
+    return Reader(
+        lambda files: read_csv(files, mapping.csv, mapping.setup),
+        lambda path: path.name.removesuffix(table_of(path, mapping.csv).suffix),
+    )
