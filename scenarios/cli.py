@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -137,23 +137,19 @@ def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
     typer.echo(f"Report: {page}")
 
 
-importing = typer.Typer(no_args_is_help=True, help="Write a dataset from laboratory files.")
-app.add_typer(importing, name="import")
-
-Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Each belongs to the trial of its name.")]
-MapFile = Annotated[Path, typer.Option("--map", metavar="YAML", help="What the files do not say: docs/recording.md.")]
-AddTo = Annotated[
-    Path | None, typer.Option(metavar="DATASET", help="Add these instruments to the trials of an imported dataset.")
-]
-
-
-@importing.command("csv")
-def import_csv(files: Files, mapping: MapFile, out: Out, add_to: AddTo = None) -> None:
-    """Samples on a clock, or static postures."""
-    _import("csv", files, mapping, out, add_to)
-
-
-def _import(kind: str, files: Sequence[Path], mapping: Path, out: Path, add_to: Path | None) -> None:
+@app.command("import")
+def import_(
+    kind: Annotated[Literal["csv"], typer.Argument(metavar="FORMAT", help="csv: samples or static postures.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Each belongs to the trial of its name.")],
+    mapping: Annotated[
+        Path, typer.Option("--map", metavar="YAML", help="What the files do not say: docs/recording.md.")
+    ],
+    out: Out,
+    add_to: Annotated[
+        Path | None, typer.Option(metavar="DATASET", help="Add these instruments to the trials of this dataset.")
+    ] = None,
+) -> None:
+    """Write a dataset from laboratory files."""
     from scenarios import exchange
 
     for note in exchange.import_files(kind, files, mapping, out, add_to):
