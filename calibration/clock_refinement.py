@@ -16,16 +16,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from scipy.ndimage import maximum_filter1d
 
 from calibration.bodies import BodyPoses, poses_of
 from calibration.clock import Clock, TrialLag
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel, nominal_hand
+from calibration.hand_fit import fit
 from calibration.inverse_dynamics import JointMotion
 from calibration.lag import Lag, long_run_variance
-from calibration.map_fit import fit
 from calibration.markers import base_body, hand_body
 from calibration.parameters import geometry_parameters, play_floor, play_start
 from calibration.postures import read_postures
@@ -190,10 +189,7 @@ def _residuals(T_measured: np.ndarray, T: np.ndarray) -> np.ndarray:
 
 def _gravity_torques(hand: HandModel, q: np.ndarray) -> np.ndarray:
     """Torques (n, k) [N.m, N] that hold the chain's joints at readings q, nominal masses."""
-    model = hand.chain.model
-    data, ids = model.createData(), [model.joints[model.getJointId(name)].idx_v for name in hand.chain.joints]
-    rows = hand.chain.configurations(hand.angles(q))
-    return np.array([pin.computeGeneralizedGravity(model, data, row)[ids] for row in rows])
+    return hand.chain.gravity_torques(hand.angles(q))
 
 
 def refined(

@@ -11,8 +11,9 @@ import numpy as np
 
 from calibration.estimate import Model
 from calibration.hand import nominal_hand
+from calibration.hand_fit import fit
 from calibration.identifiability import Identifiability, identifiability
-from calibration.map_fit import Fit, fit
+from calibration.map_fit import Fit
 from calibration.parameters import METRES_PER_RAD, ParameterSet, geometry_parameters, play_floor, play_start
 from calibration.postures import Postures
 from calibration.result import model_of

@@ -1,21 +1,24 @@
 """Pose of the hand body in the base body, as a function of the readings and of all parameters.
 
-    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset, xi)  T_tool_H
+    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset - compliance tau(q), xi)  T_tool_H
 
+tau is the nominal gravity torque at the readings: what the motors must give at rest, [N.m, N].
 Derivatives are local twists of the hand:
 
     d/d(T_tool_H)   L(T_tool_H)                        d/d(xi)      Ad(T_H_tool) J_placement
-    d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint
+    d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint,  compliance: times tau
 
 with L = diag(R', Jr(phi)) from (dp, dphi) to the local twist of a frame given as translation and rotation vector.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.kinematics import Path
 from calibration.robot import Chain
 from calibration.se3 import adjoint, from_vector, inverse, local_twist
+from calibration.twists import jexp6
 
 
 @dataclass(frozen=True)
@@ -42,30 +45,32 @@ class HandModel:
         offset: (k,) zero of each joint's motor-side reading [rad, m].
         base: (6,) translation and rotation vector of T_base_B [m, rad].
         hand: (6,) of T_tool_H [m, rad].
+        compliance: (k,) of each gear under its gravity torque [rad/(N.m), m/N].
     """
 
     chain: Chain
     offset: np.ndarray
     base: np.ndarray
     hand: np.ndarray
+    compliance: np.ndarray
 
     def with_theta(self, theta: np.ndarray) -> "HandModel":
-        """The model with frames theta[:12] and, where theta goes on, placements (6 k) and offsets (k)."""
-        k = len(self.offset)
-        if len(theta) == 12:
-            return HandModel(self.chain, self.offset, theta[:6], theta[6:12])
+        """The model with the first 12 (frames), 12 + 7 k (placements, offsets) or 12 + 8 k (compliances) parameters."""
+        k, theta = len(self.offset), np.append(theta, self.theta[len(theta) :])
         chain = self.chain.with_placements(theta[12 : 12 + 6 * k].reshape(k, 6))
-        return HandModel(chain, theta[12 + 6 * k :], theta[:6], theta[6:12])
+        return HandModel(chain, theta[12 + 6 * k : 12 + 7 * k], theta[:6], theta[6:12], theta[12 + 7 * k :])
 
     @property
     def theta(self) -> np.ndarray:
-        """All parameters, (12 + 7 k,)."""
-        return np.concatenate([self.base, self.hand, self.chain.xi.ravel(), self.offset])
+        """All parameters, (12 + 8 k,)."""
+        return np.concatenate([self.base, self.hand, self.chain.xi.ravel(), self.offset, self.compliance])
 
     def angles(self, q: np.ndarray) -> np.ndarray:
         """Joint positions (n, n_measured) behind readings q."""
         out = np.array(q, dtype=float)
         out[:, self.chain.columns] -= self.offset
+        if self.compliance.any():
+            out[:, self.chain.columns] -= self.compliance * self.chain.gravity_torques(q)
         return out
 
     def in_base_frame(self, q: np.ndarray) -> np.ndarray:
@@ -80,17 +85,40 @@ class HandModel:
         """Derivatives of T_B_H by joint position (n, 6, k), local twists of the hand, at readings q."""
         return adjoint(inverse(from_vector(self.hand))) @ self.chain.joint_jacobians(self.angles(q))
 
-    def poses_and_derivatives(self, q: np.ndarray) -> HandPoses:
-        """T_B_H and its derivatives at readings q (n, n_measured)."""
-        found = self.chain.poses_and_derivatives(self.angles(q))
-        T = inverse(from_vector(self.base)) @ found.T @ from_vector(self.hand)
-        to_hand = adjoint(inverse(from_vector(self.hand)))
-        J_joint = to_hand @ found.J_joint
-        J_base = -adjoint(inverse(T)) @ local_twist(self.base)
-        J_hand = np.broadcast_to(local_twist(self.hand), (len(T), 6, 6))
-        return HandPoses(T, np.concatenate([J_base, J_hand, to_hand @ found.J_placement, -J_joint], axis=2), J_joint)
+    def poses_and_derivatives(
+        self, q: np.ndarray, tau: np.ndarray | None = None, n_parameters: int | None = None
+    ) -> HandPoses:
+        """T_B_H and its derivatives at readings q (n, n_measured).
+
+        Args:
+            q: Readings [rad, m].
+            tau: (n, k) the chain's gravity torques at q, where they are known already.
+            n_parameters: How many of theta to differentiate by; all where not given.
+        """
+        k = len(self.offset)
+        p = 12 + 8 * k if n_parameters is None else n_parameters
+        if tau is None:
+            tau = self.chain.gravity_torques(q)
+        placed = self._path().placed(q[:, self.chain.columns] - self.offset - self.compliance * tau)
+        G, S = placed.to_end(), self.chain.path.twists
+        J, J_joint = np.empty((len(q), 6, p)), np.einsum("nakb,kb->nak", G[:, :, 1:], S)
+        J[:, :, :6], J[:, :, 6:12] = -G[:, :, 0] @ local_twist(self.base), local_twist(self.hand)
+        if p > 12:
+            for i, xi in enumerate(self.chain.xi):
+                J[:, :, 12 + 6 * i : 18 + 6 * i] = G[:, :, i + 1] @ jexp6(xi)
+            J[:, :, 12 + 6 * k : 12 + 7 * k] = -J_joint
+        if p > 12 + 7 * k:
+            J[:, :, 12 + 7 * k :] = -tau[:, None, :] * J_joint
+        return HandPoses(placed.T, J, J_joint)
+
+    def _path(self) -> Path:
+        """From the base's marker body to the hand's."""
+        fixed = np.array(self.chain.path.fixed)
+        fixed[0], fixed[-1] = inverse(from_vector(self.base)) @ fixed[0], fixed[-1] @ from_vector(self.hand)
+        return replace(self.chain.path, fixed=fixed)
 
 
 def nominal_hand(chain: Chain, frames: np.ndarray) -> HandModel:
     """The datasheet's robot with marker frames (12,) [m, rad]."""
-    return HandModel(chain, np.zeros(len(chain.joints)), frames[:6], frames[6:])
+    k = len(chain.joints)
+    return HandModel(chain, np.zeros(k), frames[:6], frames[6:], np.zeros(k))

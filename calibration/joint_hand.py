@@ -15,9 +15,9 @@ import numpy as np
 
 from calibration.clock import Clock
 from calibration.hand import HandModel
+from calibration.hand_fit import linearised
 from calibration.joint_samples import Samples
 from calibration.joint_selection import Candidate
-from calibration.map_fit import linearised
 from calibration.markers import base_body, hand_body
 from calibration.postures import Postures, read_passing
 from calibration.recording import Trial

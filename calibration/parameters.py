@@ -3,6 +3,7 @@
     frame.<a>.<b>         translation [m] and rotation vector [rad] of T_a_b
     geometry.<joint>      exp6 twist on the right of the joint placement [m, rad]
     encoder.<joint>.motor.offset      reading = angle + offset [rad, m]
+    gear.<joint>.compliance           reading = angle + offset + compliance * gravity torque [rad/(N.m), m/N]
 
 A joint's offset and the twist along its axis move the hand alike: the data speak of their combination, their
 tolerances divide it.
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.linearised import Prior
 from calibration.markers import BASE, base_body, hand_body
 from calibration.robot import Chain
 from calibration.schema import Description
@@ -30,20 +32,28 @@ class ParameterSet:
         units: `m` or `rad`, length p.
         nominal: (p,) datasheet values.
         tolerance: (p,) standard deviations of the prior; inf where there is none.
+        group: (p,) parameters whose tolerances share a factor that the data decide, -1: as they stand; None: all stand.
     """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
     nominal: np.ndarray
     tolerance: np.ndarray
+    group: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
 
     @property
+    def prior(self) -> Prior:
+        """What is believed of them beforehand."""
+        group = np.full(len(self), -1) if self.group is None else self.group
+        return Prior(self.nominal, self.tolerance, group)
+
+    @property
     def scale(self) -> np.ndarray:
         """(p,) finite scale of each parameter: its tolerance, else 1 mm or 1 mrad [m, rad]."""
-        return np.where(np.isfinite(self.tolerance), self.tolerance, 1e-3)
+        return self.prior.scale
 
 
 def frame_names() -> tuple[str, str]:
@@ -52,11 +62,12 @@ def frame_names() -> tuple[str, str]:
 
 
 def parameter_names(chain: Chain) -> tuple[str, ...]:
-    """Names of the two frames, the placements and the zeros of a chain, in the order of `HandModel.theta`."""
+    """Names of frames, placements, zeros and compliances of a chain, in the order of `HandModel.theta`."""
     return (
         *(f"{prefix}.{axis}" for prefix in frame_names() for axis in AXES),
         *(f"geometry.{joint}.{axis}" for joint in chain.joints for axis in AXES),
         *(f"encoder.{joint}.motor.offset" for joint in chain.joints),
+        *(f"gear.{joint}.compliance" for joint in chain.joints),
     )
 
 
@@ -64,7 +75,10 @@ def registration_parameters(chain: Chain, description: Description) -> Parameter
     """The two frames alone, without a prior."""
     frames = nominal_frames(chain, description)
     return ParameterSet(
-        parameter_names(chain)[:12], ("m", "m", "m", "rad", "rad", "rad") * 2, frames, np.full(12, np.inf)
+        parameter_names(chain)[:12],
+        ("m", "m", "m", "rad", "rad", "rad") * 2,
+        frames,
+        np.full(12, np.inf),
     )
 
 
@@ -74,7 +88,7 @@ def geometry_parameters(chain: Chain, description: Description) -> ParameterSet:
     k = len(chain.joints)
     lengths = np.array([METRES_PER_RAD if chain.is_prismatic(j) else 1.0 for j in chain.joints])
     return ParameterSet(
-        parameter_names(chain),
+        parameter_names(chain)[: 12 + 7 * k],
         frames.units
         + ("m", "m", "m", "rad", "rad", "rad") * k
         + tuple("m" if chain.is_prismatic(j) else "rad" for j in chain.joints),
@@ -86,6 +100,7 @@ def geometry_parameters(chain: Chain, description: Description) -> ParameterSet:
                 tol.encoder_offset * lengths,
             ]
         ),
+        np.concatenate([np.full(12, -1), np.tile([0, 0, 0, 1, 1, 1], k), np.full(k, 2)]),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from calibration.estimate import Model
 from calibration.hand import nominal_hand
-from calibration.map_fit import fit_weighted
+from calibration.hand_fit import fit_weighted
 from calibration.parameters import registration_parameters
 from calibration.postures import Postures
 from calibration.result import model_of

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from calibration.errors import InputError, NoSuchElement, ShapeError
 from calibration.kinematics import Path, path_of
+from calibration.loads import Loads, gravity_torques, loads_of
 from calibration.schema import Description
 from calibration.twists import exp6, jexp6
 
@@ -46,6 +47,7 @@ class Chain:
         tool_frame: Name of the frame whose pose is meant.
         xi: (k, 6) placement twists [m, rad].
         drawn: The nominal path from base to tool.
+        loads: What its joints carry.
     """
 
     nominal: pin.Model
@@ -55,6 +57,7 @@ class Chain:
     tool_frame: str
     xi: np.ndarray
     drawn: Path
+    loads: Loads
 
     @property
     def columns(self) -> list[int]:
@@ -104,6 +107,11 @@ class Chain:
         """Derivatives of the tool's pose by joint position (n, 6, k), local twists, at q (n, n_measured)."""
         self._check(q)
         return np.einsum("nakb,kb->nak", self.path.placed(q[:, self.columns]).to_end()[:, :, 1:], self.path.twists)
+
+    def gravity_torques(self, q: np.ndarray) -> np.ndarray:
+        """Torques (n, k) [N.m, N] that hold the chain's joints at q (n, n_measured), nominal geometry and masses."""
+        self._check(q)
+        return gravity_torques(self.drawn, self.loads, q[:, self.columns])
 
     def configurations(self, q: np.ndarray) -> np.ndarray:
         """Readings q (n, n_measured) in the model's own order and format, (n, nq)."""
@@ -180,4 +188,13 @@ def chain_of_frames(urdf: str, measured: tuple[str, ...], base_frame: str, tool_
     if several:
         raise InputError("nominal.urdf", f"joints {several} have more than one degree of freedom; none of a chain may")
     drawn = path_of(model, model.getFrameId(base.name), model.getFrameId(tool.name))
-    return Chain(model, measured, joints, base.name, tool.name, np.zeros((len(joints), 6)), drawn)
+    return Chain(
+        model,
+        measured,
+        joints,
+        base.name,
+        tool.name,
+        np.zeros((len(joints), 6)),
+        drawn,
+        loads_of(model, joints, base.name),
+    )

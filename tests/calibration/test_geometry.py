@@ -5,8 +5,8 @@ import pytest
 
 from calibration.geometry import calibrate_geometry, distinct
 from calibration.hand import nominal_hand
+from calibration.hand_fit import fit, linearised
 from calibration.identifiability import identifiability
-from calibration.map_fit import fit, linearised
 from calibration.parameters import geometry_parameters, nominal_frames, play_floor, play_start, registration_parameters
 from calibration.postures import Postures
 from calibration.registration import register

@@ -8,9 +8,23 @@ from calibration.errors import InputError
 from calibration.robot import chain_of_frames
 from calibration.twists import exp6, jexp6, jlog6, log3, log6
 from tests.calibration import matched
-from tests.calibration.test_robot import other_chain
+from tests.calibration.test_robot import OTHER_ROBOT, other_chain
 
 ANGLES = (0.0, 1e-9, 1e-4, 0.3, 0.499, 0.501, 1.0, 2.9, 3.1)
+
+
+def heavy_chain():
+    """The other robot with masses, its base turned, sliding joint last."""
+    inertial = """<inertial><mass value="2.5"/><origin xyz="0.1 -0.2 0.3"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"""
+    urdf = OTHER_ROBOT
+    for link in "bcde":
+        urdf = urdf.replace(f'<link name="{link}"/>', f'<link name="{link}">{inertial}</link>')
+    turned = """<link name="z"/><joint name="mount" type="fixed"><parent link="z"/><child link="a"/>
+    <origin xyz="0 0 1" rpy="0.3 0.2 0.1"/></joint>"""
+    return chain_of_frames(
+        urdf.replace('<link name="a"/>', f'<link name="a"/>{turned}'), ("slide", "spin", "tilted"), "a", "e"
+    )
 
 
 def twists(angle, n=50):
@@ -84,3 +98,14 @@ def test_a_joint_of_several_freedoms_is_refused():
     <child link="b"/><axis xyz="0 0 1"/></joint></robot>"""
     with pytest.raises(InputError, match="more than one degree of freedom"):
         chain_of_frames(urdf, ("plane",), "a", "b")
+
+
+@pytest.mark.parametrize("robot", ["tiago", "other"])
+def test_gravity_torques_of_all_configurations_are_pinocchio_s(chain, robot):
+    c = chain if robot == "tiago" else heavy_chain()
+    q = np.random.default_rng(4).uniform(-1.0, 1.0, size=(20, len(c.measured)))
+    model, data = c.nominal, c.nominal.createData()
+    ids = [model.joints[model.getJointId(name)].idx_v for name in c.joints]
+    expected = [pin.computeGeneralizedGravity(model, data, row)[ids] for row in c.configurations(q)]
+    assert np.abs(expected).max() > 1.0
+    np.testing.assert_allclose(c.gravity_torques(q), expected, atol=1e-12)

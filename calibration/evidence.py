@@ -1,0 +1,164 @@
+"""Sizes of random errors and widths of priors that make the data most likely (type-II maximum likelihood).
+
+    r = r_0 + J (theta - theta_0) + e,   e_i ~ N(0, C_i / w_i),   C_i = sum_m v_g(m) b_im b_im'
+    theta_j ~ N(nominal_j, f_h(j) tolerance_j^2)
+
+theta is integrated out. Each source of noise b_m (n, d) has the variance v of its group: one of a joint's reading, of
+the hand's position, of its rotation, of the markers. Variances take Fisher scoring steps down to a floor, prior
+factors f MacKay's fixed point, held near 1 as by `_HELD` parameters that deviate by exactly their tolerance.
+References: MacKay, Neural Computation 1992; Patterson, Thompson, Biometrika 1971 (restricted likelihood).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack
+
+from calibration.linearised import Linearised, Prior
+
+_HELD = 4.0
+_STEPS = 30
+_SAME = 1e-3  # iterations stop below this change of any log v, or log f [-]
+_LARGEST = 1.0  # of a standard deviation [rad, m]: data that ask for more do not belong to the model
+_NEGLIGIBLE = 10.0  # standard deviations below this many floors need not stand still
+
+
+@dataclass(frozen=True)
+class Widths:
+    """What the evidence decides.
+
+    Attributes:
+        noise: (g,) standard deviation of each group of noise sources.
+        prior: (h,) factor on the tolerances of each group of parameters [-].
+    """
+
+    noise: np.ndarray
+    prior: np.ndarray
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Sources of random errors of the residuals.
+
+    Attributes:
+        B: (n, d, m) one source a column.
+        group: (m,) which variance it has.
+        floor: (g,) smallest standard deviation of each group.
+        free: (g,) whether the evidence may change it.
+        weight: (n,) of each posture [-].
+    """
+
+    B: np.ndarray
+    group: np.ndarray
+    floor: np.ndarray
+    free: np.ndarray
+    weight: np.ndarray
+
+    def rows(self, chosen: np.ndarray) -> "Noise":
+        """The sources of some postures."""
+        return Noise(self.B[chosen], self.group, self.floor, self.free, self.weight[chosen])
+
+    def roots(self, noise: np.ndarray) -> np.ndarray:
+        """W (n, d, d) with W' W = C^-1, weights not counted."""
+        C = (self.B * noise[self.group] ** 2) @ np.swapaxes(self.B, 1, 2)
+        return np.linalg.inv(np.linalg.cholesky(C))
+
+    def whitener(self, noise: np.ndarray) -> np.ndarray:
+        """W (n, d, d) with W' W = w C^-1."""
+        return np.sqrt(self.weight)[:, None, None] * self.roots(noise)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """The evidence at some widths: minus its logarithm, its derivatives by the variances, and what theta would be."""
+
+    value: float
+    slope: np.ndarray
+    fisher: np.ndarray
+    off: np.ndarray
+    spread: np.ndarray
+
+
+def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Widths:
+    """Widths of highest evidence for the linearised problem."""
+    damping, now = 1e-3, _point(at, noise, prior, widths)
+    for _ in range(_STEPS):
+        f = _prior_factors(prior, now, widths.prior)
+        v = _scored(now, noise, widths.noise, damping)
+        trial = _point(at, noise, prior, Widths(v, f))
+        if trial.value > now.value + 1e-9 * abs(now.value) and damping < 1e6:
+            damping = max(10.0 * damping, 1e-2)
+            continue
+        damping = 0.1 * damping
+        moved = max(moved_by(widths.noise, v, _NEGLIGIBLE * noise.floor), moved_by(widths.prior, f, 1e-12) / 2.0)
+        widths, now = Widths(v, f), trial
+        if moved < _SAME:
+            break
+    return widths
+
+
+def moved_by(old: np.ndarray, new: np.ndarray, least: np.ndarray | float) -> float:
+    """Largest change of a logarithm; what is below `least` counts as that."""
+    return float(np.abs(np.log(np.maximum(new, least) / np.maximum(old, least))).max(initial=0.0))
+
+
+def _point(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> _Point:
+    """Evaluate; the slope is by variance, the information that of the postures taken one by one."""
+    root, scale = noise.roots(widths.noise), prior.scale
+    n, d, p = at.J.shape
+    some = np.sqrt(noise.weight)[:, None]
+    A = (root @ at.J) * (some[..., None] * scale)
+    r = (root @ at.r[..., None])[..., 0] * some
+    flat, precision = A.reshape(n * d, p), prior.precision(widths.prior) * scale**2
+    off = (at.theta - prior.nominal) / scale
+    covariance, log_det = inverse_and_log_det(flat.T @ flat + np.diag(precision))
+    step = covariance @ (flat.T @ r.ravel() + precision * off)
+    rest, off = r - (flat @ step).reshape(n, d), off - step
+    K = root @ noise.B
+    KA = np.swapaxes(K, 1, 2) @ A
+    trace = (K**2).sum(axis=(0, 1)) - ((KA @ covariance) * KA).sum(axis=(0, 2))
+    slope = 0.5 * (trace - (np.einsum("ndm,nd->nm", K, rest) ** 2).sum(axis=0))
+    together = 0.5 * ((np.swapaxes(K, 1, 2) @ K) ** 2).sum(axis=0)
+    groups = np.eye(len(noise.floor))[noise.group]
+    value = log_det - 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
+    value += float((rest**2).sum() + (precision * off**2).sum()) + prior.held(widths.prior, _HELD)
+    return _Point(
+        0.5 * value, groups.T @ slope, groups.T @ together @ groups, off * scale, np.diag(covariance) * scale**2
+    )
+
+
+def _scored(now: _Point, noise: Noise, s: np.ndarray, damping: float) -> np.ndarray:
+    """Standard deviations after one Fisher scoring step of the variances that are not held at their floor."""
+    v, low = s**2, noise.floor**2
+    free = noise.free & ~((v <= low * 1.0000001) & (now.slope > 0.0))
+    if not free.any():
+        return s
+    F = now.fisher[np.ix_(free, free)]
+    F = F + np.diag(damping * np.diag(F) + np.finfo(float).tiny)
+    step = np.zeros_like(v)
+    step[free] = -np.linalg.solve(F, now.slope[free])
+    return np.sqrt(np.clip(v + np.clip(step, -0.97 * v, 20.0 * v + 4.0 * low), low, np.maximum(_LARGEST**2, low)))
+
+
+def _prior_factors(prior: Prior, now: _Point, f: np.ndarray) -> np.ndarray:
+    """MacKay's fixed point for the factors on squared tolerances."""
+    new = np.array(f)
+    for h in range(len(f)):
+        mine = prior.group == h
+        unit = prior.tolerance[mine] ** 2
+        known = max(0.0, float((1.0 - now.spread[mine] / (f[h] * unit)).sum()))
+        new[h] = (float((now.off[mine] ** 2 / unit).sum()) + _HELD) / (known + _HELD)
+    return new
+
+
+def inverse_and_log_det(information: np.ndarray) -> tuple[np.ndarray, float]:
+    """Inverse and log determinant of a symmetric matrix; directions without information get a huge variance."""
+    factor, failed = lapack.dpotrf(information, lower=True)
+    if not failed:
+        diagonal = np.diagonal(factor)
+        if diagonal.min() > 1e-7 * diagonal.max():
+            inverse = lapack.dpotri(factor, lower=True)[0]
+            return inverse + np.tril(inverse, -1).T, 2.0 * float(np.log(diagonal).sum())
+    values, vectors = np.linalg.eigh(information)
+    values = np.maximum(values, 1e-15 * values[-1])
+    return (vectors / values) @ vectors.T, float(np.log(values).sum())

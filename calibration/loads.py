@@ -1,0 +1,56 @@
+"""Gravity torques of a chain, all configurations at once.
+
+    tau_j = dV/dq_j = -g . (a_j x sum_{i >= j} m_i (p_i - o_j))      revolute [N.m], about axis a_j through o_j
+    tau_j = -g . a_j sum_{i >= j} m_i                                 prismatic [N]
+
+what the motors must give at rest. m_i and p_i are mass and centre of what joint i carries up to the next joint of the
+chain; joints off the chain stay at neutral.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from calibration.kinematics import Path
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Masses along a chain of k joints.
+
+    Attributes:
+        mass: (k,) behind each joint [kg].
+        centre: (k, 3) centre of mass in the joint's own frame [m].
+        gravity: (3,) in the frame the path starts from [m/s2].
+    """
+
+    mass: np.ndarray
+    centre: np.ndarray
+    gravity: np.ndarray
+
+
+def loads_of(model: pin.Model, joints: tuple[str, ...], base_frame: str) -> Loads:
+    """Loads of a model's chain, everything else rigid at neutral."""
+    others = [i for i in range(1, model.njoints) if model.names[i] not in joints]
+    chain = pin.buildReducedModel(model, others, pin.neutral(model)) if others else model
+    bodies = [chain.inertias[chain.getJointId(name)] for name in joints]
+    R = model.frames[model.getFrameId(base_frame)].placement.rotation
+    return Loads(np.array([b.mass for b in bodies]), np.array([b.lever for b in bodies]), R.T @ model.gravity.linear)
+
+
+def gravity_torques(path: Path, loads: Loads, q: np.ndarray) -> np.ndarray:
+    """Torques (n, k) [N.m, N] that hold the joints at positions q (n, k) [rad, m]."""
+    placed, (n, k) = path.placed(q), q.shape
+    R = np.concatenate([placed.R.reshape(n, 3, k, 3)[:, :, 1:], placed.T[:, :3, None, :3]], axis=2)
+    moved = np.einsum("naib,icb->naic", R, path.fixed[1:, :3, :3])
+    origin = np.moveaxis(placed.p, 1, 2)
+    moment = loads.mass[:, None] * (origin + np.einsum("naib,ib->nia", moved, loads.centre))
+    if path.prismatic.any():  # what slides has its frame's origin elsewhere than the frame before the joint
+        slid = np.where(path.prismatic, q, 0.0)[..., None] * np.einsum("naib,ib->nia", moved, path.axis)
+        moment = moment + loads.mass[:, None] * slid
+    carried = np.cumsum(loads.mass[::-1])[::-1]
+    lever = np.cumsum(moment[:, ::-1], axis=1)[:, ::-1] - carried[:, None] * origin
+    axis = np.einsum("naib,ib->nia", moved, path.axis)
+    turning = -np.cross(axis, lever) @ loads.gravity
+    return np.where(path.prismatic, -(axis @ loads.gravity) * carried, turning)
