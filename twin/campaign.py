@@ -24,7 +24,8 @@ from twin.build import Twin, build
 from twin.config import TwinConfig
 from twin.conventions import exp6
 from twin.declare import declaration
-from twin.defects.base import Parameter
+from twin.defects.base import Defect, Parameter
+from twin.defects.departures import Warming
 from twin.defects.ground import spatial_stiffness
 from twin.defects.loads import Payload
 from twin.draw import BASE, Robot, draw
@@ -108,7 +109,8 @@ def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None =
 
 
 def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry:
-    states = simulate(_loaded(lab, motion), motion, lab.T_lab_base)
+    twin = _in_trial(lab, motion, start - _EPOCH + motion.duration / 2.0)
+    states = simulate(twin, motion, lab.T_lab_base)
     trial, true = measure(lab, motion, states, start)
     file = f"trials/{motion.id}.nc"
     digest = write_trial(out / "dataset" / file, trial)
@@ -124,11 +126,17 @@ def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry
     )
 
 
-def _loaded(lab: Laboratory, motion: Motion) -> Twin:
-    """The robot with the motion's payload in its hand."""
-    if motion.payload is None:
+def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
+    """The robot with the motion's payload in its hand, as warm as it is at `time` [s] of the campaign."""
+
+    def now(defect: Defect) -> Defect:
+        if isinstance(defect, Payload) and motion.payload is not None:
+            return replace(defect, mass=motion.payload)
+        return replace(defect, time=time) if isinstance(defect, Warming) else defect
+
+    defects = tuple(now(d) for d in lab.robot.defects)
+    if all(a is b for a, b in zip(defects, lab.robot.defects, strict=True)):
         return lab.twin
-    defects = [replace(d, mass=motion.payload) if isinstance(d, Payload) else d for d in lab.robot.defects]
     return build(mjcf.spec(), defects, lab.twin.links, lab.config.timestep)
 
 
@@ -175,15 +183,19 @@ def _true(lab: Laboratory, states: States, t_mocap: np.ndarray, start: float) ->
     t, clusters = t_mocap - start, lab.robot.clusters
     poses = {name: interpolate_poses(t, states.t, T) for name, T in states.poses.items()}
     hand = next(c for c in clusters if c.name == "gripper")
+    names = tuple(m for c in clusters for m in c.marker_names)
+    markers = np.concatenate([mocap.marker_positions(poses[c.link], c) for c in clusters], axis=1)
+    for marker in lab.robot.loose:
+        markers = marker.moved(t_mocap - _EPOCH, names, markers)
     return TruthTrial(
         joint=JOINTS,
-        marker=tuple(m for c in clusters for m in c.marker_names),
+        marker=names,
         t_mocap=t_mocap,
         q_motor_true=interpolate(t, states.t, states.motor),
         q_link_true=interpolate(t, states.t, states.link),
         base_pose=poses[BASE],
         hand_pose=poses[hand.link] @ hand.T_link_body,
-        marker_position=np.concatenate([mocap.marker_positions(poses[c.link], c) for c in clusters], axis=1),
+        marker_position=markers,
         plate_wrench=averaged(t, states.t, states.wrench, 1.0 / lab.config.instruments.mocap_rate),
     )
 
@@ -200,7 +212,7 @@ def _write_truth(lab: Laboratory, folder: Path) -> None:
     contacts = {w.name: w.contact for w in mjcf.wheels()}
     K, C = spatial_stiffness(robot.wheels, np.array([contacts[w.name] for w in robot.wheels]))
     parameters: list[Parameter] = list(lab.twin.truth)
-    for source in (*robot.encoders, *robot.clusters, *_clocks(lab.config)[:2]):
+    for source in (*robot.encoders, *robot.clusters, *robot.loose, *_clocks(lab.config)[:2]):
         parameters += source.parameters()
     derived = {"K": K, "C": C, "T_lab_base": lab.T_lab_base, "plate_centre": _plate_centre(lab.twin.model)}
     derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}

@@ -12,6 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
+from twin.config_departures import Departures
 from twin.config_values import (
     STRICT,
     Count,
@@ -223,6 +224,7 @@ class TwinConfig:
         gear_form: dead_zone: load torque decides the flank; friction_held: friction holds the play, the mesh slips.
         friction_held: What that form adds, by joint; joints not named keep the dead zone.
         coupled_wrist: Whether arm_6 and arm_7 are driven by one differential.
+        departures: What no model of the pipeline holds.
     """
 
     arm: dict[str, ArmJoint]
@@ -237,3 +239,4 @@ class TwinConfig:
     gear_form: Literal["dead_zone", "friction_held"] = "dead_zone"
     friction_held: dict[str, FrictionHeld] = field(default_factory=lambda: dict(FRICTION_HELD))
     coupled_wrist: bool = False
+    departures: Departures = field(default_factory=Departures)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from twin.build import HAND
 from twin.config import MarkerBody, TwinConfig
 from twin.defects.base import Defect
+from twin.defects.departures import Cable, FloorTilt, LooseMarker, Warming
 from twin.defects.differential import Differential
 from twin.defects.gear import DirectDrive, Gear
 from twin.defects.ground import Wheel
@@ -35,12 +36,14 @@ class Robot:
         encoders: Motor and link encoders.
         clusters: Marker bodies.
         wheels: Its wheels, also among the defects.
+        loose: Markers that hang.
     """
 
     defects: tuple[Defect, ...]
     encoders: tuple[Encoder, ...]
     clusters: tuple[Cluster, ...]
     wheels: tuple[Wheel, ...]
+    loose: tuple[LooseMarker, ...] = ()
 
 
 def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
@@ -55,10 +58,12 @@ def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
             Flexibility("torso_lift_link", config.torso.bending_stiffness, config.torso.bending_damping),
             *wheels,
             _payload(config, seed),
+            *_departures(config),
         ),
         encoders=_encoders(config, seed),
         clusters=tuple(_cluster(name, body, seed) for name, body in config.instruments.bodies.items()),
         wheels=wheels,
+        loose=tuple(LooseMarker(n, m.sag, m.since) for n, m in config.departures.loosened.items()),
     )
 
 
@@ -136,6 +141,17 @@ def _wheels(config: TwinConfig) -> tuple[Wheel, ...]:
     return tuple(
         Wheel(n, link, f"{n}_contact", k.stiffness, k.damping, k.contact_stiffness, k.contact_damping, k.friction)
         for n, link, k in (*drive, *casters)
+    )
+
+
+def _departures(config: TwinConfig) -> tuple[Defect, ...]:
+    """Those the scenario names, none by default."""
+    d = config.departures
+    return (
+        *(Flexibility(link, b.stiffness, b.damping) for link, b in d.bending.items()),
+        *(Warming(joint, np.array(w.xi), w.time_constant) for joint, w in d.warming.items()),
+        *((FloorTilt(d.floor_tilt),) if any(d.floor_tilt) else ()),
+        *(Cable(joint, c.stiffness, c.rest) for joint, c in d.cables.items()),
     )
 
 

@@ -1,0 +1,63 @@
+"""What a scenario may add that no model of the pipeline holds; every departure is off unless it is named. SI units."""
+
+from dataclasses import field
+from typing import Annotated
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from twin.config_values import STRICT, FixedNonNegative, NonNegative, Positive, Twist, Value
+from twin.uncertain import DRAWN
+
+Tilt = Annotated[float, Field(ge=-0.05, le=0.05), DRAWN]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Bending:
+    """A link that bends about its x and y axes: stiffness [N.m/rad], damping [N.m.s/rad]."""
+
+    stiffness: Annotated[float, Field(ge=1e3), DRAWN]
+    damping: NonNegative
+
+
+@dataclass(frozen=True, config=STRICT)
+class Warming:
+    """A joint placement that drifts by the twist xi [m, rad] once warm, with a time constant [s]."""
+
+    xi: Twist
+    time_constant: Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class Cable:
+    """A harness that pulls a joint towards an angle: stiffness [N.m/rad], rest [rad]."""
+
+    stiffness: NonNegative
+    rest: Value
+
+
+@dataclass(frozen=True, config=STRICT)
+class Loosened:
+    """A marker that hangs down by `sag` [m] from `since` [s] after the campaign's start."""
+
+    sag: NonNegative
+    since: FixedNonNegative = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class Departures:
+    """Departures no model of the pipeline holds.
+
+    Attributes:
+        bending: By link.
+        warming: By joint.
+        floor_tilt: Rotation of the floor, and of the lab's axes with it, out of level about x and y [rad].
+        cables: By joint.
+        loosened: By marker.
+    """
+
+    bending: dict[str, Bending] = field(default_factory=dict)
+    warming: dict[str, Warming] = field(default_factory=dict)
+    floor_tilt: tuple[Tilt, Tilt] = (0.0, 0.0)
+    cables: dict[str, Cable] = field(default_factory=dict)
+    loosened: dict[str, Loosened] = field(default_factory=dict)
