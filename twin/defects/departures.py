@@ -89,7 +89,8 @@ class Cable(Defect):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Put a spring on the joint."""
         pulled = joint(spec, self.joint_name)
-        pulled.stiffness, pulled.springref = np.array([self.stiffness, 0.0, 0.0]), self.rest
+        pulled.stiffness = np.array([self.stiffness, 0.0, 0.0])
+        pulled.springref = np.degrees(self.rest) if spec.compiler.degree else self.rest
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Stiffness and angle of rest."""
