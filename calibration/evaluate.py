@@ -20,10 +20,11 @@ from calibration.comparison import comparisons
 from calibration.dataset import Dataset
 from calibration.errors import NotEnoughData
 from calibration.estimate import Estimate
+from calibration.joint_regimes import Explained, on_repetitions, on_validation
 from calibration.markers import hand_body
 from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics
 from calibration.postures import dwell_windows
-from calibration.predict import REFERENCE, Prediction, predictor
+from calibration.predict import REFERENCE, Prediction, Predictor, predictor
 from calibration.protocols import protocol_rows
 from calibration.recording import Trial
 from calibration.schema import Role
@@ -70,10 +71,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The ladder, and the errors it is made of."""
+    """The ladder, the errors it is made of, and what the joint models explain of each joint's discrepancy."""
 
     rows: tuple[Row, ...]
     traces: tuple[Trace, ...]
+    regimes: tuple[Explained, ...] = ()
 
     def row(self, model: str, trials: Trials = "dynamic", base: str = "fixed", encoder: str = "motor") -> Row:
         """One line.
@@ -97,6 +99,7 @@ class Evaluation:
             "rows": [row_entry(r) for r in self.rows],
             "trials": [trial_entry(t) for t in self.traces],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
+            "regimes": [x.entry() for x in self.regimes],
             "comparisons": [asdict(c) for c in comparisons(self.traces)],
         }
         part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
@@ -131,7 +134,19 @@ def evaluate(
         trial = dataset.read(entry)
         T_measured = poses_of(body, trial).T
         traces += [_trace(p, trial, pose_errors(p.T_lab_hand, T_measured)) for p in predict(entry, trial)]
-    return Evaluation(tuple(ladder(traces, "mocap")), tuple(traces))
+    if progress is not None:
+        progress("joint models", 1.0)
+    return Evaluation(tuple(ladder(traces, "mocap")), tuple(traces), regimes(predict, dataset, role))
+
+
+def regimes(predict: Predictor, dataset: Dataset, role: Role = "validation") -> tuple[Explained, ...]:
+    """What the joint models explain, on repetitions of calibration motions and on the trials of a role."""
+    joints = predict.joints
+    if joints is None:
+        return ()
+    terms = joints.models[0].terms
+    again = on_repetitions(joints, (trial for _, trial in dataset.trials("calibration")), terms)
+    return (*again, *on_validation(joints, (trial for _, trial in dataset.trials(role)), predict.robot))
 
 
 def scored_errors(t: np.ndarray, errors: PoseErrors, trial: Trial, static: bool) -> PoseErrors:

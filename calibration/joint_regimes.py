@@ -1,15 +1,19 @@
 """How much of the joints' discrepancy the printed model explains, from its own regime to where it fails.
 
     cut = 1 - rms(y - y_hat) / rms(y)             R2 = 1 - sum (y - y_hat)^2 / sum (y - mean y)^2
-    repetition   the same motions again: the calibration trials that move the joint, in halves, each predicted by a
-                 model of all other halves, as rich as they carry, while the joint moves
-    unseen       other motions: validation trials that move, while the joint moves, by the models of the estimate
-    static       mean over each dwell of validation trials: S = 1/2, the side a stop left the gear on is not predicted
+    repetition      the same motion again: calibration trials that excite the joint, settled, in halves, each predicted
+                    by a model of all other halves, as rich as they carry, while the joint moves
+    start_stop      by the same model: starts and stops of those trials, which happen once and are no repetition
+    unseen_motion   other motions: validation trials that move, while the joint moves, by the models of the estimate
+    static          mean over each dwell of validation trials: S = 1/2, not the side a stop left the gear on
 
-y is motor minus link reading, the zero removed. A joint counts where it is excited: it moves by a tenth of a radian.
+y is motor minus link reading, the zero removed. Settled is from 1.5 s after the joint began to move to 0.3 s before it
+stops: a velocity step of 0.1 s makes base and torso ring near 2 Hz and throws the gear from flank to flank against the
+sign of its velocity. A joint is excited where it moves by a tenth of a radian, both halves run on both flanks for a
+second, and its discrepancy is ten times the noise of a reading.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -19,15 +23,19 @@ from calibration.clock import Clock
 from calibration.joint_correction import JointModels, correct
 from calibration.joint_inputs import velocities
 from calibration.joint_model import Terms
-from calibration.joint_samples import Samples, samples_of
+from calibration.joint_samples import Samples, pooled, samples_of
 from calibration.joint_selection import candidates
+from calibration.joint_single import fit_joint
 from calibration.joint_zero import dwell_differences
 from calibration.recording import Trial
 
-Regime = Literal["repetition", "unseen", "static"]
+Regime = Literal["repetition", "start_stop", "unseen_motion", "static"]
 RICHEST = 8  # degree in the model's own regime
 _EXCITED = 0.1  # [rad] range of a joint's motion
 _MOVING = 0.02  # [rad/s]
+_STARTED, _STOPPING = 1.5, 0.3  # [s] after the first and before the last sample that moves
+_ON_EACH_FLANK = 1.0  # [s]
+_OVER_NOISE = 10.0  # discrepancy over the noise of a reading [-]
 
 
 @dataclass(frozen=True)
@@ -36,13 +44,13 @@ class Explained:
 
     Attributes:
         joint: Name of the joint.
-        regime: `repetition`, `unseen` or `static`.
+        regime: `repetition`, `start_stop`, `unseen_motion` or `static`.
         degree: Of the model; None where there is no correction.
         n: Samples or dwells.
         before: Rms of the discrepancy [rad].
         after: Rms of what is left [rad].
         r2: [-].
-        outside: Share of samples outside the model's domain [-].
+        outside: Share of them outside the model's domain [-].
     """
 
     joint: str
@@ -54,39 +62,92 @@ class Explained:
     r2: float
     outside: float
 
+    def entry(self) -> dict[str, str | int | float | None]:
+        """A row of `regimes` in evaluation.json."""
+        return {
+            "joint": self.joint,
+            "regime": self.regime,
+            "degree": self.degree,
+            "n": self.n,
+            "discrepancy_before_mrad": 1e3 * self.before,
+            "discrepancy_after_mrad": 1e3 * self.after,
+            "cut_percent": 100.0 * self.cut,
+            "r2": self.r2,
+            "outside_percent": 100.0 * self.outside,
+        }
+
     @property
     def cut(self) -> float:
         """Share of the rms taken off [-]."""
         return 1.0 - self.after / max(self.before, np.finfo(float).tiny)
 
 
-def on_repetitions(models: JointModels, trials: Sequence[Trial], terms: Terms) -> tuple[Explained, ...]:
+def on_repetitions(models: JointModels, trials: Iterable[Trial], terms: Terms) -> tuple[Explained, ...]:
     """What the model explains of motions it has seen, in repetitions it has not: moving calibration trials."""
-    moving = [trial for trial in trials if not len(trial.dwell_start)]
+    moving = (trial for trial in trials if not len(trial.dwell_start))
     of_trials = [samples_of(models.inputs.of_trial(trial.id), trial, models.zero) for trial in moving]
+    noise = models.inputs.description.sigmas.encoder
+    columns = zip(models.inputs.measured, models.zero, zip(*of_trials, strict=True), strict=True)
     return tuple(
         found
-        for joint, column in zip(models.inputs.measured, zip(*of_trials, strict=True), strict=True)
-        if (found := _on_repetitions(joint, [s for s in column if s is not None], terms)) is not None
+        for joint, zero, column in columns
+        for found in _on_repetitions(joint, float(zero), [s for s in column if s is not None], terms, noise)
     )
 
 
-def on_validation(models: JointModels, trials: Sequence[Trial], robot: Clock) -> tuple[Explained, ...]:
-    """What the models explain of validation trials: while moving (`unseen`), and of their dwells (`static`)."""
-    moving, still = ([t for t in trials if bool(len(t.dwell_start)) == rests] for rests in (False, True))
-    return (*_on_others(models, "unseen", moving, robot), *_on_others(models, "static", still, robot))
+def on_validation(models: JointModels, trials: Iterable[Trial], robot: Clock) -> tuple[Explained, ...]:
+    """What the models explain of validation trials: while moving (`unseen_motion`), and of their dwells (`static`)."""
+    moving: list[Trial] = []
+    still: list[Trial] = []
+    for trial in trials:
+        (still if len(trial.dwell_start) else moving).append(trial)
+    return (*_on_others(models, "unseen_motion", moving, robot), *_on_others(models, "static", still, robot))
 
 
-def _on_repetitions(joint: str, samples: Sequence[Samples], terms: Terms) -> Explained | None:
-    excited = [s for s in samples if np.ptp(s.theta) > _EXCITED]
-    halves = [s.part(rows) for s in excited for rows in np.array_split(np.arange(len(s)), 2)]
-    if not halves:
-        return None
+def _on_repetitions(
+    joint: str, zero: float, samples: Sequence[Samples], terms: Terms, noise: float
+) -> Iterator[Explained]:
+    excited = [s for s in samples if _visits_both_flanks(s)]
+    halves = [half for s in excited for half in _halves(s)]
+    if not halves or np.sqrt((pooled(halves).y ** 2).mean()) < _OVER_NOISE * noise:
+        return
     best = min(candidates(halves, terms, RICHEST), key=lambda c: c.score)
-    pairs = zip(halves, best.left_out, strict=True)
-    y, e, speed = np.concatenate([[s.y, s.y - p, np.abs(s.velocity)] for s, p in pairs], axis=1)
-    moves = speed > _MOVING
-    return _explained(joint, "repetition", best.degree, y[moves], e[moves], np.zeros(moves.sum()))
+    whole = pooled(halves)
+    moves = np.abs(whole.velocity) > _MOVING
+    e = (whole.y - np.concatenate(best.left_out))[moves]
+    yield _explained(joint, "repetition", best.degree, whole.y[moves], e, np.zeros(len(e)))
+    model = fit_joint(joint, halves, zero, terms, best)
+    if model.degree is None:
+        return
+    ends = pooled([_ends(s) for s in excited])
+    e = ends.y - model.discrepancy(ends.theta, ends.tau, ends.velocity)
+    yield _explained(joint, "start_stop", model.degree, ends.y, e, model.is_outside(ends.theta, ends.tau))
+
+
+def _visits_both_flanks(samples: Samples) -> bool:
+    """Whether the joint moves, in both halves of the trial's settled part with either sign for long enough."""
+    if len(samples) < 2 or np.ptp(samples.theta) < _EXCITED:
+        return False
+    enough = _ON_EACH_FLANK / float(np.median(np.diff(samples.t)))
+    signs = [sign * half.velocity > _MOVING for half in _halves(samples) for sign in (1.0, -1.0)]
+    return all(of_one.sum() >= enough for of_one in signs)
+
+
+def _settled(samples: Samples) -> np.ndarray:
+    """Samples (n,) after the start and before the stop of the joint's motion."""
+    t = samples.t[np.abs(samples.velocity) > _MOVING]
+    return (samples.t >= t[0] + _STARTED) & (samples.t <= t[-1] - _STOPPING)
+
+
+def _halves(samples: Samples) -> list[Samples]:
+    return [samples.part(rows) for rows in np.array_split(np.flatnonzero(_settled(samples)), 2)]
+
+
+def _ends(samples: Samples) -> Samples:
+    """Samples of the start, and of the stop until as long after it."""
+    t = samples.t[np.abs(samples.velocity) > _MOVING]
+    near = (samples.t >= t[0]) & (samples.t <= t[-1] + _STARTED)
+    return samples.part(near & ~_settled(samples))
 
 
 def _on_others(models: JointModels, regime: Regime, trials: Sequence[Trial], robot: Clock) -> Iterator[Explained]:

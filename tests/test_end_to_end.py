@@ -133,6 +133,9 @@ def test_one_estimate_is_scored_under_both_protocols(result):
     assert [(p["protocol"], p["model"]) for p in found["protocols"]] == [
         (protocol, model) for protocol in ("public", "ours") for model in ("nominal", "model_1", "model_2", "model_3")
     ]
+    told = {(x["joint"], x["regime"]): x for x in found["regimes"]}
+    assert {(f"arm_{k}_joint", r) for k in range(1, 8) for r in ("unseen_motion", "static")} <= told.keys()
+    assert all(x["n"] > 0 and x["discrepancy_before_mrad"] > 0.0 for x in told.values())
     better = {tuple(c["b"]): c["finding"] for c in found["comparisons"]}
     assert better["model_2", "plate"] == "better"
     assert better["model_1", "plate"] != "worse"

@@ -41,12 +41,17 @@ def runs(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def ladders(runs):
+def evaluations(runs):
+    return [calibration.evaluate(estimate, calibration.load(folder / "dataset")) for folder, estimate in runs]
+
+
+@pytest.fixture(scope="module")
+def ladders(runs, evaluations):
     """Their dynamic rows against the truth, by model, base and encoder."""
     found = []
-    for seed, (folder, estimate) in zip(SEEDS, runs, strict=True):
+    for seed, (folder, estimate), evaluation in zip(SEEDS, runs, evaluations, strict=True):
         dataset = calibration.load(folder / "dataset")
-        judged = score(estimate, dataset, folder / "truth", calibration.evaluate(estimate, dataset))
+        judged = score(estimate, dataset, folder / "truth", evaluation)
         rows = {(r.model, r.base, r.encoder): r.metrics for r in judged.rows if r.trials == "dynamic"}
         found.append(rows)
         print(seed, *(f"{'/'.join(k)} {x.position_rmse_component_mm:.2f}" for k, x in rows.items()))
@@ -95,6 +100,13 @@ def test_roll_and_pitch_of_the_base_are_predicted(runs, base_r2, source):
 
 def test_link_encoders_beat_motor_encoders_with_the_base_measured(ladders):
     assert holds(ladders, lambda r: mm(r, "model_3", "measured", "link") < mm(r, "model_2", "measured")) >= 9
+
+
+@pytest.mark.parametrize("joint", [f"arm_{k}_joint" for k in range(1, 8)])
+def test_the_printed_joint_model_explains_a_settled_repetition(evaluations, joint):
+    found = [next(x for x in e.regimes if (x.joint, x.regime) == (joint, "repetition")) for e in evaluations]
+    print(joint, *(f"{x.cut:.2f} {x.r2:.3f}" for x in found))
+    assert all(x.cut >= 0.60 and x.r2 >= 0.85 for x in found)
 
 
 def test_the_papers_nominal_error_is_one_of_the_series(capsys):

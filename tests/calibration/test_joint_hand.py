@@ -7,6 +7,7 @@ import pytest
 
 import mjcf
 from calibration import Dataset, Estimate, joint_regimes
+from calibration.joint_correction import JointModels
 from calibration.joint_fit import fit_joint_models
 from calibration.joint_hand import nearest_hand
 from calibration.joint_regimes import on_repetitions, on_validation
@@ -75,10 +76,49 @@ def test_play_is_explained_in_motion_and_not_at_rest(monkeypatch: pytest.MonkeyP
     found |= {x.regime: x for x in on_validation(models, validation, ROBOT) if x.joint == "arm_6_joint"}
     assert found["repetition"].cut > 0.6
     assert found["repetition"].r2 > 0.85
-    assert found["unseen"].cut > 0.5
+    assert found["unseen_motion"].cut > 0.5
     assert found["static"].cut < 0.2
     assert found["static"].n == 12
-    assert found["unseen"].before == pytest.approx(GAP, rel=0.1)
+    assert found["unseen_motion"].before == pytest.approx(GAP, rel=0.1)
+
+
+def test_a_start_is_no_repetition_and_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gear is thrown from flank to flank for a second after each start, by nothing the model is asked with."""
+    monkeypatch.setattr(joint_regimes, "RICHEST", 1)
+    data = []
+    for k, q in enumerate(joint_data.motions(0)):
+        y = lost_in_play(q)
+        thrown = slice(100, 230)
+        y[thrown, ARM_6] = GAP * np.sign(np.sin(0.12 * np.arange(130) + k))
+        data.append(joint_data.recorded(f"t{k}", q, y))
+    still = np.repeat(matched.CENTRE[None], 400, axis=0)
+    data.append(joint_data.recorded("rest", still, lost_in_play(still), np.array([[0.5, 3.5]])))
+    models, _ = fit_joint_models(mjcf.urdf(), joint_data.described(), data, ROBOT, joint_data.hand())
+    found = {x.regime: x for x in on_repetitions(models, data, "total") if x.joint == "arm_6_joint"}
+    assert found["repetition"].cut > 0.6
+    assert found["start_stop"].cut < 0.3
+    assert found["repetition"].entry() | {"joint": "", "regime": ""} == {
+        "joint": "", "regime": "", "degree": found["repetition"].degree, "n": found["repetition"].n,
+        "discrepancy_before_mrad": 1e3 * found["repetition"].before, "outside_percent": 0.0,
+        "discrepancy_after_mrad": 1e3 * found["repetition"].after, "r2": found["repetition"].r2,
+        "cut_percent": 100.0 * found["repetition"].cut,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "told"), [("nothing", True), ("one way", False), ("no play", False)])
+def test_a_joint_is_excited_on_both_flanks_and_above_the_noise(
+    monkeypatch: pytest.MonkeyPatch, change: str, told: bool
+) -> None:
+    monkeypatch.setattr(joint_regimes, "RICHEST", 1)
+    data = []
+    for k, q in enumerate(joint_data.motions(0)):
+        if change == "one way":
+            q[:, ARM_6] = np.linspace(-0.5, 0.5, len(q))
+        y = lost_in_play(q) * (2e-3 if change == "no play" else 1.0)
+        data.append(joint_data.recorded(f"t{k}", q, y))
+    models = JointModels(joint_data.inputs(), joint_data.ZERO, ())
+    found = [x.joint for x in on_repetitions(models, data, "total") if x.regime == "repetition"]
+    assert ("arm_6_joint" in found) == told
 
 
 def lost_in_play(q: np.ndarray) -> np.ndarray:
