@@ -142,7 +142,7 @@ def evaluate(
 def regimes(predict: Predictor, dataset: Dataset, role: Role = "validation") -> tuple[Explained, ...]:
     """What the joint models explain, on repetitions of calibration motions and on the trials of a role."""
     joints = predict.joints
-    if joints is None:
+    if joints is None or predict.robot is None:
         return ()
     terms = joints.models[0].terms
     again = on_repetitions(joints, (trial for _, trial in dataset.trials("calibration")), terms)
