@@ -84,7 +84,7 @@ class Model:
     def with_clocks(self, clocks: Iterable[Clock]) -> "Model":
         """The model with `clock.<instrument>.{offset,drift}` after its own parameters."""
         model = self
-        for clock in clocks:
+        for clock in (c for c in clocks if c.covariance.any()):  # a shared clock is known, not estimated
             sigma = np.sqrt(np.diag(clock.covariance))
             added = (
                 Parameter(f"clock.{clock.instrument}.offset", "s", 0.0, clock.offset, float(sigma[0]), "estimated"),

@@ -16,7 +16,7 @@ import numpy as np
 from calibration.linearised import Prior
 from calibration.markers import BASE, base_body, hand_body
 from calibration.robot import Chain
-from calibration.schema import Description
+from calibration.schema import Body, Description
 from calibration.se3 import from_vector, to_vector
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
@@ -106,13 +106,20 @@ def geometry_parameters(chain: Chain, description: Description) -> ParameterSet:
 
 def nominal_frames(chain: Chain, description: Description) -> np.ndarray:
     """T_base_B and T_tool_H with every marker body on its link as drawn, (12,) [m, rad]."""
-    q = np.zeros((1, len(chain.measured)))
-    base, hand = base_body(description), hand_body(description)
-    T_base_tool, T_base_B, T_base_H = (
-        chain.poses(q)[0],
-        *(chain.poses(q, body.link)[0] @ from_vector(np.array(body.placement)) for body in (base, hand)),
-    )
-    return np.concatenate([to_vector(T_base_B), to_vector(np.linalg.solve(T_base_tool, T_base_H))])
+    T_base_tool = chain.poses(np.zeros((1, len(chain.measured))))[0]
+    T_tool_H = np.linalg.solve(T_base_tool, _drawn(chain, hand_body(description)))
+    return np.concatenate([to_vector(nominal_base_body(chain, description)), to_vector(T_tool_H)])
+
+
+def nominal_base_body(chain: Chain, description: Description) -> np.ndarray:
+    """T_base_B (4, 4) with the base's marker body as drawn; the hand may have none."""
+    return _drawn(chain, base_body(description))
+
+
+def _drawn(chain: Chain, body: Body) -> np.ndarray:
+    """Pose (4, 4) of a marker body in the base, all joints at zero."""
+    T_base_link = chain.poses(np.zeros((1, len(chain.measured))), body.link)[0]
+    return np.asarray(T_base_link @ from_vector(np.array(body.placement)))
 
 
 def play_start(chain: Chain, description: Description) -> np.ndarray:

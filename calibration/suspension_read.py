@@ -10,11 +10,10 @@ import pinocchio as pin
 from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.inverse_dynamics import floating_model
-from calibration.parameters import nominal_frames
+from calibration.parameters import nominal_base_body
 from calibration.recording import Trial
 from calibration.robot import chain_of
 from calibration.schema import Description
-from calibration.se3 import from_vector
 from calibration.suspension_rest import rest_of
 from calibration.suspension_sway import Forcing, Sway, sway_of
 from calibration.suspension_wrench import Load, dynamics_load, plate_load
@@ -88,7 +87,7 @@ def laboratory(
 ) -> Laboratory:
     """The laboratory of a dataset; the marker body where it is drawn, unless T_base_B says otherwise."""
     if T_base_B is None:
-        T_base_B = from_vector(nominal_frames(chain_of(urdf, description), description)[:6])
+        T_base_B = nominal_base_body(chain_of(urdf, description), description)
     return Laboratory(description, floating_model(urdf, description), T_base_B, robot, plate)
 
 

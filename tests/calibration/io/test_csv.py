@@ -11,8 +11,6 @@ from calibration import load
 from scenarios import cli, exchange
 from tests.calibration import matched
 
-ROOT = Path(__file__).parents[3]
-REAL = ROOT.parent / "shared/data/real"
 JOINTS = {name: {"motor": name, "unit": "m" if name.startswith("torso") else "rad"} for name in matched.JOINTS}
 HAND = {f"gripper{i}": [f"gripper{i}_{a}" for a in "xyz"] for i in range(4)}
 BASE = {f"base{i}": [f"base{i}_{a}" for a in "xyz"] for i in range(4)}
