@@ -19,7 +19,7 @@ import numpy as np
 import mjcf
 from calibration.recording import Trial, write_trial
 from calibration.schema import TrialEntry
-from twin import truth
+from twin import session, truth
 from twin.build import Twin, build
 from twin.config import TwinConfig
 from twin.conventions import exp6
@@ -35,6 +35,7 @@ from twin.instruments.sampling import averaged, interpolate, interpolate_poses
 from twin.motions import JOINTS, Motion
 from twin.randomness import generator
 from twin.schedule import schedule
+from twin.session import CONFIRMATION, moved, remounted
 from twin.simulate import States, simulate
 from twin.truth import TruthTrial
 from twin.uncertain import drawn
@@ -73,6 +74,12 @@ def laboratory(config: TwinConfig, seed: int) -> Laboratory:
     return Laboratory(config, seed, robot, twin, T_lab_base)
 
 
+def second_session(lab: Laboratory) -> Laboratory:
+    """The same robot on another day."""
+    robot = remounted(lab.config, lab.robot, lab.seed)
+    return replace(lab, robot=robot, T_lab_base=moved(lab.config, lab.T_lab_base, lab.seed))
+
+
 def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None = None) -> None:
     """Simulate a campaign and write OUT/dataset and OUT/truth.
 
@@ -86,13 +93,15 @@ def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None =
         TwinError: The simulation failed; said where.
     """
     lab = laboratory(config, seed)
+    later = second_session(lab)
     for folder in ("dataset/trials", "truth/trials"):
         (out / folder).mkdir(parents=True, exist_ok=True)
     motions = schedule(config.campaign, mjcf.spec().compile(), seed)
     starts = _EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
     entries, done, total = [], 0.0, sum(m.duration for m in motions)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = [pool.submit(_one, lab, m, float(t), out) for m, t in zip(motions, starts, strict=True)]
+        sessions = (later if m.role == CONFIRMATION else lab for m in motions)
+        jobs = [pool.submit(_one, s, m, float(t), out) for s, m, t in zip(sessions, motions, starts, strict=True)]
         try:
             for motion, job in zip(motions, jobs, strict=True):
                 entries.append(job.result())
@@ -105,7 +114,7 @@ def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None =
     description = declaration(config, tuple(entries))
     (out / "dataset/dataset.json").write_text(description.model_dump_json(indent=1) + "\n", encoding="utf-8")
     (out / "dataset/nominal.urdf").write_text(mjcf.urdf(), encoding="utf-8")
-    _write_truth(lab, out / "truth")
+    _write_truth(lab, later if config.campaign.confirmation else None, out / "truth")
 
 
 def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry:
@@ -207,7 +216,7 @@ def _plate_centre(model: mujoco.MjModel) -> np.ndarray:
     return data.site("plate").xpos.copy()
 
 
-def _write_truth(lab: Laboratory, folder: Path) -> None:
+def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:
     robot = lab.robot
     contacts = {w.name: w.contact for w in mjcf.wheels()}
     K, C = spatial_stiffness(robot.wheels, np.array([contacts[w.name] for w in robot.wheels]))
@@ -216,4 +225,8 @@ def _write_truth(lab: Laboratory, folder: Path) -> None:
         parameters += source.parameters()
     derived = {"K": K, "C": C, "T_lab_base": lab.T_lab_base, "plate_centre": _plate_centre(lab.twin.model)}
     derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}
+    if later is not None:
+        parameters += session.parameters(later.robot)
+        derived |= {f"{CONFIRMATION}.T_lab_base": later.T_lab_base}
+        derived |= {f"{CONFIRMATION}.T_{c.frames.replace('.', '_')}": c.T_link_body for c in later.robot.clusters}
     truth.write_parameters(folder / "truth.json", parameters, derived)

@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
 from twin.config_departures import Departures
+from twin.config_session import Session
 from twin.config_values import (
     STRICT,
     Count,
@@ -176,6 +177,7 @@ class Campaign:
         pause: Between trials, on every clock [s].
         payloads: Further masses [kg] with which the first validation swing is repeated.
         push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
+        confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]
@@ -190,6 +192,7 @@ class Campaign:
     pause: FixedNonNegative
     payloads: tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...] = ()
     push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    confirmation: bool = False
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -225,6 +228,7 @@ class TwinConfig:
         friction_held: What that form adds, by joint; joints not named keep the dead zone.
         coupled_wrist: Whether arm_6 and arm_7 are driven by one differential.
         departures: What no model of the pipeline holds.
+        session: What changes until the confirmation.
     """
 
     arm: dict[str, ArmJoint]
@@ -240,3 +244,4 @@ class TwinConfig:
     friction_held: dict[str, FrictionHeld] = field(default_factory=lambda: dict(FRICTION_HELD))
     coupled_wrist: bool = False
     departures: Departures = field(default_factory=Departures)
+    session: Session = field(default_factory=Session)

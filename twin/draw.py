@@ -61,7 +61,7 @@ def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
             *_departures(config),
         ),
         encoders=_encoders(config, seed),
-        clusters=tuple(_cluster(name, body, seed) for name, body in config.instruments.bodies.items()),
+        clusters=tuple(cluster(name, body, seed) for name, body in config.instruments.bodies.items()),
         wheels=wheels,
         loose=tuple(LooseMarker(n, m.sag, m.since) for n, m in config.departures.loosened.items()),
     )
@@ -180,8 +180,9 @@ def _harmonics(rng: np.random.Generator, once: float, twice: float) -> tuple[flo
     return float(c1), float(s1), float(c2), float(s2)
 
 
-def _cluster(name: str, body: MarkerBody, seed: int) -> Cluster:
-    rng = generator(seed, "cluster", name)
+def cluster(name: str, body: MarkerBody, seed: int, *session: str) -> Cluster:
+    """Mount a marker body, in the first session unless one is named."""
+    rng = generator(seed, *session, "cluster", name)
     nominal = np.array(list(body.markers.values()))
     placement = rng.normal(size=6) * np.repeat([body.translation, body.rotation], 3)
     scattered = nominal + rng.normal(size=nominal.shape) * body.marker

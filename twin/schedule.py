@@ -10,9 +10,12 @@ from twin.config import Campaign
 from twin.motions import Motion
 from twin.randomness import generator
 
+REGISTRATION = "registration"
+_REGISTRATION_POSTURES = 8
+
 
 def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
-    """Calibration first (statics, sweeps, swings), then validation (swings, other statics)."""
+    """Calibration first (statics, sweeps, swings), then validation (swings, other statics), then confirmation."""
     return (
         _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign),
         *_sweeps(campaign),
@@ -21,6 +24,19 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *_loaded(campaign),
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
         _statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
+        *(_confirmation(campaign, nominal, seed) if campaign.confirmation else ()),
+    )
+
+
+def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
+    """The second session: a few postures to register the markers anew, then what validation is made of."""
+    q = postures.draw(nominal, _REGISTRATION_POSTURES + 1, generator(seed, "postures", REGISTRATION))
+    register = motions.postures(f"{REGISTRATION}_confirmation", "confirmation", q, campaign)
+    swings = _swings("confirmation", campaign.validation_swing, motions.VALIDATION_SWINGS, campaign)
+    return (
+        replace(register, name=REGISTRATION),
+        *(replace(m, id=f"{m.id}_confirmation") for m in swings),
+        _statics("postures_confirmation", "confirmation", campaign.validation_postures, nominal, seed, campaign),
     )
 
 

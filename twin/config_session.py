@@ -1,0 +1,21 @@
+"""What a scenario says of another day: the confirmation session; SI units."""
+
+from pydantic.dataclasses import dataclass
+
+from twin.config_values import STRICT, FixedNonNegative
+
+
+@dataclass(frozen=True, config=STRICT)
+class Session:
+    """What changes from the first session to the confirmation; markers are remounted with their bodies' own widths.
+
+    Attributes:
+        base_translation: Half width of the base's move, per axis [m].
+        base_rotation: Half width of its turn [rad].
+        encoder_zero: Standard deviation of a motor encoder's zero after homing anew [rad]: three steps of the absolute
+            encoder it is homed by.
+    """
+
+    base_translation: FixedNonNegative = 0.08
+    base_rotation: FixedNonNegative = 0.5
+    encoder_zero: FixedNonNegative = 3e-4
