@@ -3,16 +3,24 @@
 from scenarios.plots.boxes import Sample, error_boxes
 from scenarios.plots.forest import Interval, intervals
 from scenarios.plots.histogram import z_histogram
+from scenarios.plots.hysteresis import BACK, FORTH, Flank, hysteresis
+from scenarios.plots.joint_chain import JOINT_CHAIN, joint_chain
 from scenarios.plots.style import ESTIMATE, MISSED, NOMINAL, ORACLE, OTHER, TRUTH, drawing, figure, svg
-from scenarios.plots.trace import Line, error_traces
+from scenarios.plots.trace import Line, error_traces, measured_beside
+from scenarios.plots.wheeled_base import WHEELED_BASE, wheeled_base
 
 __all__ = [
+    "BACK",
     "ESTIMATE",
+    "FORTH",
+    "JOINT_CHAIN",
     "MISSED",
     "NOMINAL",
     "ORACLE",
     "OTHER",
     "TRUTH",
+    "WHEELED_BASE",
+    "Flank",
     "Interval",
     "Line",
     "Sample",
@@ -20,7 +28,11 @@ __all__ = [
     "error_boxes",
     "error_traces",
     "figure",
+    "hysteresis",
     "intervals",
+    "joint_chain",
+    "measured_beside",
     "svg",
+    "wheeled_base",
     "z_histogram",
 ]

@@ -1,4 +1,4 @@
-"""Errors over time: a line a row, thinned so that every peak stays."""
+"""Quantities over time, errors or measured beside predicted, thinned so that every peak stays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 _COLUMNS = 450  # smallest and largest value are kept in each of so many parts of the time
+_DOTS = 300  # measured samples drawn, beside the extremes
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,26 @@ def error_traces(lines: Sequence[Line], quantity: str, ax: Axes) -> Axes:
     ax.set_ylabel(quantity)
     ax.margins(x=0.0)
     return ax
+
+
+def measured_beside(measured: Line, predicted: Sequence[Line], quantity: str, ax: Axes) -> Axes:
+    """Draw a measured quantity as dots over time, and what predicts it as lines on top."""
+    t, values = _dotted(measured.t, measured.values)
+    ax.plot(t, values, "o", color=measured.colour, markersize=1.3, markeredgewidth=0.0, label=measured.label)
+    for line in predicted:
+        t, values = thinned(line.t, line.values)
+        ax.plot(t, values, color=line.colour, linewidth=line.width, label=line.label)
+    ax.set_ylabel(quantity)
+    ax.margins(x=0.0)
+    return ax
+
+
+def _dotted(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Samples evenly spread, and the extremes."""
+    even = slice(None, None, max(1, len(t) // _DOTS))
+    extreme_t, extremes = thinned(t, values, _DOTS // 10)
+    t, rows = np.unique(np.append(t[even], extreme_t), return_index=True)
+    return t, np.append(values[even], extremes)[rows]
 
 
 def thinned(t: np.ndarray, values: np.ndarray, columns: int = _COLUMNS) -> tuple[np.ndarray, np.ndarray]:

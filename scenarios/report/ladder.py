@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from scenarios.report.results import Results, Row
+from scenarios.report.entries import Row
+from scenarios.report.results import Results
 
 MEANINGS = {
     "nominal": "datasheet geometry, marker bodies where the drawing says",

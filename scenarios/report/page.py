@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 from scenarios.plots import svg
 from scenarios.report import figures, numbers, paper, verdict
 from scenarios.report.ladder import BASES, MEANINGS, headline_model, ladder, predictive
+from scenarios.report.models import section
 from scenarios.report.parameters import coverage, groups, known, left_out
 from scenarios.report.recordings import instruments
 from scenarios.report.results import Results, read
 
 _TEMPLATES = Path(__file__).parent.parent / "templates"
-_NAMES = ("paper", "errors", "traces", "parameters", "z_scores")
+_NAMES = ("paper", "wheels", "sway", "joint", "loops", "errors", "traces", "parameters", "z_scores")
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,9 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
     model, found = headline_model(results, steps), known(results)
     before, after = predictive(steps, "nominal"), predictive(steps, model)
     has_truth = results.score is not None
+    models = section(results, steps)
     made = {
-        "paper": paper.boxes(results, steps),
+        **models.figures,
         "errors": figures.boxes(results, paper.readable(steps)),
         "traces": figures.traces(results, steps),
         "parameters": figures.forest(found, has_truth),
@@ -87,6 +89,7 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
         "figure": _numbered(("picture", results.picture), *made.items()),
         "table": _numbered(
             *ladders.items(),
+            *models.tables,
             ("axes", made["errors"]),
             ("trials", results.recorded),
             ("clocks", results.recorded and results.estimate and results.estimate.clocks),
@@ -98,22 +101,9 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
         "coverage": coverage(found),
         "left_out": left_out(results.score, results.estimate),
         "picture": _png(results.picture),
-        **_models(results),
+        **models.values,
     }
     return values, {name: _drawing(name, drawn) for name, drawn in made.items() if drawn is not None}
-
-
-def _models(results: Results) -> dict[str, Any]:
-    """What the section on the paper's models shows beside its figure."""
-    suspension = results.estimate.suspension if results.estimate else None
-    return {
-        "protocols": results.evaluation.protocols,
-        "comparisons": results.evaluation.comparisons,
-        "joint_lines": paper.joint_lines(results),
-        "axis_lines": paper.axis_lines(results),
-        "suspension_sources": paper.suspension_sources(results),
-        "suspension_form": suspension.form if suspension else "",
-    }
 
 
 def _numbered(*parts: tuple[str, object]) -> dict[str, int]:

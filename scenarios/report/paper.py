@@ -103,3 +103,9 @@ def axis_lines(results: Results) -> tuple[AxisLine, ...]:
     return tuple(
         AxisLine(axis, tuple((float(r2[k]), bool(moves[k])) for r2, moves in tried)) for k, axis in enumerate(_AXES)
     )
+
+
+def held_out_yaw(results: Results) -> dict[str, float]:
+    """R2 of yaw on left-out trials, by source of the wrench."""
+    lines = axis_lines(results)
+    return {s: lines[5].found[k][0] for k, s in enumerate(suspension_sources(results))}

@@ -11,8 +11,9 @@ import numpy as np
 from calibration import Estimate
 from calibration.estimate import Model
 from scenarios.plots import Interval
+from scenarios.report.entries import Score
 from scenarios.report.numbers import readable
-from scenarios.report.results import Results, Score
+from scenarios.report.results import Results
 
 KINDS = {
     "frame": "marker frames",

@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from scenarios.report.entries import Row
 from scenarios.report.ladder import BASES, Step, floor, headline_model, oracle_base, predictive
 from scenarios.report.numbers import count, error, significant
-from scenarios.report.results import Results, Row
+from scenarios.report.results import Results
 
 CLAIM = (
     "All figures are of a synthetic twin. They are predictive unless a row says oracle, and no bias is removed. The "

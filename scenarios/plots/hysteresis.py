@@ -1,0 +1,55 @@
+"""Discrepancy of a joint against its position: one colour for each direction of motion.
+
+Pale dots: measured. Lines: what the model predicts for the same samples, in the order of time.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+FORTH, BACK = "#1a5fa8", "#c2410c"
+_PALE = 0.45  # opacity of the dots
+_DOTS = 140  # drawn of each flank
+_GAP = 0.15  # [s] a line goes on for
+
+
+@dataclass(frozen=True)
+class Flank:
+    """One direction of motion.
+
+    Attributes:
+        label: What it is called.
+        colour: Of its dots and its line.
+        t: (n,) [s].
+        position: (n,).
+        measured: (n,).
+        model: (n,) predicted, None where there is no model.
+    """
+
+    label: str
+    colour: str
+    t: np.ndarray
+    position: np.ndarray
+    measured: np.ndarray
+    model: np.ndarray | None
+
+
+def hysteresis(flanks: tuple[Flank, ...], ax: Axes) -> Axes:
+    """Draw the flanks of one joint; the caller names the axes."""
+    for f in flanks:
+        if f.model is not None:
+            ax.plot(*strokes(f.t, f.position, f.model), color=f.colour, linewidth=0.8, label=f"model, {f.label}")
+    for f in flanks:
+        rows = slice(None, None, max(1, len(f.position) // _DOTS))
+        look: dict[str, Any] = {"color": f.colour, "alpha": _PALE, "markersize": 2.2, "markeredgewidth": 0.0}
+        ax.plot(f.position[rows], f.measured[rows], "o", **look, label=f"measured, {f.label}")
+    return ax
+
+
+def strokes(t: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The columns (n,) with a NaN wherever more than 0.15 s pass between samples at t (n,) [s], or time goes back."""
+    step = np.diff(t)
+    breaks = np.flatnonzero((step > _GAP) | (step < 0.0)) + 1
+    return tuple(np.insert(column, breaks, np.nan) for column in columns)

@@ -1,0 +1,77 @@
+"""The section on the paper's models: what they are, what was identified, and how well it predicts held-out trials."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from scenarios.plots import JOINT_CHAIN, WHEELED_BASE, drawing, figure, joint_chain, wheeled_base
+from scenarios.report import loads, loops, paper, regimes, stiffness, sway
+from scenarios.report.ladder import Step
+from scenarios.report.results import Results
+
+
+@dataclass(frozen=True)
+class Section:
+    """What the page needs of a section.
+
+    Attributes:
+        values: For the template.
+        figures: By name, None where there is nothing to draw.
+        tables: Their names and what is in them, in their order.
+    """
+
+    values: dict[str, Any]
+    figures: dict[str, Figure | None]
+    tables: tuple[tuple[str, object], ...]
+
+
+def section(results: Results, steps: Sequence[Step]) -> Section:
+    """The section of a run."""
+    swayed, why_no_sway = sway.sway(results)
+    looped, why_no_loops = loops.loops(results)
+    trials = loads.loaded_trials(results)
+    evaluation, suspension = results.evaluation, results.estimate.suspension if results.estimate else None
+    values = {
+        "protocols": evaluation.protocols,
+        "comparisons": evaluation.comparisons,
+        "sway": swayed,
+        "sway_axes": sway.lines(swayed) if swayed else (),
+        "why_no_sway": why_no_sway,
+        "axis_lines": paper.axis_lines(results),
+        "suspension_sources": paper.suspension_sources(results),
+        "held_out_yaw": paper.held_out_yaw(results),
+        "suspension_form": suspension.form if suspension else "",
+        "suspension_said": stiffness.said(results),
+        "elements": stiffness.elements(results),
+        "structures": stiffness.structures(results.description),
+        "wheel_combinations": stiffness.combinations(results),
+        "loops": looped,
+        "why_no_loops": why_no_loops,
+        "joint_lines": paper.joint_lines(results),
+        "regimes": regimes.joint_regimes(evaluation.regimes),
+        "regime_names": regimes.REGIMES,
+        "regime_sentences": regimes.sentences(evaluation.regimes),
+        "loaded": trials,
+        "load_rows": loads.load_rows(results, steps, trials),
+    }
+    figures = {
+        "paper": paper.boxes(results, steps),
+        "wheels": _diagram(wheeled_base, *WHEELED_BASE),
+        "sway": sway.drawn(swayed) if swayed else None,
+        "joint": _diagram(joint_chain, *JOINT_CHAIN),
+        "loops": loops.drawn(looped),
+    }
+    names = ("protocols", "comparisons", "loads", "sway", "stiffness", "held_out", "wheels", "joints", "regimes")
+    contents = ("protocols", "comparisons", "load_rows", "sway_axes", "elements", "axis_lines", "wheel_combinations")
+    tables = zip(names, (values[c] for c in (*contents, "joint_lines", "regimes")), strict=True)
+    return Section(values, figures, tuple(tables))
+
+
+def _diagram(draw: Callable[[Axes], Axes], width: float, height: float) -> Figure:
+    with drawing():
+        page = figure(width, height)
+        draw(page.add_axes((0.0, 0.0, 1.0, 1.0)))
+    return page

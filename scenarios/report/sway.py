@@ -1,0 +1,174 @@
+"""The base's motion in one held-out trial: measured by its markers, predicted by the suspension.
+
+x = (t, theta)  displacement of the base frame since the first second [mm, mrad], axes of the base at rest
+R2_a = 1 - sum (x - x_hat)_a^2 / sum x_a^2         zero is a base that stays; the first second does not count
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from calibration.bodies import poses_of
+from calibration.errors import NotEnoughData
+from calibration.markers import base_body
+from calibration.predict import REFERENCE, Predictor, predictor
+from calibration.recording import Trial
+from calibration.schema import TrialEntry
+from calibration.se3 import from_vector
+from calibration.signals import even, low_passed
+from calibration.suspension import Suspension
+from calibration.suspension_predict import base_poses
+from calibration.suspension_read import laboratory
+from calibration.suspension_rest import rest_of
+from calibration.suspension_wrench import CUTOFF
+from scenarios.plots import ESTIMATE, OTHER, Line, drawing, figure, measured_beside
+from scenarios.report.numbers import fixed
+from scenarios.report.results import Results
+
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+UNITS = ("mm", "mm", "mm", "mrad", "mrad", "mrad")
+_UNIT = 1e3  # mm in a metre, mrad in a radian
+_LINES = {"plate": (ESTIMATE, 1.7), "dynamics": (OTHER, 0.7)}
+_HEIGHT = 5.2  # [inch] of the figure
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """The base as one source of the wrench predicts it: x (n, 6) [mm, mrad], R2 (6,), axes that are moved (6,)."""
+
+    source: str
+    x: np.ndarray
+    r2: np.ndarray
+    moves: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sway:
+    """The base in one trial.
+
+    Attributes:
+        trial: Its name.
+        t: (n,) [s from the trial's start].
+        measured: (n, 6) [mm, mrad], NaN where not seen.
+        predicted: By source of the wrench.
+    """
+
+    trial: str
+    t: np.ndarray
+    measured: np.ndarray
+    predicted: tuple[Predicted, ...]
+
+    @property
+    def scored(self) -> np.ndarray:
+        """(n,) what counts."""
+        return np.asarray((self.t > REFERENCE) & np.isfinite(self.measured).all(axis=1))
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Peak to peak of the measured motion (6,) [mm, mrad]."""
+        return np.ptp(self.measured[self.scored], axis=0)
+
+    @property
+    def shifted(self) -> np.ndarray:
+        """Where the base stands in the last second (6,) [mm, mrad]; it began at zero."""
+        return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - REFERENCE], axis=0))
+
+    def left(self, predicted: Predicted) -> np.ndarray:
+        """Rms (6,) [mm, mrad] that a prediction leaves."""
+        return np.sqrt(((self.measured - predicted.x)[self.scored] ** 2).mean(axis=0))
+
+
+@dataclass(frozen=True)
+class AxisSway:
+    """One axis of one trial.
+
+    Attributes:
+        axis: Its name.
+        unit: Of what follows.
+        spread: Peak to peak of what was measured.
+        shifted: Where it stands in the end, measured.
+        found: By source of the wrench: R2, None where the axis is left still, and the rms that is left.
+    """
+
+    axis: str
+    unit: str
+    spread: float
+    shifted: float
+    found: tuple[tuple[float | None, float], ...]
+
+
+def sway(results: Results) -> tuple[Sway | None, str]:
+    """The first held-out moving trial; or none, and why."""
+    estimate, dataset = results.estimate, results.dataset
+    if dataset is None:
+        return None, "the dataset is not in the run folder"
+    if estimate is None or not estimate.calibrated or estimate.suspension is None:
+        return None, "no suspension was identified"
+    entry = next((e for e in dataset.entries("validation") if e.kind != "static"), None)
+    if entry is None:
+        return None, "no held-out trial moves"
+    try:
+        return _of_trial(predictor(estimate, dataset), estimate.suspension, entry, dataset.read(entry)), ""
+    except NotEnoughData as error:
+        return None, str(error)
+
+
+def _of_trial(prepared: Predictor, suspension: Suspension, entry: TrialEntry, trial: Trial) -> Sway:
+    description, base = prepared.description.loaded(entry), from_vector(prepared.models["model_1"].base)
+    lab = laboratory(prepared.urdf, description, prepared.robot, prepared.plate, base)
+    rest = rest_of(description, trial, base)
+    smooth = low_passed(even(trial.t_mocap, rest.displacement(poses_of(base_body(description), trial).T)), CUTOFF)
+    measured = np.where(smooth.valid[:, None], _UNIT * smooth.x, np.nan)
+    alone = Sway(entry.id, smooth.t - trial.t_mocap[0], measured, ())
+    predicted = []
+    for source, _ in suspension.held_out:
+        if source == "dynamics" or (prepared.plate is not None and len(trial.t_plate)):
+            at_mocap = _UNIT * rest.displacement(base_poses(suspension, lab, trial, source))
+            x = np.stack([np.interp(smooth.t, trial.t_mocap, column) for column in at_mocap.T], axis=1)
+            predicted.append(Predicted(source, x, _r2(measured, x, alone.scored), suspension.moves(source)))
+    if not predicted:
+        raise NotEnoughData(f"trial {entry.id} has no wrench of a source the suspension was tried with")
+    return replace(alone, predicted=tuple(predicted))
+
+
+def lines(found: Sway) -> tuple[AxisSway, ...]:
+    """The axes in order."""
+    spread, left = found.spread, {p.source: found.left(p) for p in found.predicted}
+    return tuple(
+        AxisSway(
+            AXES[k],
+            UNITS[k],
+            float(spread[k]),
+            float(found.shifted[k]),
+            tuple((float(p.r2[k]) if p.moves[k] else None, float(left[p.source][k])) for p in found.predicted),
+        )
+        for k in range(6)
+    )
+
+
+def _r2(measured: np.ndarray, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    error, motion = (((a)[rows] ** 2).sum(axis=0) for a in (measured - x, measured))
+    return np.asarray(1.0 - error / np.maximum(motion, np.finfo(float).tiny))
+
+
+def drawn(found: Sway) -> Figure:
+    """Measured and predicted motion, translation on the left, rotation on the right."""
+    with drawing():
+        page = figure(10.0, _HEIGHT)
+        axes = page.subplots(3, 2, sharex=True)
+        page.subplots_adjust(0.06, 0.45 / _HEIGHT, 0.99, 1.0 - 0.45 / _HEIGHT, hspace=0.34)
+        for k, (axis, unit) in enumerate(zip(AXES, UNITS, strict=True)):
+            ax = axes[k % 3, k // 3]
+            lines = [Line(f"predicted from {p.source}", found.t, p.x[:, k], *_LINES[p.source]) for p in found.predicted]
+            measured_beside(Line("measured", found.t, found.measured[:, k], "black"), lines, f"{axis} [{unit}]", ax)
+            ax.set_title("R2 " + ", ".join(f"{p.source} {_worth(p, k)}" for p in found.predicted), fontweight="normal")
+        for ax in axes[2]:
+            ax.set_xlabel("time since the start of the trial [s]")
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        page.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.05, 1.0), ncols=len(labels))
+    return page
+
+
+def _worth(p: Predicted, k: int) -> str:
+    return fixed(float(max(p.r2[k], -9.99)), 2) if p.moves[k] else "left still"
