@@ -1,4 +1,4 @@
-"""What a report reads of evaluation.json, score.json, scenario.yaml and truth.json; fields of other versions are left out."""
+"""What a report reads of evaluation.json, score.json, scenario.yaml and truth.json; other fields are left out."""
 
 from pydantic import BaseModel, ConfigDict
 
