@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from scenarios.plots import (
+    BACK,
     ESTIMATE,
+    FORTH,
     MISSED,
     TRUTH,
+    Flank,
     Interval,
     Line,
     Sample,
@@ -14,10 +17,15 @@ from scenarios.plots import (
     error_boxes,
     error_traces,
     figure,
+    hysteresis,
     intervals,
+    joint_chain,
+    measured_beside,
     svg,
+    wheeled_base,
     z_histogram,
 )
+from scenarios.plots.hysteresis import strokes
 from scenarios.plots.trace import thinned
 
 
@@ -55,6 +63,53 @@ def test_traces_have_a_line_a_row_and_a_zero(ax):
     assert error_traces(lines, "error along x [mm]", ax) is ax
     assert ax.get_ylabel() == "error along x [mm]"
     assert [line.get_label() for line in ax.lines][1:] == ["nominal", "model_2"]
+
+
+def test_what_is_measured_is_dots_with_its_extremes_and_what_predicts_it_is_lines(ax):
+    t = np.arange(5000.0)
+    values = np.sin(0.01 * t)
+    values[1234] = 9.0
+    measured_beside(Line("measured", t, values, "black"), [Line("predicted", t, 0.0 * t, ESTIMATE)], "yaw [mrad]", ax)
+    dots, line = ax.lines
+    assert (dots.get_linestyle(), dots.get_marker(), line.get_linestyle()) == ("None", "o", "-")
+    assert dots.get_ydata().max() == 9.0
+    assert np.all(values[dots.get_xdata().astype(int)] == dots.get_ydata())
+    assert len(dots.get_xdata()) < 500
+    assert ax.get_ylabel() == "yaw [mrad]"
+
+
+def test_both_directions_of_a_joint_have_dots_and_the_model_its_lines(ax):
+    t = np.array([0.0, 0.1, 0.2, 1.0, 1.1])
+    up = Flank("growing", FORTH, t, t, t + 1.0, t + 2.0)
+    hysteresis((up, Flank("falling", BACK, t, t, t - 1.0, None)), ax)
+    assert {line.get_label(): line.get_color() for line in ax.lines} == {
+        "measured, growing": FORTH,
+        "measured, falling": BACK,
+        "model, growing": FORTH,
+    }
+    model = next(line for line in ax.lines if line.get_label().startswith("model"))
+    np.testing.assert_array_equal(model.get_ydata(), [2.0, 2.1, 2.2, np.nan, 3.0, 3.1])
+
+
+def test_a_line_ends_where_time_jumps_or_starts_anew():
+    t, x = np.array([0.0, 0.1, 0.5, 0.6, 0.0]), np.arange(5.0)
+    np.testing.assert_array_equal(strokes(t, x)[0], [0.0, 1.0, np.nan, 2.0, 3.0, np.nan, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("draw", "names"),
+    [
+        (joint_chain, ("backlash.", "gear.<joint>.", "encoder.<joint>.motor.", "encoder.<joint>.link.", "q_link")),
+        (wheeled_base, ("suspension.<wheel>.", "contact.<wheel>.", "base_footprint", "wrench", "$r_i$")),
+    ],
+)
+def test_diagrams_name_the_parameters_inside_their_frame(ax, draw, names):
+    assert draw(ax) is ax
+    words = " ".join(text.get_text() for text in ax.texts)
+    assert [name for name in names if name not in words] == []
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    places = [text.get_position() for text in ax.texts if text.get_text()]
+    assert all(left < x < right and low < y < high for x, y in places)
 
 
 def test_thinning_keeps_every_extreme_and_the_gaps():
