@@ -26,7 +26,6 @@ from twin.conventions import exp6
 from twin.declare import declaration
 from twin.defects.base import Defect, Parameter
 from twin.defects.departures import Warming
-from twin.defects.ground import spatial_stiffness
 from twin.defects.loads import Payload
 from twin.draw import BASE, Robot, draw
 from twin.instruments import mocap, plate, robot_log
@@ -37,6 +36,7 @@ from twin.randomness import generator
 from twin.schedule import schedule
 from twin.session import CONFIRMATION, moved, remounted
 from twin.simulate import States, simulate
+from twin.stiffness import spatial_stiffness
 from twin.truth import TruthTrial
 from twin.uncertain import drawn
 
@@ -218,8 +218,7 @@ def _plate_centre(model: mujoco.MjModel) -> np.ndarray:
 
 def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:
     robot = lab.robot
-    contacts = {w.name: w.contact for w in mjcf.wheels()}
-    K, C = spatial_stiffness(robot.wheels, np.array([contacts[w.name] for w in robot.wheels]))
+    K, C = spatial_stiffness(robot.wheels)
     parameters: list[Parameter] = list(lab.twin.truth)
     for source in (*robot.encoders, *robot.clusters, *robot.loose, *_clocks(lab.config)[:2]):
         parameters += source.parameters()

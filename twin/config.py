@@ -8,7 +8,7 @@ any value that is given as a distribution (`twin.uncertain`).
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
@@ -38,6 +38,10 @@ class WheelType:
         contact_stiffness: Normal, on the floor [N/m].
         contact_damping: Normal, on the floor [N.s/m].
         friction: Coefficient mu [-].
+        torsion: Bushing krx, kry, krz [N.m/rad]: krz alone, or all three; 0: fixed to the base about that axis.
+        torsion_damping: Bushing crx, cry, crz [N.m.s/rad].
+        torsional_friction: Of the contact, moment about the normal over normal force [m].
+        rolling_friction: Of the contact, moment about a tangent over normal force [m].
     """
 
     stiffness: tuple[Positive, Positive, Positive]
@@ -45,6 +49,18 @@ class WheelType:
     contact_stiffness: Positive
     contact_damping: NonNegative
     friction: NonNegative
+    torsion: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    torsion_damping: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    torsional_friction: NonNegative = 0.02
+    rolling_friction: NonNegative = 0.02
+
+    @field_validator("torsion")
+    @classmethod
+    def _carried(cls, torsion: Vector3) -> Vector3:
+        """A wheel that can tilt about one tangent alone would roll away."""
+        if (torsion[0] > 0.0) != (torsion[1] > 0.0) or (torsion[0] > 0.0 and torsion[2] == 0.0):
+            raise ValueError("torsional stiffness about z alone or about x, y and z; the others must be 0")
+        return torsion
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -56,12 +72,15 @@ class Base:
         caster_front: The two casters in front.
         caster_back: The two casters behind; each pair stands as the last drive has turned it.
         pose: x, y [m] and yaw [rad] of the base in the lab.
+        wheels: `contact`: on bushings, by contacts that stick and slip; `anchored`: on bushings whose lower ends are
+            fixed in the floor, a linear base; `rigid`: without bushings, on soft contacts alone.
     """
 
     drive: WheelType
     caster_front: WheelType
     caster_back: WheelType
     pose: Point
+    wheels: Literal["contact", "anchored", "rigid"] = "contact"
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -6,9 +6,13 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+import mjcf
 from twin.build import HAND
-from twin.config import MarkerBody, TwinConfig
+from twin.config import Base, MarkerBody, TwinConfig, WheelType
+from twin.defects.anchored import Anchored
 from twin.defects.base import Defect
+from twin.defects.bushing import Bushing
+from twin.defects.contact import Contact
 from twin.defects.departures import Cable, FloorTilt, LooseMarker, Warming
 from twin.defects.differential import Differential
 from twin.defects.gear import DirectDrive, Gear
@@ -35,7 +39,7 @@ class Robot:
         defects: What changes the body, in the order it is applied.
         encoders: Motor and link encoders.
         clusters: Marker bodies.
-        wheels: Its wheels, also among the defects.
+        wheels: Its wheels, also in the defects.
         loose: Markers that hang.
     """
 
@@ -56,7 +60,7 @@ def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
             *_gears(config, seed),
             _torso_drive(config),
             Flexibility("torso_lift_link", config.torso.bending_stiffness, config.torso.bending_damping),
-            *wheels,
+            *((Anchored(wheels),) if config.base.wheels == "anchored" else wheels),
             _payload(config, seed),
             *_departures(config),
         ),
@@ -134,14 +138,29 @@ def _torso_drive(config: TwinConfig) -> DirectDrive:
 
 
 def _wheels(config: TwinConfig) -> tuple[Wheel, ...]:
-    b = config.base
-    drive = [(f"wheel_{s}", f"wheel_{s}_link", b.drive) for s in ("left", "right")]
-    pairs = (("front", b.caster_front), ("back", b.caster_back))
-    casters = [(f"caster_{end}_{s}", f"caster_{end}_{s}_1_link", k) for end, k in pairs for s in ("left", "right")]
-    return tuple(
-        Wheel(n, link, f"{n}_contact", k.stiffness, k.damping, k.contact_stiffness, k.contact_damping, k.friction)
-        for n, link, k in (*drive, *casters)
+    return tuple(_wheel(w, _type(config.base, w.name), config.base.wheels) for w in mjcf.wheels())
+
+
+def _type(base: Base, name: str) -> WheelType:
+    front = base.caster_front if name.startswith("caster_front") else base.caster_back
+    return base.drive if name.startswith("wheel") else front
+
+
+def _wheel(nominal: mjcf.Wheel, of: WheelType, ground: str) -> Wheel:
+    """A caster rides on its bushing with its fork, whose body is the parent of the rolling one."""
+    return Wheel(
+        nominal.name,
+        nominal.body.replace("_2_link", "_1_link"),
+        f"{nominal.name}_contact",
+        nominal.centre,
+        nominal.contact,
+        bushing=None if ground == "rigid" else Bushing(of.stiffness, of.damping, of.torsion, of.torsion_damping),
+        footing=None if ground == "anchored" else _contact(of),
     )
+
+
+def _contact(of: WheelType) -> Contact:
+    return Contact(of.contact_stiffness, of.contact_damping, of.friction, of.torsional_friction, of.rolling_friction)
 
 
 def _departures(config: TwinConfig) -> tuple[Defect, ...]:

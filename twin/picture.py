@@ -10,9 +10,10 @@ import mjcf
 from twin.build import build
 from twin.campaign import Laboratory, laboratory
 from twin.config import TwinConfig
-from twin.conventions import placement, transform
+from twin.conventions import transform
 from twin.motions import JOINTS
 from twin.raycast import View, render
+from twin.root import put_down
 
 SIZE = (900, 700)
 _MARKER = (0.90, 0.13, 0.20, 1.0)
@@ -33,8 +34,7 @@ def picture(config: TwinConfig, seed: int, path: Path, size: tuple[int, int] = S
     """
     lab, nominal = laboratory(config, seed), mjcf.spec().compile()
     model = build(_with_markers(lab), lab.robot.defects, timestep=config.timestep, visual=True).model
-    data = mujoco.MjData(model)
-    data.joint("root").qpos[:3], data.joint("root").qpos[3:] = placement(lab.T_lab_base)
+    model, data = put_down(model, lab.T_lab_base)
     held_out = nominal.key("reach").qpos
     for joint in JOINTS:
         data.joint(joint).qpos = held_out[nominal.joint(joint).qposadr[0]]

@@ -10,10 +10,11 @@ import numpy as np
 from mujoco import rollout
 
 from twin.build import PUSH, Twin
-from twin.conventions import placement, states_with_their_sensors, transform
+from twin.conventions import states_with_their_sensors, transform
 from twin.defects.gear import rotor_joint
 from twin.errors import Diverged, NotStanding
 from twin.motions import JOINTS, RATE, SETTLE, Motion
+from twin.root import anchored, base_poses, floor_wrench, put_down
 
 _MIN_UPRIGHT = 0.98  # [-] cosine of the base's tilt below which the robot has tipped
 
@@ -55,17 +56,17 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
         Diverged: A state is not finite.
         NotStanding: The robot tipped over.
     """
-    model, data = twin.model, mujoco.MjData(twin.model)
+    model, data = put_down(twin.model, T_lab_base)
     command = _interpolated(motion.command, model.opt.timestep)
     control = _controls(model, command)
     if motion.push is not None:
         control[:, [model.actuator(name).id for name in PUSH]] = _interpolated(motion.push, model.opt.timestep)
-    first = _initial_state(model, data, motion.command[0], T_lab_base)
+    first = _initial_state(model, data, motion.command[0])
     states, sensors = rollout.rollout(model, data, first[None], control[None])
     states = states_with_their_sensors(first, states[0])
     _check(model, motion, states)
     skip = len(command) - round(motion.duration / model.opt.timestep) - 1
-    return _unpack(twin, states[skip:], sensors[0][skip:], command[skip:], motion)
+    return _unpack(model, twin.links, states[skip:], sensors[0][skip:], command[skip:])
 
 
 def _interpolated(setpoints: np.ndarray, timestep: float) -> np.ndarray:
@@ -87,8 +88,7 @@ def _controls(model: mujoco.MjModel, command: np.ndarray) -> np.ndarray:
     return control
 
 
-def _initial_state(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, T_lab_base: np.ndarray) -> np.ndarray:
-    data.joint("root").qpos[:3], data.joint("root").qpos[3:] = placement(T_lab_base)
+def _initial_state(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
     for joint, value in zip(JOINTS, q, strict=True):
         data.joint(joint).qpos = value
         data.joint(_driven(joint)).qpos = value
@@ -103,8 +103,7 @@ def _check(model: mujoco.MjModel, motion: Motion, states: np.ndarray) -> None:
     if len(bad):
         step, column = bad[0]
         raise Diverged(motion.id, step * model.opt.timestep - SETTLE, _owner(model, int(column)))
-    quat = states[:, 1 + 3 : 1 + 7]
-    upright = 1.0 - 2.0 * (quat[:, 1] ** 2 + quat[:, 2] ** 2)
+    upright = base_poses(model, states[:, 1 : 1 + model.nq])[:, 2, 2]
     if upright.min() < _MIN_UPRIGHT:
         at = int(np.argmin(upright >= _MIN_UPRIGHT))
         raise NotStanding(f"trial {motion.id!r}: the robot tips over at {at * model.opt.timestep - SETTLE:.2f} s")
@@ -117,8 +116,9 @@ def _owner(model: mujoco.MjModel, column: int) -> str:
     return model.joint(model.dof_jntid[min(max(column - 1 - model.nq, 0), model.nv - 1)]).name
 
 
-def _unpack(twin: Twin, states: np.ndarray, sensors: np.ndarray, command: np.ndarray, motion: Motion) -> States:
-    model = twin.model
+def _unpack(
+    model: mujoco.MjModel, links: tuple[str, ...], states: np.ndarray, sensors: np.ndarray, command: np.ndarray
+) -> States:
     qpos, qvel = states[:, 1 : 1 + model.nq], states[:, 1 + model.nq : 1 + model.nq + model.nv]
     link = np.stack([qpos[:, model.joint(j).qposadr[0]] for j in JOINTS], axis=1)
     motor = np.stack([qpos[:, model.joint(_driven(j)).qposadr[0]] for j in JOINTS], axis=1)
@@ -132,8 +132,8 @@ def _unpack(twin: Twin, states: np.ndarray, sensors: np.ndarray, command: np.nda
         motor_velocity=velocity,
         torque=kp * (command - motor) - kv * velocity,
         command=command,
-        poses={name: _pose(model, sensors, name) for name in twin.links},
-        wrench=_wrench(model, sensors),
+        poses={name: _pose(model, sensors, name) for name in links},
+        wrench=_floor_wrench(model, qpos, qvel) if anchored(model) else _wrench(model, sensors),
     )
 
 
@@ -145,6 +145,12 @@ def _sensed(model: mujoco.MjModel, sensors: np.ndarray, name: str) -> np.ndarray
 def _pose(model: mujoco.MjModel, sensors: np.ndarray, link: str) -> np.ndarray:
     kinds = (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMEQUAT)
     return transform(*(_sensed(model, sensors, f"{link}.{k.name}") for k in kinds))
+
+
+def _floor_wrench(model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return floor_wrench(model, qpos, qvel, data.site("plate").xpos)
 
 
 def _wrench(model: mujoco.MjModel, sensors: np.ndarray) -> np.ndarray:

@@ -1,11 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import mjcf
 from twin.build import build
+from twin.defects.contact import Chatters
 from twin.defects.gear import Gear
-from twin.defects.ground import Chatters, Wheel, spatial_stiffness
 from twin.defects.loads import LinkMass, Payload
 from twin.defects.placements import Placement
 from twin.defects.sensing import Encoder
@@ -67,7 +69,7 @@ def test_masses_and_payload_are_as_declared(lab, nominal):
 
 def test_contacts_that_would_chatter_are_refused(lab):
     wheel = next(w for w in lab.robot.wheels if w.name == "caster_front_left")
-    bad = Wheel(**{**vars(wheel), "contact_damping": 1000.0})
+    bad = replace(wheel, footing=replace(wheel.footing, damping=1000.0))
     with pytest.raises(Chatters, match=r"caster_front_left.*at most 2\d\d N.s/m"):
         build(mjcf.spec(), [bad])
 
@@ -86,21 +88,3 @@ def test_encoder_readings_are_the_stated_formula():
     assert encoder.read(np.array([q]))[0] == pytest.approx(q + 3e-3 + wave, abs=1e-9)
     coarse = Encoder("arm_1_joint", "link", 0.0, (0.0,) * 4, 1e-2)
     np.testing.assert_allclose(coarse.read(np.array([0.0149, 0.0151])), [0.01, 0.02])
-
-
-def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
-    contacts = {w.name: np.array(w.contact) for w in mjcf.wheels()}
-    p = np.array([contacts[w.name] for w in lab.robot.wheels])
-    K, C = spatial_stiffness(lab.robot.wheels, p)
-    kz = [w.stiffness[2] * w.contact_stiffness / (w.stiffness[2] + w.contact_stiffness) for w in lab.robot.wheels]
-    np.testing.assert_allclose(K[2, 2], sum(kz))
-    np.testing.assert_allclose(K[3, 3], np.dot(kz, p[:, 1] ** 2))
-    kx, ky = (np.array([w.stiffness[i] for w in lab.robot.wheels]) for i in (0, 1))
-    np.testing.assert_allclose(K[5, 5], np.dot(kx, p[:, 1] ** 2) + np.dot(ky, p[:, 0] ** 2))
-    np.testing.assert_allclose(K, K.T)
-    h = 1e-3  # heave at h rad/s: the imaginary part of the dynamic stiffness is damping times h
-    series = [
-        1 / (1 / (w.stiffness[2] + 1j * h * w.damping[2]) + 1 / (w.contact_stiffness + 1j * h * w.contact_damping))
-        for w in lab.robot.wheels
-    ]
-    np.testing.assert_allclose(C[2, 2], sum(series).imag / h, rtol=1e-9)

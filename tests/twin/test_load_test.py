@@ -1,0 +1,66 @@
+import mujoco
+import numpy as np
+import pytest
+
+import mjcf
+from scenarios import load
+from twin import build, load_test, release_test
+from twin.draw import draw
+from twin.stiffness import spatial_stiffness
+
+
+def standing(nominal, *settings, seed=0):
+    """A twin of wheels and nothing else, and its wheels."""
+    config = load("humanoids2024", list(settings)).twin
+    robot = draw(config, nominal, seed)
+    wheels = [d for d in robot.defects if type(d).__name__ in ("Wheel", "Anchored")]
+    return build(mjcf.spec(), wheels, timestep=config.timestep), robot.wheels
+
+
+def error(found, true):
+    """Largest departure of an element, relative to the geometric mean of its diagonal pair; axes that give."""
+    give = np.isfinite(np.diag(true))
+    np.testing.assert_array_equal(np.isfinite(np.diag(found)), give)
+    found, true = found[np.ix_(give, give)], true[np.ix_(give, give)]
+    q = np.sqrt(np.diag(true))
+    return np.abs((found - true) / np.outer(q, q)).max()
+
+
+def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
+    wheels = lab.robot.wheels
+    p = np.array([w.contact for w in wheels])
+    K, C = spatial_stiffness(wheels)
+    k = np.array([w.bushing.stiffness for w in wheels])
+    kc = np.array([w.footing.stiffness for w in wheels])
+    kz = k[:, 2] * kc / (k[:, 2] + kc)
+    np.testing.assert_allclose(K[2, 2], sum(kz))
+    np.testing.assert_allclose(K[3, 3], np.dot(kz, p[:, 1] ** 2))
+    np.testing.assert_allclose(K[5, 5], np.dot(k[:, 0], p[:, 1] ** 2) + np.dot(k[:, 1], p[:, 0] ** 2))
+    np.testing.assert_allclose(K, K.T)
+    h = 1e-3  # heave at h rad/s: the imaginary part of the dynamic stiffness is damping times h
+    series = [
+        1 / (1 / (w.bushing.stiffness[2] + 1j * h * w.bushing.damping[2]) + 1 / (kc_i + 1j * h * w.footing.damping))
+        for w, kc_i in zip(wheels, kc, strict=True)
+    ]
+    np.testing.assert_allclose(C[2, 2], sum(series).imag / h, rtol=1e-9)
+
+
+@pytest.mark.parametrize("ground", ["contact", "anchored"])
+def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
+    twin, wheels = standing(nominal, f"twin.base.wheels={ground}")
+    K, C = spatial_stiffness(wheels)
+    found = load_test(twin)
+    assert error(found.K, K) < 1e-3
+    assert error(release_test(twin), C) < 0.05
+    data = mujoco.MjData(twin.model)
+    mujoco.mj_forward(twin.model, data)
+    base = twin.model.body("base_footprint").id
+    weight, centre = 9.81 * twin.model.body_subtreemass[base], data.subtree_com[base] - data.xpos[base]
+    np.testing.assert_allclose(np.diag(found.K_gravity)[3:5], -weight * centre[2], rtol=0.2)  # loads turn with the base
+
+
+def test_the_bare_nominal_robot_can_be_tested():
+    K, K_gravity = load_test(build(mjcf.spec(), ()))
+    assert np.isinf(np.diag(K)[[0, 1, 5]]).all()
+    assert (np.diag(K)[2:5] > 1e3).all()
+    assert K_gravity.shape == (6, 6)

@@ -1,0 +1,176 @@
+"""Load and release test of a base, as a workshop would do it: small known wrenches, read the deflection.
+
+    load:     S = [x_j] [w_j]^-1,  K_total = S^-1                 x_j half the change between w_j and -w_j, at rest
+    gravity:  K_total = K + g K',  so that loads at two gravities tell K and K_gravity = g K' apart
+    release:  integral of x from release to rest = K_total^-1 C K_total^-1 w_j
+
+about base_footprint's origin at rest, in its axes, linear then angular. The last line is the first moment of the step
+response, the Laplace transform of M x'' + C x' + K x = 0 at s = 0: masses do not enter. Positions are taken where the
+integrator evaluates the springs, at the start of each step. Loads are followed under a damping towards the lab, which
+is gone where nothing moves; the release is without it. The upper body is held.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from scipy.spatial.transform import Rotation
+
+from twin.build import Twin
+from twin.conventions import transform
+from twin.errors import TwinError
+from twin.root import ROOT, base_poses, put_down
+
+FORCE, MOMENT = 2.0, 0.5  # [N], [N.m]
+_WRENCHES = np.diag([FORCE] * 3 + [MOMENT] * 3)
+_OIL = 15.0  # [1/s] rate at which the damping of the test takes motion out, below the slowest mode's frequency
+_SETTLE, _LOAD, _RELEASE = 2.0, 0.9, 2.5  # [s]
+_LIGHTER = 0.5  # share of gravity at which the load test is repeated
+_INERTIA, _DAMPING = 1e5, 1e7  # of joints that are held [kg.m2, N.m.s/rad]
+_RIGID = np.array([5e-9] * 3 + [5e-8] * 3)  # compliance that counts as none [m/N, rad/(N.m)]
+_AT_REST = 1e-3  # share of a deflection that may be left after a release
+
+
+class Restless(TwinError):
+    """A base that does not come to rest, or slips, under a test load."""
+
+
+class Stiffness(NamedTuple):
+    """What a load test finds.
+
+    Attributes:
+        K: (6, 6) stiffness of the suspension [N/m, N, N.m/rad]; infinite on the diagonal where nothing gives.
+        K_gravity: (6, 6) what weight and preload add to it.
+    """
+
+    K: np.ndarray
+    K_gravity: np.ndarray
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A robot on the test bench, its upper body held.
+
+    Attributes:
+        model: In oil: the base is damped towards the lab.
+        bare: Without that damping.
+        hold: Forces (nv,) that carry the upper body.
+        rest: State at rest.
+    """
+
+    model: mujoco.MjModel
+    bare: mujoco.MjModel
+    hold: np.ndarray
+    rest: np.ndarray
+
+    def run(self, model: mujoco.MjModel, state: np.ndarray, wrench: np.ndarray, duration: float) -> np.ndarray:
+        """States (n, ns) after each step under a constant wrench (6,) on the base, lab axes, about its origin."""
+        force, base = np.zeros((model.nbody, 6)), model.body(ROOT)
+        force[base.id] = wrench
+        force[base.id, 3:] -= np.cross(base.ipos, wrench[:3])  # MuJoCo pulls at the centre of mass
+        control = np.concatenate([np.zeros(model.nu), self.hold, force.ravel()])
+        kinds = (
+            mujoco.mjtState.mjSTATE_CTRL,
+            mujoco.mjtState.mjSTATE_QFRC_APPLIED,
+            mujoco.mjtState.mjSTATE_XFRC_APPLIED,
+        )
+        n, spec = round(duration / model.opt.timestep), sum(int(k) for k in kinds)
+        controls = np.broadcast_to(control, (1, n, len(control)))
+        found, _ = rollout.rollout(model, mujoco.MjData(model), state[None], controls, control_spec=spec)
+        return np.asarray(found[0])
+
+    def displacement(self, states: np.ndarray) -> np.ndarray:
+        """(n, 6) from rest, in the base's axes at rest."""
+        T_rest, T = (base_poses(self.model, s[:, 1 : 1 + self.model.nq]) for s in (self.rest[None], states))
+        T_rest_base = np.linalg.solve(T_rest, T)
+        return np.hstack([T_rest_base[:, :3, 3], Rotation.from_matrix(T_rest_base[:, :3, :3]).as_rotvec()])
+
+
+def load_test(twin: Twin) -> Stiffness:
+    """Small-signal stiffness of the base, by +-2 N and +-0.5 N.m along each axis; the arm at its zero posture.
+
+    Raises:
+        Restless: The base does not come to rest.
+    """
+    S, lighter = compliance(bench(twin)), compliance(bench(twin, _LIGHTER))
+    rigid = np.diag(S) < _RIGID
+    K_total, K_lighter = (_inverted(s, rigid) for s in (S, lighter))
+    K_gravity = (K_total - K_lighter) / (1.0 - _LIGHTER)
+    K = K_total - K_gravity
+    K[rigid, rigid] = np.inf
+    return Stiffness(K, K_gravity)
+
+
+def release_test(twin: Twin) -> np.ndarray:
+    """Small-signal damping C (6, 6) of the base for slow motion [N.s/m, N.s, N.m.s/rad].
+
+    Raises:
+        Restless: The base does not come back to rest.
+    """
+    b = bench(twin)
+    S = compliance(b)
+    rigid, step = np.diag(S) < _RIGID, b.model.opt.timestep
+    moment = np.zeros((6, 6))
+    for j, wrench in enumerate(_WRENCHES):
+        loaded = b.run(b.model, b.rest, wrench, _LOAD)[-1]
+        x = b.displacement(np.vstack([loaded, b.run(b.bare, loaded, np.zeros(6), _RELEASE)]))
+        if abs(x[-1] @ wrench) > _AT_REST * abs(x[0] @ wrench):
+            raise Restless(f"the base keeps {x[-1] @ wrench / (x[0] @ wrench):.1%} of its deflection along axis {j}")
+        moment[:, j] = step * x[:-1].sum(axis=0) / wrench[j]
+    K = _inverted(S, rigid)
+    C = K @ moment @ K
+    C[rigid, rigid] = np.inf
+    return C
+
+
+def compliance(b: Bench) -> np.ndarray:
+    """(6, 6) displacement by wrench, K_total^-1."""
+    loaded = [[b.run(b.model, b.rest, s * w, _LOAD)[-1] for w in _WRENCHES] for s in (1.0, -1.0)]
+    up, down = (b.displacement(np.array(states)) for states in loaded)
+    return np.asarray(np.linalg.solve(_WRENCHES, (up - down) / 2.0).T)
+
+
+def bench(twin: Twin, gravity: float = 1.0) -> Bench:
+    """A twin at rest on the plate under a share of gravity, upper body held.
+
+    Raises:
+        Restless: It does not come to rest.
+    """
+    T = transform(np.array([0.9, 0.45, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))
+    model, data = put_down(twin.model.__copy__(), T)
+    model.opt.gravity *= gravity
+    upper = _upper_joints(model)
+    mujoco.mj_forward(model, data)
+    hold, M = np.zeros(model.nv), np.empty((model.nv, model.nv))
+    hold[upper] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[upper]
+    mujoco.mj_fullM(model, data, M)
+    model.dof_armature[upper], model.dof_damping[upper], model.dof_frictionloss[upper] = _INERTIA, _DAMPING, 0.0
+    model.tendon_limited[:] = 0
+    bare = model.__copy__()
+    model.dof_damping[:6] += 2.0 * _OIL * np.diag(M)[:6]
+    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    start = np.empty(mujoco.mj_stateSize(model, kind))
+    mujoco.mj_getState(model, data, start, kind)
+    states = Bench(model, bare, hold, start).run(model, start, np.zeros(6), _SETTLE)
+    return Bench(model, bare, hold, states[-1])
+
+
+def _upper_joints(model: mujoco.MjModel) -> np.ndarray:
+    """Degrees of freedom above the base: their body carries nothing that stands on the floor."""
+    standing = {model.body(ROOT).id}
+    touching = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    for body in model.geom_bodyid[touching]:
+        while body:
+            standing.add(int(body))
+            body = model.body_parentid[body]
+    return np.array([d for d in range(model.nv) if int(model.dof_bodyid[d]) not in standing], dtype=int)
+
+
+def _inverted(S: np.ndarray, rigid: np.ndarray) -> np.ndarray:
+    """Stiffness of the axes that give; zero elsewhere."""
+    K = np.zeros((6, 6))
+    free = np.ix_(~rigid, ~rigid)
+    K[free] = np.linalg.inv(S[free])
+    return K
