@@ -65,9 +65,9 @@ def _matrix(model: mujoco.MjModel, kind: str) -> np.ndarray:
     """K or C (6, 6) of the model's tendons."""
     found = np.zeros((6, 6))
     for n in range(6):
-        tendon = model.tendon(f"root.{kind}.{n}")
-        value = (tendon.stiffness if kind == "spring" else tendon.damping).ravel()[0]
-        rows = slice(tendon.adr[0], tendon.adr[0] + tendon.num[0])
+        i = model.tendon(f"root.{kind}.{n}").id
+        value = float((model.tendon_stiffness if kind == "spring" else model.tendon_damping)[i])
+        rows = slice(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
         joints, share = model.wrap_objid[rows], model.wrap_prm[rows]
         e = np.zeros(6)
         e[[AXES.index(model.joint(int(j)).name.removeprefix("root.")) for j in joints]] = share

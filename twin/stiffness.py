@@ -4,7 +4,7 @@
 
 about the base frame's origin, in its axes, linear then angular. Normal to the floor bushing and contact are in series,
 k = k1 k2 / (k1 + k2) and, for slow motion, c = (c1 k2^2 + c2 k1^2) / (k1 + k2)^2. A braked wheel that tilts with the
-base keeps its contact point, which then is p_i; one whose bushing twists about all axes stands still, and p_i is its hub.
+base keeps its contact point, which then is p_i; one whose bushing twists about all axes stands, and p_i is its hub.
 Without bushings friction holds x, y and the rotation about z: their K is infinite.
 """
 

@@ -94,9 +94,16 @@ def write_parameters(path: Path, parameters: Iterable[Parameter], derived: dict[
     content = {
         "schema": 1,
         "parameters": [p._asdict() for p in parameters],
-        "derived": {name: np.asarray(value).tolist() for name, value in derived.items()},
+        "derived": {name: _numbers(value) for name, value in derived.items()},
     }
-    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _numbers(value: np.ndarray) -> object:
+    """Nested lists; null for what is infinite, a stiffness where nothing gives."""
+    found = np.asarray(value, dtype=float).astype(object)
+    found[np.isinf(np.asarray(value, dtype=float))] = None
+    return found.tolist()
 
 
 def read_parameters(path: Path) -> tuple[Parameter, ...]:

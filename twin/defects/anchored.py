@@ -3,10 +3,10 @@
     F_i = Kt_i dr_i + Ct_i d(dr_i)/dt,   M_i = Ktheta_i theta + Ctheta_i dtheta/dt,   dr_i = s + theta x r_i
     sum_i (F_i, M_i + r_i x F_i) = K (s, theta) + C d(s, theta)/dt,   as in `twin.stiffness`
 
-linear in the base's displacement s along its own axes and in its angles theta, from where it is put down. The base hangs
-on six joints, angles before slides; K and C are springs and dampers of fixed tendons along their eigenvectors, since a
-tendon of length e'x with stiffness k pulls with e k e'x. The forces are those of wheels suspended in the base's axes
-that act on fixed points of the floor.
+linear in the base's displacement s along its own axes and in its angles theta, from where it is put down. The base
+hangs on six joints, angles before slides; K and C are springs and dampers of fixed tendons along their eigenvectors,
+since a tendon of length e'x with stiffness k pulls with e k e'x. The forces are those of wheels suspended in the base's
+axes that act on fixed points of the floor.
 """
 
 from dataclasses import dataclass

@@ -1,0 +1,48 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenarios import load
+from twin import motions, truth
+from twin.campaign import laboratory
+from twin.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def config():
+    return load("humanoids2024", ["twin.base.wheels=anchored"]).quick().twin
+
+
+@pytest.fixture(scope="module")
+def anchored(config):
+    return laboratory(config, 0)
+
+
+def swing(config, name="around_z", duration=3.0):
+    path = motions.CALIBRATION_SWINGS[name]
+    return motions.swing(name, "calibration", "swing", path, duration, config.campaign)
+
+
+def test_an_anchored_base_comes_back_to_where_it_stood(anchored, config):
+    campaign = replace(config.campaign, rest=4.0)
+    there_and_back = motions.swing("z", "calibration", "swing", motions.CALIBRATION_SWINGS["around_z"], 5.12, campaign)
+    states = simulate(anchored.twin, there_and_back, anchored.T_lab_base)
+    T = np.linalg.solve(states.poses["base_footprint"][500], states.poses["base_footprint"])
+    moved, left = np.abs(T[:, :3, 3]).max(), np.abs(T[-1, :3, 3]).max()
+    assert moved > 2e-4
+    assert left < 0.02 * moved
+
+
+def test_an_anchored_base_presses_on_the_plate_with_its_weight(anchored, config):
+    states = simulate(anchored.twin, swing(config), anchored.T_lab_base)
+    weight = 9.81 * anchored.twin.model.body_mass.sum()
+    still = states.t < 1.0
+    np.testing.assert_allclose(states.wrench[still, 2].mean(), -weight, rtol=1e-4)
+    np.testing.assert_allclose(states.wrench[still, :2].mean(axis=0), 0.0, atol=0.1)
+
+
+def test_infinite_stiffness_is_null_in_a_file(tmp_path):
+    truth.write_parameters(tmp_path / "truth.json", [], {"K": np.diag([np.inf, 2.0])})
+    assert json.loads((tmp_path / "truth.json").read_text())["derived"]["K"] == [[None, 0.0], [0.0, 2.0]]
