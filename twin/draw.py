@@ -6,13 +6,9 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-import mjcf
 from twin.build import HAND
-from twin.config import Base, MarkerBody, TwinConfig, WheelType
-from twin.defects.anchored import Anchored
+from twin.config import MarkerBody, TwinConfig
 from twin.defects.base import Defect
-from twin.defects.bushing import Bushing
-from twin.defects.contact import Contact
 from twin.defects.departures import Cable, FloorTilt, LooseMarker, Warming
 from twin.defects.differential import Differential
 from twin.defects.gear import DirectDrive, Gear
@@ -21,6 +17,7 @@ from twin.defects.hysteresis import Hysteresis
 from twin.defects.loads import Flexibility, LinkMass, Payload
 from twin.defects.placements import Placement
 from twin.defects.sensing import Cluster, Encoder
+from twin.draw_base import ground, wheels_of
 from twin.randomness import generator
 
 TORSO = "torso_lift_joint"
@@ -52,7 +49,7 @@ class Robot:
 
 def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
     """Draw one robot of the series; the same seed gives the same robot."""
-    wheels = _wheels(config)
+    wheels = wheels_of(config.base)
     return Robot(
         defects=(
             *_placements(config, seed),
@@ -60,7 +57,7 @@ def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
             *_gears(config, seed),
             _torso_drive(config),
             Flexibility("torso_lift_link", config.torso.bending_stiffness, config.torso.bending_damping),
-            *((Anchored(wheels),) if config.base.wheels == "anchored" else wheels),
+            *ground(config.base, wheels),
             _payload(config, seed),
             *_departures(config),
         ),
@@ -135,32 +132,6 @@ def _torso_drive(config: TwinConfig) -> DirectDrive:
     t = config.torso
     damping = _DAMPING_RATIO * float(np.sqrt(t.servo_stiffness * t.rotor_inertia))
     return DirectDrive(TORSO, t.rotor_inertia, t.servo_stiffness, damping)
-
-
-def _wheels(config: TwinConfig) -> tuple[Wheel, ...]:
-    return tuple(_wheel(w, _type(config.base, w.name), config.base.wheels) for w in mjcf.wheels())
-
-
-def _type(base: Base, name: str) -> WheelType:
-    front = base.caster_front if name.startswith("caster_front") else base.caster_back
-    return base.drive if name.startswith("wheel") else front
-
-
-def _wheel(nominal: mjcf.Wheel, of: WheelType, ground: str) -> Wheel:
-    """A caster rides on its bushing with its fork, whose body is the parent of the rolling one."""
-    return Wheel(
-        nominal.name,
-        nominal.body.replace("_2_link", "_1_link"),
-        f"{nominal.name}_contact",
-        nominal.centre,
-        nominal.contact,
-        bushing=None if ground == "rigid" else Bushing(of.stiffness, of.damping, of.torsion, of.torsion_damping),
-        footing=None if ground == "anchored" else _contact(of),
-    )
-
-
-def _contact(of: WheelType) -> Contact:
-    return Contact(of.contact_stiffness, of.contact_damping, of.friction, of.torsional_friction, of.rolling_friction)
 
 
 def _departures(config: TwinConfig) -> tuple[Defect, ...]:
