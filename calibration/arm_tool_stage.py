@@ -6,8 +6,9 @@ along with it,
 
     twist of the arm's base = Ad(T_B_arm^-1) twist of T_base_B
 
-and both are in the model's covariance. Residuals larger than the measurement's noise widen all sigmas and are told:
-they are what "factory calibration is good enough" leaves out.
+and both are in the model's covariance. Residuals larger than the measurement's noise are what "factory calibration is
+good enough" leaves out. They are told, they widen all sigmas, and what the arm's errors have in common, hidden in
+the two frames, is taken to be as large as what they have not.
 """
 
 from collections.abc import Iterator
@@ -56,7 +57,7 @@ def locate_arm(
         found = fit_arm_tool(M, A, postures.covariance, robust=True)
     theta = np.concatenate([base, to_vector(nominal_arm(chain) @ found.X), to_vector(found.Y)])
     T_B_arm = inverse(from_vector(base)) @ before[0] @ found.X
-    covariance = _covariance(theta, T_B_arm, base_covariance, max(1.0, found.chi2) * found.covariance)
+    covariance = _covariance(theta, T_B_arm, base_covariance, _twists(found, M, A))
     seen = identifiability(np.vstack([_whitened(theta, found, A, postures, T_B_arm), known]), parameters)
     sigma = np.sqrt(np.diag(covariance))
     rows = zip(parameters.names, parameters.units, parameters.nominal, theta, sigma, seen.status, strict=True)
@@ -104,6 +105,22 @@ def _covariance(theta: np.ndarray, T_B_arm: np.ndarray, base: np.ndarray, twists
     return G @ block_diag(base, twists) @ G.T
 
 
+def _twists(found: ArmTool, M: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """Covariance (12, 12) of the twists of both frames, see the head of this file."""
+    covariance = max(1.0, found.chi2) * found.covariance
+    if found.chi2 > _CHI2:
+        common = np.repeat([part**2 for part in _left(found, M, A)], 3) / 3.0
+        covariance = covariance + np.diag(np.tile(common, 2))
+    return covariance
+
+
+def _left(found: ArmTool, M: np.ndarray, A: np.ndarray) -> tuple[float, float]:
+    """Residuals' norm, rms over the postures [m, rad]."""
+    r = residuals(found.X, found.Y, M, A)[0]
+    squared = np.average(r**2, axis=0, weights=found.weight)
+    return float(np.sqrt(squared[:3].sum())), float(np.sqrt(squared[3:].sum()))
+
+
 def _whitened(theta: np.ndarray, found: ArmTool, A: np.ndarray, postures: Postures, T_B_arm: np.ndarray) -> np.ndarray:
     """Derivative (6 n, 18) of the hand's whitened pose in the base body by the three frames."""
     AY = A @ found.Y
@@ -122,8 +139,7 @@ def _whitened(theta: np.ndarray, found: ArmTool, A: np.ndarray, postures: Postur
 def _verdicts(
     found: ArmTool, M: np.ndarray, A: np.ndarray, stray: np.ndarray, seen: Identifiability
 ) -> Iterator[Verdict]:
-    r, _ = residuals(found.X, found.Y, M, A)
-    mm, mrad = (1e3 * float(np.sqrt((part**2).sum(axis=1).mean())) for part in (r[:, :3], r[:, 3:]))
+    mm, mrad = (1e3 * part for part in _left(found, M, A))
     left = f"{mm:.3f} mm and {mrad:.3f} mrad rms left, {np.sqrt(found.chi2):.1f} times the noise"
     if not found.converged:
         yield Verdict(STAGE, "refused", f"the fit did not come to rest ({left})")

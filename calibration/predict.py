@@ -49,6 +49,7 @@ _ROWS: tuple[tuple[str, tuple[Base, ...], tuple[Encoder, ...]], ...] = (
     ("nominal", ("fixed", "measured"), ("motor",)),
     ("model_1", ("plate", "dynamics", "measured"), ("motor",)),
     ("registration", _EVERY, ("motor",)),
+    ("arm_tool", _EVERY, ("motor",)),
     ("model_2", _EVERY, ("motor",)),
     ("model_3", _EVERY, ("motor", "link")),
 )

@@ -68,7 +68,10 @@ def run(
     loaded = steps.load(scenario, _overrides(overrides, seed))
     out = out or Path("runs") / loaded.name
     with console.progress() as progress:
-        steps.run(loaded, out, quick=quick, progress=progress)
+        result = steps.run(loaded, out, quick=quick, progress=progress)
+    if (table := console.frames(out)) is not None:
+        console.show(console.verdicts([v for v in result.estimate.verdicts if v.stage in ("base_frame", "arm_tool")]))
+        console.show(table)
     console.show(console.ladder(out))
     typer.echo(f"\nReport: {out / 'report.html'}")
 

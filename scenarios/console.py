@@ -101,6 +101,22 @@ def ladder(results: Path) -> Table:
     return table
 
 
+def frames(results: Path) -> Table | None:
+    """Return the table of estimated frames beside their truth; None unless the estimate is about frames."""
+    main = json.loads((results / "estimate" / "estimate.json").read_text(encoding="utf-8"))["main"]
+    if main != "arm_tool":
+        return None
+    table = _table("frame", "unit", "estimate", "truth", "error", "sigma")
+    table.title, table.title_justify = "Frames, against truth", "left"
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for p in json.loads((results / "score.json").read_text(encoding="utf-8"))["parameters"]:
+        if p["name"].startswith("frame.") and p["estimate"] is not None:
+            values = (p["estimate"], p["truth"], p["estimate"] - p["truth"], p["sigma"])
+            table.add_row(p["name"], f"m{p['unit']}", *(f"{1e3 * value:.3f}" for value in values))
+    return table
+
+
 def verdicts(found: Sequence[Any]) -> Table:
     """Return the table of what each stage says of its own result."""
     table = _table("stage", "verdict", "message")

@@ -29,14 +29,15 @@ class Scenario(BaseModel):
     calibration: Annotated[Options, Field(default_factory=Options)]
 
     def quick(self) -> "Scenario":
-        """The same robot and laboratory, a campaign of about 180 s: for tests, its figures are of less data."""
+        """The same robot and laboratory, a campaign of at most 180 s: for tests, its figures are of less data."""
+        whole = self.twin.campaign
         short = replace(
-            self.twin.campaign,
-            calibration_postures=24,
-            validation_postures=6,
+            whole,
+            calibration_postures=min(24, whole.calibration_postures),
+            validation_postures=min(6, whole.validation_postures),
             dwell=0.9,
-            sweep=3.0,
-            calibration_swing=6.0,
-            validation_swing=8.0,
+            sweep=min(3.0, whole.sweep),
+            calibration_swing=min(6.0, whole.calibration_swing),
+            validation_swing=min(8.0, whole.validation_swing),
         )
         return self.model_copy(update={"twin": replace(self.twin, campaign=short)})

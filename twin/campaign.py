@@ -31,6 +31,7 @@ from twin.draw import BASE, Robot, draw
 from twin.instruments import mocap, plate, robot_log
 from twin.instruments.clock import Clock
 from twin.instruments.sampling import averaged, interpolate, interpolate_poses
+from twin.kinematic import arm_frame, carried, without_plate
 from twin.motions import JOINTS, Motion
 from twin.randomness import generator
 from twin.schedule import schedule
@@ -118,8 +119,7 @@ def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None =
 
 
 def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry:
-    twin = _in_trial(lab, motion, start - _EPOCH + motion.duration / 2.0)
-    states = simulate(twin, motion, lab.T_lab_base)
+    states = _states(lab, motion, start - _EPOCH + motion.duration / 2.0)
     trial, true = measure(lab, motion, states, start)
     file = f"trials/{motion.id}.nc"
     digest = write_trial(out / "dataset" / file, trial)
@@ -133,6 +133,17 @@ def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry
         sha256=digest,
         payload=motion.payload,
     )
+
+
+def _states(lab: Laboratory, motion: Motion, time: float) -> States:
+    """What the motion does at `time` [s] of the campaign."""
+    if _is_carried(lab, motion):
+        return carried(lab.twin, motion, lab.T_lab_base)
+    return simulate(_in_trial(lab, motion, time), motion, lab.T_lab_base)
+
+
+def _is_carried(lab: Laboratory, motion: Motion) -> bool:
+    return lab.config.campaign.carried or (motion.base is not None and motion.base.form == "kinematic")
 
 
 def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
@@ -179,7 +190,7 @@ def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tu
         dwell_stop=motion.dwells[:, 1] + start,
         approach=motion.approach,
     )
-    return trial, true
+    return (without_plate(trial) if _is_carried(lab, motion) else trial), true
 
 
 def _clocks(config: TwinConfig) -> tuple[Clock, Clock, Clock]:
@@ -222,6 +233,8 @@ def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> Non
     parameters: list[Parameter] = list(lab.twin.truth)
     for source in (*robot.encoders, *robot.clusters, *robot.loose, *_clocks(lab.config)[:2]):
         parameters += source.parameters()
+    if lab.config.campaign.driving.forms:
+        parameters += arm_frame(lab.twin, next(iter(lab.config.arm)))
     derived = {"K": K, "C": C, "T_lab_base": lab.T_lab_base, "plate_centre": _plate_centre(lab.twin.model)}
     derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}
     if later is not None:

@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
 from twin.config_departures import Departures
+from twin.config_driving import Driving
 from twin.config_session import Session
 from twin.config_values import (
     STRICT,
@@ -109,6 +110,8 @@ class Widths:
         placement_rotation: Each joint placement, per axis [rad].
         link_mass: Relative [-].
         link_com: Per axis [m].
+        mount_translation: Where the arm is bolted on, per axis, on top of its first joint's placement [m].
+        mount_rotation: The same, per axis [rad].
         spread: Half width of the uniform factor on offsets and gaps [-]; 0 leaves them as written.
     """
 
@@ -117,6 +120,8 @@ class Widths:
     link_mass: Annotated[float, Field(ge=0.0, le=0.3), DRAWN]
     link_com: NonNegative
     spread: Annotated[float, Field(ge=0.0, le=0.9), DRAWN] = 0.0
+    mount_translation: NonNegative = 0.0
+    mount_rotation: NonNegative = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -190,13 +195,15 @@ class Campaign:
         dwell: Rest in each static posture [s].
         calibration_postures: Number of.
         validation_postures: Number of.
-        sweep: Duration of each one-joint sweep [s].
-        calibration_swing: Duration of each calibration swing [s].
-        validation_swing: Duration of each validation swing [s].
+        sweep: Duration of each one-joint sweep [s]; 0: no sweeps.
+        calibration_swing: Duration of each calibration swing [s]; 0: none.
+        validation_swing: Duration of each validation swing [s]; 0: none.
         pause: Between trials, on every clock [s].
         payloads: Further masses [kg] with which the first validation swing is repeated.
         push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
+        driving: Trials in which the base moves.
+        carried: Whether every trial is without physics, joints and base where they are told to be.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]
@@ -205,13 +212,15 @@ class Campaign:
     dwell: Annotated[float, Field(ge=0.8, le=10.0)]
     calibration_postures: Count
     validation_postures: Count
-    sweep: FixedPositive
-    calibration_swing: FixedPositive
-    validation_swing: FixedPositive
+    sweep: FixedNonNegative
+    calibration_swing: FixedNonNegative
+    validation_swing: FixedNonNegative
     pause: FixedNonNegative
     payloads: tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...] = ()
     push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     confirmation: bool = False
+    driving: Driving = field(default_factory=Driving)
+    carried: bool = False
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -25,6 +25,11 @@ def exp6(twist: np.ndarray) -> np.ndarray:
     return RigidTransform.from_exp_coords(np.concatenate([twist[..., 3:], twist[..., :3]], axis=-1)).as_matrix()
 
 
+def rotation_vector(T: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3) [rad] of transforms (..., 4, 4)."""
+    return Rotation.from_matrix(T[..., :3, :3]).as_rotvec()
+
+
 def states_with_their_sensors(first: np.ndarray, states: np.ndarray) -> np.ndarray:
     """States (n, ns) on which the sensor values (n, ...) of the same n steps were computed.
 

@@ -71,8 +71,10 @@ def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
 def _placements(config: TwinConfig, seed: int) -> tuple[Placement, ...]:
     w = config.widths
     widths = np.repeat([w.placement_translation, w.placement_rotation], 3)
-    names = (TORSO, *config.arm)
-    return tuple(Placement(n, generator(seed, "placement", n).normal(size=6) * widths) for n in names)
+    xi = {n: generator(seed, "placement", n).normal(size=6) * widths for n in (TORSO, *config.arm)}
+    mount = np.repeat([w.mount_translation, w.mount_rotation], 3)
+    xi[next(iter(config.arm))] += generator(seed, "mount").normal(size=6) * mount
+    return tuple(Placement(name, twist) for name, twist in xi.items())
 
 
 def _masses(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> tuple[LinkMass, ...]:

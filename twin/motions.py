@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.schema import Kind, Role
+from twin.base_path import BasePath
 from twin.config import Campaign
 
 JOINTS = ("torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8)))
@@ -26,13 +27,14 @@ class Motion:
     Attributes:
         id: Name of the trial.
         role: calibration | validation.
-        kind: static | sweep | swing.
+        kind: static | sweep | swing | spin | drive.
         name: Name of the motion.
         command: Set-points (n, 8) at RATE, recording starts at the first [m, rad].
         dwells: Start and stop of each rest (n_postures, 2) [s from the first set-point]; empty where there is none.
         approach: Sign of each joint's motion into each posture (n_postures, 8).
         payload: Mass in the hand [kg]; None: the campaign's.
         push: Force on the hand at each set-point (n, 3), tool axes [N]; None: none.
+        base: Where the base goes; None: nowhere.
     """
 
     id: str
@@ -44,6 +46,7 @@ class Motion:
     approach: np.ndarray
     payload: float | None = None
     push: np.ndarray | None = None
+    base: BasePath | None = None
 
     @property
     def duration(self) -> float:

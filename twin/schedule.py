@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 
 from calibration.schema import Role
-from twin import motions, postures
+from twin import driving, motions, postures
 from twin.config import Campaign
 from twin.motions import Motion
 from twin.randomness import generator
@@ -15,9 +15,10 @@ _REGISTRATION_POSTURES = 8
 
 
 def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
-    """Calibration first (statics, sweeps, swings), then validation (swings, other statics), then confirmation."""
+    """Calibration first (statics, spins and drives, sweeps, swings), then validation, then confirmation."""
     return (
         _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign),
+        *driving.trials(campaign),
         *_sweeps(campaign),
         *_swings("calibration", campaign.calibration_swing, motions.CALIBRATION_SWINGS, campaign),
         *_swings("validation", campaign.validation_swing, motions.VALIDATION_SWINGS, campaign),
@@ -47,6 +48,8 @@ def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, ca
 
 
 def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:
+    if campaign.sweep == 0.0:
+        return ()
     return tuple(
         motions.swing(
             f"sweep_{j}", "calibration", "sweep", motions.sweep_path(j, campaign.sweep), campaign.sweep, campaign
@@ -68,4 +71,6 @@ def _loaded(campaign: Campaign) -> tuple[Motion, ...]:
 
 
 def _swings(role: Role, duration: float, paths: dict[str, motions.Swing], campaign: Campaign) -> tuple[Motion, ...]:
+    if duration == 0.0:
+        return ()
     return tuple(motions.swing(name, role, "swing", path, duration, campaign) for name, path in paths.items())
