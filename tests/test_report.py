@@ -395,6 +395,7 @@ def test_numbers_have_the_digits_that_mean_something():
         "–",
     )
     assert (fixed(-1234.5, 1), fixed(float("nan"), 2), count(10398)) == ("−1\u202f234.5", "–", "10\u202f398")
+    assert (fixed(-1e-4, 2), fixed(-0.006, 2)) == ("0.00", "−0.01")
     assert (error(23.012), error(3.0549), error(0.957), error(0.0061)) == ("23.0", "3.05", "0.96", "0.01")
     assert (cell(3.0549), cell(0.0061), cell(0.0), cell(None)) == ("3.05", "0.006", "0.00", "–")
     assert [decimals(s) for s in (0.0996, 0.17, 1.04, 26.0, 0.0, None)] == [2, 2, 1, 0, 3, 3]

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from calibration.estimate_parts import joints_model
 from calibration.evaluate import Trace, ladder
 from calibration.identifiability import Combination
 from calibration.joint_inputs import input_model
+from calibration.joint_regimes import Regime as CalibratedRegime
 from calibration.metrics import PoseErrors
 from calibration.suspension import Suspension
 from calibration.suspension_held_out import HeldOut
@@ -36,10 +38,10 @@ REGIMES = [
     | {"cut_percent": c, "r2": 0.5, "n": 10}
     for j, r, c in (
         (JOINT, "repetition", 85.0),
-        (JOINT, "unseen", 40.0),
+        (JOINT, "unseen_motion", 40.0),
         (JOINT, "static", -12.0),
         (PLAIN, "repetition", 91.0),
-        (PLAIN, "static", 3.0),
+        (PLAIN, "static", 0.0),
     )
 ]
 
@@ -161,9 +163,13 @@ def test_the_true_springs_predict_the_axes_that_are_moved(whole):
     rows = (found.t > 1.0) & np.isfinite(found.measured).all(axis=1)
     error, motion = ((a[rows] ** 2).sum(axis=0) for a in (found.measured - p.x, found.measured))
     np.testing.assert_allclose(p.r2, 1.0 - error / motion)
+    middle = rows & (found.t > 0.25 * found.t[-1]) & (found.t < 0.75 * found.t[-1])
+    error, motion = ((a[middle] ** 2).sum(axis=0) for a in (found.measured - p.x, found.measured))
+    np.testing.assert_allclose(p.r2_middle, 1.0 - error / motion)
     assert p.r2[3:5].min() > 0.98
     np.testing.assert_allclose(p.r2[~MOVES], 0.0, atol=1e-9)
-    assert row_of(whole, "The same trial in figures", "roll [mrad]")[2] == fixed(p.r2[3], 2)
+    roll = row_of(whole, "The same trial in figures", "roll [mrad]")
+    assert roll[2:4] == [fixed(p.r2[3], 2), fixed(p.r2_middle[3], 2)]
     assert row_of(whole, "The same trial in figures", "yaw [mrad]")[2] == "left still"
     assert row_of(whole, "The same trial in figures", "yaw [mrad]")[0] == fixed(np.ptp(found.measured[rows, 5]), 2)
 
@@ -221,14 +227,24 @@ def test_loops_hold_what_the_encoders_said_and_the_model_says(whole, recording):
 
 
 def test_regimes_are_told_joint_by_joint_and_in_sentences(whole):
-    assert row_of(whole, "regime by regime", JOINT)[2::4] == ["85 %", "40 %", "−12 %"]
-    assert row_of(whole, "regime by regime", PLAIN)[4:8] == 4 * ["–"]
+    assert row_of(whole, "regime by regime", JOINT) == ["2.00", "0.30", "85", "0.50", "10"]
+    assert row_of(whole, "regime by regime", PLAIN) == ["2.00", "0.18", "91", "0.50", "10"]
     text = text_of(whole)
-    assert "unseen repetitions: the rms falls by 10 % or more in 2 of 2 joints (by 85 to 91 %)." in text
-    assert "Static postures, unseen: the rms falls by 10 % or more in 0 of 2 joints and grows in arm_2." in text
-    assert 'class="missed">−12' in (whole / "report.html").read_text()
-    lines = regimes.joint_regimes(tuple(Regime(**r) for r in REGIMES))
-    assert [x.joint for x in lines] == [JOINT, PLAIN]
+    assert "other repetitions: the rms falls by 10 % or more in 2 of 2 joints (by 85 to 91 %)." in text
+    assert "Other motions, held out: the rms falls by 10 % or more in 1 of 1 joints (by 40 %)." in text
+    assert (
+        "Static postures, held out: the rms falls by 10 % or more in 0 of 2 joints, grows in arm_2, is left as it is in arm_3."
+        in text
+    )
+    assert 'class="missed">−12<' in (whole / "report.html").read_text()
+
+
+def test_regimes_have_our_order_and_unknown_ones_come_last():
+    found = regimes.by_regime(
+        tuple(Regime(**REGIMES[0] | {"regime": r}) for r in ("other", *reversed(regimes.REGIMES)))
+    )
+    assert [r.meaning for r in found] == [*regimes.REGIMES.values(), "other"]
+    assert {r for r in get_args(CalibratedRegime)} == set(regimes.REGIMES)
 
 
 def test_trials_are_apart_where_payload_or_push_differ(run, recording):

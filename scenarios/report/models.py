@@ -51,9 +51,7 @@ def section(results: Results, steps: Sequence[Step]) -> Section:
         "loops": looped,
         "why_no_loops": why_no_loops,
         "joint_lines": paper.joint_lines(results),
-        "regimes": regimes.joint_regimes(evaluation.regimes),
-        "regime_names": regimes.REGIMES,
-        "regime_sentences": regimes.sentences(evaluation.regimes),
+        "regimes": regimes.by_regime(evaluation.regimes),
         "loaded": trials,
         "load_rows": loads.load_rows(results, steps, trials),
     }

@@ -7,10 +7,10 @@ _SCALED = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}
 
 
 def fixed(x: float | None, digits: int) -> str:
-    """A number with so many decimals; a dash where there is none."""
+    """A number with so many decimals, zero without a sign; a dash where there is none."""
     if x is None or not math.isfinite(x):
         return "–"
-    return f"{x:,.{digits}f}".replace("-", _MINUS).replace(",", _THIN)
+    return f"{x:z,.{digits}f}".replace("-", _MINUS).replace(",", _THIN)
 
 
 def significant(x: float | None, digits: int = 3) -> str:

@@ -1,6 +1,6 @@
 """How much of each joint's discrepancy its model explains, by regime, and in a sentence where it helps.
 
-A regime helps a joint if the rms is cut by a tenth or more, harms it if the rms grows.
+The model helps a joint where the rms is cut by a tenth or more, and harms it where the rms grows.
 """
 
 from collections.abc import Sequence
@@ -9,38 +9,38 @@ from dataclasses import dataclass
 from scenarios.report.entries import Regime
 
 REGIMES = {
-    "repetition": "the same motions again, unseen repetitions",
-    "unseen": "other motions, unseen",
-    "static": "static postures, unseen",
+    "repetition": "The same motions again, settled, by models fitted to other repetitions",
+    "start_stop": "Starts and stops of those motions",
+    "unseen_motion": "Other motions, held out",
+    "static": "Static postures, held out",
 }
 _HELPS = 10.0  # [%]
 
 
 @dataclass(frozen=True)
-class JointRegimes:
-    """One joint; a regime it was not excited in is None, in the order of `REGIMES`."""
+class RegimeRows:
+    """One regime: what it is, its rows by joint, and where the model helps in a sentence."""
 
-    joint: str
-    found: tuple[Regime | None, ...]
-
-
-def joint_regimes(regimes: Sequence[Regime]) -> tuple[JointRegimes, ...]:
-    """A line for each joint."""
-    found = {(r.joint, r.regime): r for r in regimes}
-    joints = dict.fromkeys(r.joint for r in regimes)
-    return tuple(JointRegimes(j, tuple(found.get((j, regime)) for regime in REGIMES)) for j in joints)
+    meaning: str
+    rows: tuple[Regime, ...]
+    sentence: str
 
 
-def sentences(regimes: Sequence[Regime]) -> tuple[str, ...]:
-    """One for each regime: where it helps, where not."""
-    return tuple(_sentence(m, mine) for k, m in REGIMES.items() if (mine := [r for r in regimes if r.regime == k]))
+def by_regime(regimes: Sequence[Regime]) -> tuple[RegimeRows, ...]:
+    """The regimes there are, the model's own first; others than ours by their name."""
+    names = dict.fromkeys((*REGIMES, *(r.regime for r in regimes)))
+    groups = ((REGIMES.get(name, name), tuple(r for r in regimes if r.regime == name)) for name in names)
+    return tuple(RegimeRows(meaning, rows, _sentence(meaning, rows)) for meaning, rows in groups if rows)
 
 
-def _sentence(meaning: str, mine: Sequence[Regime]) -> str:
-    helped = [r for r in mine if r.cut_percent >= _HELPS]
-    harmed = [r.joint.removesuffix("_joint") for r in mine if r.cut_percent < 0.0]
-    text = f"{meaning[0].upper()}{meaning[1:]}: the rms falls by 10 % or more in {len(helped)} of {len(mine)} joints"
-    if helped:
-        low, high = (f(r.cut_percent for r in helped) for f in (min, max))
-        text += f" (by {low:.0f} to {high:.0f} %)" if len(helped) > 1 else f" (by {low:.0f} %)"
-    return text + (f" and grows in {', '.join(harmed)}." if harmed else ".")
+def _sentence(meaning: str, rows: Sequence[Regime]) -> str:
+    cuts = [r.cut_percent for r in rows if r.cut_percent >= _HELPS]
+    harmed, as_it_was = (
+        ", ".join(r.joint.removesuffix("_joint") for r in rows if chosen(r))
+        for chosen in (lambda r: r.cut_percent < 0.0, lambda r: r.cut_percent == 0.0)
+    )
+    text = f"{meaning}: the rms falls by 10 % or more in {len(cuts)} of {len(rows)} joints"
+    if cuts:
+        text += f" (by {min(cuts):.0f} to {max(cuts):.0f} %)" if len(cuts) > 1 else f" (by {cuts[0]:.0f} %)"
+    text += f", grows in {harmed}" if harmed else ""
+    return text + (f", is left as it is in {as_it_was}." if as_it_was else ".")

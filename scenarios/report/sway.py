@@ -35,11 +35,20 @@ _HEIGHT = 5.2  # [inch] of the figure
 
 @dataclass(frozen=True)
 class Predicted:
-    """The base as one source of the wrench predicts it: x (n, 6) [mm, mrad], R2 (6,), axes that are moved (6,)."""
+    """The base as one source of the wrench predicts it.
+
+    Attributes:
+        source: `plate` or `dynamics`.
+        x: (n, 6) [mm, mrad].
+        r2: (6,) over all that counts.
+        r2_middle: (6,) over the middle half of the trial, away from the jolts of start and stop.
+        moves: (6,) axes that are moved.
+    """
 
     source: str
     x: np.ndarray
     r2: np.ndarray
+    r2_middle: np.ndarray
     moves: np.ndarray
 
 
@@ -65,6 +74,11 @@ class Sway:
         return np.asarray((self.t > REFERENCE) & np.isfinite(self.measured).all(axis=1))
 
     @property
+    def middle(self) -> np.ndarray:
+        """(n,) the middle half of the trial."""
+        return np.asarray(self.scored & (np.abs(self.t / self.t[-1] - 0.5) < 0.25))
+
+    @property
     def spread(self) -> np.ndarray:
         """Peak to peak of the measured motion (6,) [mm, mrad]."""
         return np.ptp(self.measured[self.scored], axis=0)
@@ -88,14 +102,15 @@ class AxisSway:
         unit: Of what follows.
         spread: Peak to peak of what was measured.
         shifted: Where it stands in the end, measured.
-        found: By source of the wrench: R2, None where the axis is left still, and the rms that is left.
+        found: By source of the wrench: R2 and that of the middle half, None where the axis is left still, and the rms
+            that is left.
     """
 
     axis: str
     unit: str
     spread: float
     shifted: float
-    found: tuple[tuple[float | None, float], ...]
+    found: tuple[tuple[float | None, float | None, float], ...]
 
 
 def sway(results: Results) -> tuple[Sway | None, str]:
@@ -126,7 +141,8 @@ def _of_trial(prepared: Predictor, suspension: Suspension, entry: TrialEntry, tr
         if source == "dynamics" or (prepared.plate is not None and len(trial.t_plate)):
             at_mocap = _UNIT * rest.displacement(base_poses(suspension, lab, trial, source))
             x = np.stack([np.interp(smooth.t, trial.t_mocap, column) for column in at_mocap.T], axis=1)
-            predicted.append(Predicted(source, x, _r2(measured, x, alone.scored), suspension.moves(source)))
+            whole, middle = (_r2(measured, x, rows) for rows in (alone.scored, alone.middle))
+            predicted.append(Predicted(source, x, whole, middle, suspension.moves(source)))
     if not predicted:
         raise NotEnoughData(f"trial {entry.id} has no wrench of a source the suspension was tried with")
     return replace(alone, predicted=tuple(predicted))
@@ -141,10 +157,14 @@ def lines(found: Sway) -> tuple[AxisSway, ...]:
             UNITS[k],
             float(spread[k]),
             float(found.shifted[k]),
-            tuple((float(p.r2[k]) if p.moves[k] else None, float(left[p.source][k])) for p in found.predicted),
+            tuple((*_moved(p, k), float(left[p.source][k])) for p in found.predicted),
         )
         for k in range(6)
     )
+
+
+def _moved(p: Predicted, k: int) -> tuple[float | None, float | None]:
+    return (float(p.r2[k]), float(p.r2_middle[k])) if p.moves[k] else (None, None)
 
 
 def _r2(measured: np.ndarray, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -165,6 +185,7 @@ def drawn(found: Sway) -> Figure:
             ax.set_title("R2 " + ", ".join(f"{p.source} {_worth(p, k)}" for p in found.predicted), fontweight="normal")
         for ax in axes[2]:
             ax.set_xlabel("time since the start of the trial [s]")
+        page.align_ylabels(axes)
         handles, labels = axes[0, 0].get_legend_handles_labels()
         page.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.05, 1.0), ncols=len(labels))
     return page
