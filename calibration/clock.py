@@ -2,6 +2,7 @@
 
     t_mocap = s (1 + drift) + offset                      s on the instrument's clock [s]
     lag_k = offset + drift s_k + noise_k                  s_k the middle of trial k
+    drift_k = drift + noise'_k                            where a trial is long enough to show its own
     var noise_k = B^2 (sigma_k^2 + floor^2)               B^2 = max(1, chi2 / degrees of freedom)   (Birge ratio)
 
 The model errors of a trial grow with its own sigma: what moves little shows little, and most of it wrong. What all
@@ -19,7 +20,7 @@ from calibration.lag import Lag
 
 _DRIFT = 1e-4  # prior standard deviation of a clock's drift [-]: 100 ppm
 _FAR = 5.0  # robust standard deviations
-_TRIAL = 1e-4  # [s] floor of a trial's sigma
+_TRIAL = 5e-5  # [s] floor of a trial's sigma; twice it over the trial is that of its own drift
 
 
 @dataclass(frozen=True)
@@ -58,11 +59,23 @@ def shared_clock(instrument: str) -> Clock:
 
 @dataclass(frozen=True)
 class TrialLag:
-    """Lag of one trial, at time s [s] of the instrument's clock."""
+    """What one trial says of a clock.
+
+    Attributes:
+        trial_id: The trial.
+        s: Time on the instrument's clock [s] at which lag and drift are uncorrelated.
+        lag: At s.
+        drift: Within the trial [-].
+        drift_sigma: Its standard deviation [-]; infinite where the trial alone does not tell.
+        duration: Of the trial [s].
+    """
 
     trial_id: str
     s: float
     lag: Lag
+    drift: float = 0.0
+    drift_sigma: float = np.inf
+    duration: float = np.inf
 
 
 def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> tuple[Clock, tuple[str, ...]]:
@@ -85,8 +98,8 @@ def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> t
     lag = np.array([t.lag.value for t in trials])
     sigma = np.array([np.hypot(t.lag.sigma, _TRIAL) for t in trials])
     kept = _inliers(s, lag, sigma)
-    fit = _line(s[kept], lag[kept], sigma[kept])
-    (offset, drift), (var_lag, var_drift), centre = fit
+    within = np.array([(t.drift, np.hypot(t.drift_sigma, 2.0 * _TRIAL / t.duration)) for t in trials])[kept]
+    (offset, drift), (var_lag, var_drift), centre = _line(s[kept], lag[kept], sigma[kept], within)
     var_lag += common**2
     J = np.array([[1.0, -centre], [0.0, 1.0]])
     covariance = J @ np.diag([var_lag, var_drift]) @ J.T
@@ -105,13 +118,19 @@ def _inliers(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     return np.abs(r) <= _FAR * np.hypot(spread, sigma)
 
 
-def _line(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """(lag at the centre, drift), their variances, and the centre: weighted least squares, a prior on the drift."""
-    w = sigma**-2.0
+def _line(
+    s: np.ndarray, lag: np.ndarray, sigma: np.ndarray, within: np.ndarray
+) -> tuple[tuple[float, float], tuple[float, float], float]:
+    """(lag at the centre, drift), their variances, and the centre: weighted least squares, a prior on the drift.
+
+    `within` (n, 2) is each trial's own drift and its sigma [-].
+    """
+    w, w_drift = sigma**-2.0, within[:, 1] ** -2.0
     centre, reference = float(w @ s / w.sum()), float(w @ lag / w.sum())
     d = s - centre
-    information = float(w @ d**2) + _DRIFT**-2
-    drift = float(w @ (d * (lag - reference))) / information
-    chi2, dof = float(w @ (lag - reference - drift * d) ** 2), len(s) - 2
+    information = float(w @ d**2 + w_drift.sum()) + _DRIFT**-2
+    drift = float(w @ (d * (lag - reference)) + w_drift @ within[:, 0]) / information
+    chi2 = float(w @ (lag - reference - drift * d) ** 2 + w_drift @ (within[:, 0] - drift) ** 2)
+    dof = len(s) + int((w_drift > 0.0).sum()) - 2
     birge = max(1.0, chi2 / dof) if dof > 0 else 1.0
     return (reference, drift), (birge / float(w.sum()), birge / information), centre

@@ -1,43 +1,39 @@
 """The robot's clock once more, from whole poses, a provisional geometry and the joints that gravity holds.
 
     r(t) = log6(T_measured(t)^-1 T_B_H(q(t - lag)))
-         = d_lag sum_loaded J_j dq_j + c + sum_loaded J_j (o_j + a_j q_j + b_j tau_j + h_j sgn(dq_j))
-                                         + sum_others d_j J_j dq_j + noise
+         = (lag + drift (t - t0)) sum_held J_j dq_j + sum_others d_j J_j dq_j + J_theta e + noise
+           + sum_held J_j (o_j+- + a_j q_j + b_j tau_j + h_jw lost_w(q_j))
 
 Behind a gear the link is not where the motor is, and a gear without load lags by 4 gap / (pi amplitude omega): ten
-milliseconds and more. So only joints whose gravity torque tau_j keeps its sign throughout a trial, which stay on one
-flank, speak of the clock; zeros, elasticity and dry friction of theirs are nuisances. Each other joint has a lag of its
-own and random errors as large as any gear's. The remaining noise is the markers' and each joint's random reading error,
-by its lever arm. Static postures depend on the clock so little that milliseconds do not matter to the geometry.
+milliseconds and more. So a joint speaks of the clock only while its gravity torque tau_j keeps it on a flank; zeros of
+either flank, elasticity and dry friction (play of 0.1 and 0.4 mrad, weights of 1) are its nuisances. Otherwise it has a
+lag of its own and random errors as large as any gear's. e are the errors of the provisional geometry, as large as its
+fit says. The remaining noise is the markers' and each joint's random reading error, by its lever arm.
 """
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
-from calibration.bodies import BodyPoses, poses_of
-from calibration.clock import Clock, TrialLag
+from calibration.clock import Clock, TrialLag, fit_clock
+from calibration.clock_samples import Samples, read_samples
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel, nominal_hand
 from calibration.hand_fit import fit
 from calibration.inverse_dynamics import JointMotion
-from calibration.lag import Lag, long_run_variance
-from calibration.markers import base_body, hand_body
+from calibration.lag import Lag, long_run_covariance
 from calibration.parameters import geometry_parameters, play_floor, play_start
-from calibration.postures import read_postures
+from calibration.postures import Postures, read_passing, read_postures
 from calibration.recording import Trial
 from calibration.robot import Chain
 from calibration.schema import Description
-from calibration.se3 import adjoint, inverse, rotation_vector
+from calibration.se3 import inverse, rotation_vector
 
-_STRIDE = 2  # motion-capture samples
-_ENOUGH = 100  # samples
+_SPACING, _PASSED = 0.5, 250  # [s] between postures passed through, at least; so many of them, about
 _MOVES = 0.05  # [rad, m] a joint must move to count as moving
 _LOADED, _TORQUE = 0.1, 0.3  # a joint is loaded while |tau| exceeds this share of its largest, and this [N.m, N]
-_JERK, _AFTER = 3.0, 0.3  # samples within _AFTER [s] of faster accelerations [rad/s2, m/s2] are left out: links bounce
 _SLOW = 0.02  # [rad/s, m/s] below which dry friction has no sign
 _FREE = 0.02  # [rad, m] random error of a joint that is not loaded: more than any gear's play
 _log = logging.getLogger(__name__)
@@ -49,50 +45,45 @@ class Provisional:
 
     Attributes:
         hand: Calibrated on the static postures.
+        root: (p, p) Cholesky factor of its parameters' covariance.
         play: (k,) random reading error of each joint [rad, m].
         largest: (k,) largest gravity torque of each joint in the campaign [N.m, N].
     """
 
     hand: HandModel
+    root: np.ndarray
     play: np.ndarray
     largest: np.ndarray
 
 
-@dataclass(frozen=True)
-class Samples:
-    """One trial on the motion capture's clock, where base and hand are seen.
-
-    Attributes:
-        t: (n,) [s].
-        q: (n, n_measured) readings [rad, m].
-        v: (n, k) rates of the chain's joints [rad/s, m/s].
-        T: (n, 4, 4) measured T_B_H.
-        covariance: (n, 6, 6) of its local twist [m, rad].
-    """
-
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    T: np.ndarray
-    covariance: np.ndarray
-
-
 def provisional(chain: Chain, description: Description, trials: Sequence[Trial], robot: Clock) -> Provisional:
-    """Calibrate on the static postures with an approximate clock.
+    """Calibrate on the static postures and on those passed through, with an approximate clock.
 
     Raises:
-        NotEnoughData: No static posture, or a fit that does not converge.
+        NotEnoughData: Base and hand are not seen together, or a fit that does not converge.
     """
     parameters = geometry_parameters(chain, description)
     nominal = nominal_hand(chain, parameters.nominal[:12])
-    postures = read_postures(description, trials, robot)
+    postures = _postures(description, trials, robot)
     start, floor = play_start(chain, description), play_floor(chain, description)
     found = fit(nominal, parameters, postures, start, floor)
     if not found.converged:
         raise NotEnoughData("the provisional geometry did not converge")
     hand = nominal.with_theta(found.theta)
     some = np.concatenate([trial.q_motor[:: max(1, len(trial.t_robot) // 200)] for trial in trials])
-    return Provisional(hand, found.play, np.abs(_gravity_torques(hand, some)).max(axis=0))
+    return Provisional(
+        hand, np.linalg.cholesky(found.covariance), found.play, np.abs(_gravity_torques(hand, some)).max(axis=0)
+    )
+
+
+def _postures(description: Description, trials: Sequence[Trial], robot: Clock) -> Postures:
+    """Static postures, if any, and those passed through, evenly spaced over all trials."""
+    seconds = sum(float(trial.t_mocap[-1] - trial.t_mocap[0]) for trial in trials)
+    passed = read_passing(description, trials, robot, max(_SPACING, seconds / _PASSED))
+    try:
+        return read_postures(description, trials, robot).joined(passed)
+    except NotEnoughData:
+        return passed
 
 
 def refined_lags(robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock) -> list[TrialLag]:
@@ -100,7 +91,7 @@ def refined_lags(robot: Provisional, description: Description, trials: Sequence[
     lags = []
     for trial in trials:
         try:
-            lags.append(_refined(robot, _samples(description, trial, clock, calm=True), trial.id, clock))
+            lags.append(_refined(robot, read_samples(description, trial, clock, calm=True), trial.id, clock))
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
     return lags
@@ -113,7 +104,7 @@ def link_angles(robot: Provisional, description: Description, trial: Trial, cloc
 
     Joints that are not on the way to the hand keep their readings.
     """
-    x = _samples(description, trial, clock, calm=False)
+    x = read_samples(description, trial, clock, calm=False)
     J, D = robot.hand.joint_jacobians(x.q), robot.play**2
     r = _residuals(x.T, robot.hand.poses(x.q))
     C = x.covariance + (J * D) @ np.swapaxes(J, 1, 2)
@@ -122,63 +113,59 @@ def link_angles(robot: Provisional, description: Description, trial: Trial, cloc
     return JointMotion(x.t, q)
 
 
-def _samples(description: Description, trial: Trial, clock: Clock, calm: bool) -> Samples:
-    """Every other sample, without jerky motion if only `calm` ones are wanted."""
-    base, hand = poses_of(base_body(description), trial), poses_of(hand_body(description), trial)
-    s, T = clock.from_mocap(trial.t_mocap), inverse(base.T) @ hand.T
-
-    def at(x: np.ndarray) -> np.ndarray:
-        return np.stack([np.interp(s, trial.t_robot, c, left=np.nan, right=np.nan) for c in x.T], axis=1)
-
-    rates = np.gradient(trial.q_motor, trial.t_robot, axis=0)
-    jerked = np.abs(np.gradient(rates, trial.t_robot, axis=0)).max(axis=1) > _JERK
-    near = maximum_filter1d(jerked.astype(float), 2 * int(_AFTER / np.median(np.diff(trial.t_robot))) + 1)
-    q, v, wanted = at(trial.q_motor), at(rates), (at(near[:, None])[:, 0] == 0.0) | (not calm)
-    rows = np.flatnonzero(wanted & np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]
-    if len(rows) < _ENOUGH:
-        raise NotEnoughData("base and hand are hardly in view, or all motion is jerky")
-    return Samples(trial.t_mocap[rows], q[rows], v[rows], T[rows], _covariances(T, base, hand, rows, description))
-
-
-def _covariances(
-    T: np.ndarray, base: BodyPoses, hand: BodyPoses, rows: np.ndarray, description: Description
-) -> np.ndarray:
-    Ad = adjoint(inverse(T[rows]))
-    C = hand.covariance[rows] + Ad @ base.covariance[rows] @ np.swapaxes(Ad, 1, 2)
-    return description.sigmas.marker**2 * C
-
-
 def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> TrialLag:
-    """Least squares for the lag with the nuisances eliminated, its sigma allowing for autocorrelation."""
+    """Least squares for lag and drift with the nuisances eliminated, their covariance allowing for autocorrelation."""
     hand, columns = robot.hand, robot.hand.chain.columns
-    v, tau = x.v[:, columns], _gravity_torques(hand, x.q)
-    loaded = np.abs(tau).min(axis=0) > np.maximum(_TORQUE, _LOADED * robot.largest)
-    moves = np.ptp(x.q[:, columns], axis=0) > _MOVES
-    if not (loaded & moves).any():
+    q, v, tau = x.q[:, columns], x.v[:, columns], _gravity_torques(hand, x.q)
+    held = np.abs(tau) > np.maximum(_TORQUE, _LOADED * robot.largest)
+    speaks = held & (np.ptp(np.where(held, q, _median(q, held)), axis=0) > _MOVES)
+    if not speaks.any():
         raise NotEnoughData("no joint moves that gravity holds on one flank")
-    J = hand.joint_jacobians(x.q)
-    moved = J * np.where(loaded, robot.play, np.maximum(robot.play, _FREE))
+    at = hand.poses_and_derivatives(x.q)
+    moved = at.J_joint * np.where(held, robot.play, np.maximum(robot.play, _FREE))[:, None]
     W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
-    J = W @ J
-    shapes = (np.ones_like(v), x.q[:, columns] - x.q[:, columns].mean(axis=0), tau, np.tanh(v / _SLOW))
-    held = [(J * shape[:, None])[:, :, loaded & moves] for shape in shapes]
-    A = np.concatenate([W, *held, (J * v[:, None])[:, :, ~loaded]], axis=2).reshape(6 * len(v), -1)
-    slope = (J * v[:, None])[:, :, loaded].sum(axis=2)
-    r = W @ _residuals(x.T, hand.poses(x.q))[..., None]
-    y = _orthogonal_to(A, np.column_stack([r.ravel(), slope.ravel()]))
-    information = float(y[:, 1] @ y[:, 1])
-    change = float(y[:, 0] @ y[:, 1]) / information
-    psi = (y[:, 1] * (y[:, 0] - change * y[:, 1]) / information).reshape(-1, 6).sum(axis=1)
-    sigma = float(np.sqrt(long_run_variance(psi, 1.0 / float(np.median(np.diff(x.t))))))
-    middle = float(np.average(x.t, weights=(y[:, 1] ** 2).reshape(-1, 6).sum(axis=1)))
-    s = float(clock.from_mocap(np.array([middle]))[0])
-    return TrialLag(trial_id, s, Lag(middle - s + change, sigma, 1.0))
+    J = W @ at.J_joint
+    shapes = (tau > 0.0, tau < 0.0, q - q.mean(axis=0), tau)
+    free = [J * (v * ~speaks)[:, None], *(J * (speaks * shape)[:, None] for shape in shapes)]
+    known = [J * (speaks * lost)[:, None] for lost in np.moveaxis(x.lost[:, columns], 2, 0)]
+    A = np.concatenate(free, axis=2).reshape(6 * len(v), -1)
+    B = np.concatenate([W @ at.J @ robot.root, *known], axis=2).reshape(6 * len(v), -1)
+    slope = (J * (v * speaks)[:, None]).sum(axis=2)
+    middle = float(np.average(x.t, weights=(slope**2).sum(axis=1)))
+    r = W @ _residuals(x.T, at.T)[..., None]
+    S = np.stack([slope, slope * (x.t - middle)[:, None]], axis=2).reshape(-1, 2)
+    return _told(_orthogonal_to(A, B, np.column_stack([r.ravel(), S])), x.t, middle, trial_id, clock)
 
 
-def _orthogonal_to(A: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Columns y without what the columns of A explain."""
-    A = A / np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
-    return y - A @ np.linalg.lstsq(A, y, rcond=1e-8)[0]
+def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Median (k,) of each joint's held readings (n, k); of all of them where it is never held."""
+    return np.nanmedian(np.where(held | ~held.any(axis=0), q, np.nan), axis=0)
+
+
+def _told(y: np.ndarray, t: np.ndarray, middle: float, trial_id: str, clock: Clock) -> TrialLag:
+    """Lag and drift from whitened residuals and slopes (6 n + b, 3), at the instant where they are uncorrelated."""
+    r, S = y[:, 0], y[:, 1:]
+    scale = np.linalg.norm(S, axis=0)
+    inverse_information = np.linalg.inv(S.T @ S / np.outer(scale, scale)) / np.outer(scale, scale)
+    change = inverse_information @ (S.T @ r)
+    psi, n = (r - S @ change)[:, None] * (S @ inverse_information), len(t)
+    in_time, prior = psi[: 6 * n].reshape(n, 6, 2).sum(axis=1), psi[6 * n :]
+    C = long_run_covariance(in_time, 1.0 / float(np.median(np.diff(t)))) + prior.T @ prior
+    shift = float(np.clip(-C[0, 1] / C[1, 1], t[0] - middle, t[-1] - middle))
+    at = middle + shift
+    s = float(clock.from_mocap(np.array([at]))[0])
+    sigma = float(np.sqrt(C[0, 0] + 2 * shift * C[0, 1] + shift**2 * C[1, 1]))
+    lag = Lag(at - s + float(change[0] + shift * change[1]), sigma, 1.0)
+    return TrialLag(trial_id, s, lag, clock.drift + float(change[1]), float(np.sqrt(C[1, 1])), float(t[-1] - t[0]))
+
+
+def _orthogonal_to(A: np.ndarray, B: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Columns y (m, c) without what columns A, free, and B, with coefficients N(0, 1), explain: (m + b, c)."""
+    size, b = np.linalg.norm(A, axis=0), B.shape[1]
+    A = A[:, size > 0.0] / size[size > 0.0]
+    D = np.block([[A, B], [np.zeros((b, A.shape[1])), np.eye(b)]])
+    y = np.concatenate([y, np.zeros((b, y.shape[1]))])
+    return y - D @ np.linalg.lstsq(D, y, rcond=1e-8)[0]
 
 
 def _residuals(T_measured: np.ndarray, T: np.ndarray) -> np.ndarray:
@@ -195,7 +182,7 @@ def _gravity_torques(hand: HandModel, q: np.ndarray) -> np.ndarray:
 def refined(
     robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock, passes: int = 2
 ) -> list[TrialLag]:
-    """Lags from poses; each pass starts from the one before, shifted by its median.
+    """Lags from poses; each pass starts from the clock of the one before.
 
     Raises:
         NotEnoughData: No trial moves a joint that gravity holds.
@@ -205,6 +192,5 @@ def refined(
         lags = refined_lags(robot, description, trials, clock)
         if not lags:
             raise NotEnoughData("no trial moves a joint that gravity holds on one flank")
-        off = [t.lag.value - clock.offset - clock.drift * t.s for t in lags]
-        clock = replace(clock, offset=clock.offset + float(np.median(off)))
+        clock = fit_clock(clock.instrument, lags)[0]
     return lags

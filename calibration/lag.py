@@ -114,6 +114,12 @@ def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> t
 
 def long_run_variance(psi: np.ndarray, rate: float) -> float:
     """Variance of sum(psi), sampled at `rate` [Hz], allowing for autocorrelation up to `_MEMORY` (Bartlett weights)."""
-    c = correlate(psi, psi, mode="full", method="fft")
-    k = np.abs(correlation_lags(len(psi), len(psi)))
-    return float((c * np.clip(1.0 - k / (_MEMORY * rate), 0.0, None)).sum())
+    return float(long_run_covariance(psi[:, None], rate)[0, 0])
+
+
+def long_run_covariance(psi: np.ndarray, rate: float) -> np.ndarray:
+    """The same of the sums of psi (n, c): covariance (c, c)."""
+    n, c = psi.shape
+    weight = np.clip(1.0 - np.abs(correlation_lags(n, n)) / (_MEMORY * rate), 0.0, None)
+    both = [[weight @ correlate(a, b, mode="full", method="fft") for b in psi.T] for a in psi.T]
+    return np.array(both).reshape(c, c)

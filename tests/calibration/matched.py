@@ -82,6 +82,11 @@ def hand_in_base(truth: Truth, q: np.ndarray) -> np.ndarray:
     return out
 
 
+def positions(T: np.ndarray, xyz: list[list[float]]) -> np.ndarray:
+    """Markers (n, m, 3) of a cluster along its poses (n, 4, 4)."""
+    return np.einsum("nij,mj->nmi", T[:, :3, :3], np.array(xyz)) + T[:, None, :3, 3]
+
+
 def random_angles(rng: np.random.Generator, n: int, torso: bool = True) -> np.ndarray:
     m = model(Truth())
     q = np.array([rng.uniform(m.lowerPositionLimit, m.upperPositionLimit) for _ in range(n)])
@@ -144,10 +149,7 @@ def record(
     T_lab_base = se3(np.array([0.9, 0.5, 0.0, 0.0, 0.0, -1.6]))
     T_lab_B = T_lab_base @ se3(truth.base)
     T = {"base": np.repeat(T_lab_B[None], n, axis=0), "gripper": T_lab_B @ hand_in_base(truth, at(link, t_mocap))}
-    position = np.concatenate(
-        [np.einsum("nij,mj->nmi", T[b][:, :3, :3], np.array(x)) + T[b][:, None, :3, 3] for b, (_, x) in BODIES.items()],
-        axis=1,
-    )
+    position = np.concatenate([positions(T[b], x) for b, (_, x) in BODIES.items()], axis=1)
     position = position + truth.marker_sigma * rng.normal(size=position.shape)
     t_plate = np.arange(int(t[-1] * 200.0)) / 200.0 + 0.5 / 200.0
     wrench = np.zeros((len(t_plate), 6))
