@@ -121,7 +121,7 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     speaks = held & (np.ptp(np.where(held, q, _median(q, held)), axis=0) > _MOVES)
     if not speaks.any():
         raise NotEnoughData("no joint moves that gravity holds on one flank")
-    at = hand.poses_and_derivatives(x.q)
+    at = hand.poses_and_derivatives(x.q, tau, len(robot.root))
     moved = at.J_joint * np.where(held, robot.play, np.maximum(robot.play, _FREE))[:, None]
     W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
     J = W @ at.J_joint

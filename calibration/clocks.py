@@ -39,7 +39,7 @@ from calibration.se3 import inverse
 from calibration.signals import Signal, body_rates, even, low_passed
 from calibration.verdict import Verdict
 
-_COMMON = {"robot": 1e-4, "plate": 3e-4}  # what all trials share [s]: dry friction winds gears, the link is late
+_COMMON = {"robot": 1.5e-4, "plate": 3e-4}  # what all trials share [s]: dry friction winds gears, the link is late
 _CUTOFF = 6.0  # robot [Hz]
 _HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
 _MOVES = 8.0  # a joint whose range exceeds this many half gaps gets that play term
