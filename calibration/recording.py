@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5netcdf
 import h5py
@@ -23,15 +23,15 @@ from calibration.errors import InputError, ShapeError
 _CLOCKS = {"t_robot": "robot", "t_mocap": "mocap", "t_plate": "plate"}
 # name: (dimensions, units, what it is, frame)
 _LAYOUT: dict[str, tuple[tuple[str, ...], str, str, str]] = {
-    "t_robot": (("t_robot",), "s", "robot clock", ""),
-    "q_motor": (("t_robot", "joint"), "rad", "motor-side reading at the joint (m for prismatic joints)", ""),
-    "q_link": (("t_robot", "joint"), "rad", "link-side reading, NaN without a link encoder", ""),
-    "v_motor": (("t_robot", "joint"), "rad/s", "motor-side velocity at the joint", ""),
-    "effort": (("t_robot", "joint"), "A", "motor current", ""),
-    "q_command": (("t_robot", "joint"), "rad", "commanded joint position", ""),
-    "t_mocap": (("t_mocap",), "s", "motion-capture clock", ""),
+    "t_robot": (("t_robot",), "s", "robot clock", "none"),
+    "q_motor": (("t_robot", "joint"), "rad", "motor-side reading at the joint (m for prismatic joints)", "joint axis"),
+    "q_link": (("t_robot", "joint"), "rad", "link-side reading, NaN without a link encoder", "joint axis"),
+    "v_motor": (("t_robot", "joint"), "rad/s", "motor-side velocity at the joint", "joint axis"),
+    "effort": (("t_robot", "joint"), "A", "motor current", "joint axis"),
+    "q_command": (("t_robot", "joint"), "rad", "commanded joint position", "joint axis"),
+    "t_mocap": (("t_mocap",), "s", "motion-capture clock", "none"),
     "marker_position": (("t_mocap", "marker", "axis"), "m", "marker positions, NaN where occluded", "lab"),
-    "t_plate": (("t_plate",), "s", "force-plate clock", ""),
+    "t_plate": (("t_plate",), "s", "force-plate clock", "none"),
     "plate_wrench": (
         ("t_plate", "plate", "wrench"),
         "N, N.m",
@@ -39,10 +39,28 @@ _LAYOUT: dict[str, tuple[tuple[str, ...], str, str, str]] = {
         "lab",
     ),
     "plate_centre": (("plate", "axis"), "m", "surface centre of each plate", "lab"),
-    "dwell_start": (("posture",), "s", "start of each dwell, mocap clock", ""),
-    "dwell_stop": (("posture",), "s", "end of each dwell, mocap clock", ""),
-    "approach": (("posture", "joint"), "1", "sign of each joint's last motion before the dwell", ""),
+    "dwell_start": (("posture",), "s", "start of each dwell, mocap clock", "none"),
+    "dwell_stop": (("posture",), "s", "end of each dwell, mocap clock", "none"),
+    "approach": (("posture", "joint"), "1", "sign of each joint's last motion before the dwell", "joint axis"),
 }
+
+
+class Variable(NamedTuple):
+    """A variable of a trial's file, as its attributes say it."""
+
+    name: str
+    dims: tuple[str, ...]
+    units: str
+    meaning: str
+    frame: str
+    clock: str
+
+
+def _clock(name: str, dims: tuple[str, ...]) -> str:
+    return _CLOCKS.get(dims[0], "mocap" if name.startswith("dwell") else "none")
+
+
+VARIABLES = tuple(Variable(n, d, u, m, f, _clock(n, d)) for n, (d, u, m, f) in _LAYOUT.items())
 _LABELS = ("joint", "marker", "marker_body", "plate")
 _EXACT = ("t_robot", "t_mocap", "t_plate", "dwell_start", "dwell_stop", "plate_centre")
 
@@ -128,11 +146,10 @@ def write_trial(path: Path, trial: Trial) -> str:
         for label in ("joint", "marker", "plate"):
             file.dimensions[label] = len(getattr(trial, label))
         write_labels(file, {label: getattr(trial, label) for label in _LABELS})
-        for name, (dims, units, meaning, frame) in _LAYOUT.items():
-            kind = "i1" if name == "approach" else "f8" if name in _EXACT else "f4"
-            clock = _CLOCKS.get(dims[0], "mocap" if name.startswith("dwell") else "")
-            attributes = {"units": units, "long_name": meaning, "frame": frame, "clock": clock}
-            write_variable(file, name, getattr(trial, name), dims, kind, attributes)
+        for v in VARIABLES:
+            kind = "i1" if v.name == "approach" else "f8" if v.name in _EXACT else "f4"
+            attributes = {"units": v.units, "long_name": v.meaning, "frame": v.frame, "clock": v.clock}
+            write_variable(file, v.name, getattr(trial, v.name), v.dims, kind, attributes)
     return sha256(path)
 
 
@@ -141,18 +158,17 @@ def write_labels(file: h5netcdf.File, names: Mapping[str, tuple[str, ...]]) -> N
     for label, values in names.items():
         dims = ("marker" if label == "marker_body" else label,)
         data = np.array(values, dtype=object) if values else None
-        file.create_variable(label, dims, dtype=h5py.string_dtype(), data=data)
+        variable = file.create_variable(label, dims, dtype=h5py.string_dtype(), data=data)
+        variable.attrs.update(units="none", frame="none", clock="none")
 
 
 def write_variable(
     file: h5netcdf.File, name: str, data: np.ndarray, dims: tuple[str, ...], kind: str, attributes: Mapping[str, str]
 ) -> None:
-    """Write an array, packed, with those attributes that are not empty."""
+    """Write an array, packed, with its attributes; one that is empty says `none`."""
     packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if data.size else {}
     variable = file.create_variable(name, dims, dtype=kind, data=data.astype(kind), **packing)
-    for key, value in attributes.items():
-        if value:
-            variable.attrs[key] = value
+    variable.attrs.update({key: value or "none" for key, value in attributes.items()})
 
 
 def labels(file: h5netcdf.File, name: str) -> tuple[str, ...]:

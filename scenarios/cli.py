@@ -13,7 +13,9 @@ from typing import Annotated, Literal
 
 import typer
 
+from scenarios import command_dataset
 from scenarios.errors import ScenarioError
+from scenarios.options import Out, Overrides, Quick, ScenarioName, Seed, overriding
 
 FAILED = 1
 WRONG_INPUT = 2
@@ -26,16 +28,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="A robot whose truth is known, measured, calibrated and judged.",
 )
-
-ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.")]
-Out = Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")]
-Seed = Annotated[
-    int | None, typer.Option(min=0, metavar="N", help="Root of all randomness, instead of the scenario's.")
-]
-Quick = Annotated[bool, typer.Option("--quick", help="The scenario's short variant.")]
-Overrides = Annotated[
-    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="A value instead of the scenario's; repeatable.")
-]
 
 
 @app.callback()
@@ -65,7 +57,7 @@ def run(
     """Simulate, calibrate, evaluate and report."""
     from scenarios import console, steps
 
-    loaded = steps.load(scenario, _overrides(overrides, seed))
+    loaded = steps.load(scenario, overriding(overrides, seed))
     out = out or Path("runs") / loaded.name
     with console.progress() as progress:
         result = steps.run(loaded, out, quick=quick, progress=progress)
@@ -83,7 +75,7 @@ def simulate(
     """Write dataset/ and truth/ of a scenario."""
     from scenarios import console, steps
 
-    loaded = steps.load(scenario, _overrides(overrides, seed))
+    loaded = steps.load(scenario, overriding(overrides, seed))
     with console.progress() as progress:
         steps.simulate(loaded.quick() if quick else loaded, out, progress)
     typer.echo(f"Dataset: {out / 'dataset'}\nTruth: {out / 'truth'}")
@@ -160,6 +152,9 @@ def import_(
     typer.echo(f"Dataset: {out}")
 
 
+app.command("dataset")(command_dataset.dataset)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command and exit with its code; what a user can mend or must know is told without a traceback."""
     before = signal.signal(signal.SIGTERM, _terminate)
@@ -185,10 +180,6 @@ def _domain_errors() -> tuple[type[Exception], ...]:
     from twin.errors import TwinError
 
     return CalibrationError, TwinError
-
-
-def _overrides(given: Sequence[str] | None, seed: int | None) -> list[str]:
-    return [*(given or ()), *(() if seed is None else (f"seed={seed}",))]
 
 
 def _fail(error: Exception, code: int) -> None:

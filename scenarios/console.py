@@ -16,6 +16,8 @@ from scenarios.steps import Progress
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
+    from scenarios.collection.row import Row
+
 PLAIN_WIDTH = 120
 """Width of a table where there is no terminal [characters]."""
 
@@ -79,6 +81,19 @@ def show(table: Table) -> None:
     if not console.is_terminal:
         console = Console(width=PLAIN_WIDTH)
     console.print(table)
+
+
+def show_rows(rows: "Sequence[Row]", most: int = 5) -> None:
+    """Print how many runs of a collection ended well, and on stderr why some did not."""
+    bad = [row for row in rows if row.status != "ok"]
+    Console().print(
+        f"{len(rows) - len(bad)} of {len(rows)} runs, {sum(row.bytes for row in rows) / 1e6:.1f} MB", highlight=False
+    )
+    errors = Console(stderr=True)
+    for row in bad[:most]:
+        errors.print(f"run {row.id} {row.status}: {row.reason}", markup=False, highlight=False, soft_wrap=True)
+    if len(bad) > most:
+        errors.print(f"and {len(bad) - most} more; index.csv has them all", highlight=False)
 
 
 def ladder(results: Path) -> Table:

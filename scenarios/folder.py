@@ -49,7 +49,7 @@ def replacing(out: Path | str, kind: Kind) -> Iterator[Path]:
         ScenarioError: `out` is something that must not be overwritten, or cannot be written.
     """
     out = Path(out).resolve()
-    _check_replaceable(out, kind)
+    check_replaceable(out, kind)
     with _beside(out) as work:
         yield work / "new"
         _move([(work / "new", out)], work)
@@ -80,7 +80,12 @@ def updating(out: Path | str, names: Collection[str]) -> Iterator[Path]:
             _move([(new / name, out / name) for name in moving], work)
 
 
-def _check_replaceable(out: Path, kind: Kind) -> None:
+def check_replaceable(out: Path, kind: Kind) -> None:
+    """See that writing a folder of this kind at `out` loses no file of the user's.
+
+    Raises:
+        ScenarioError: It is a file, the folder one is in, or holds what this program does not write.
+    """
     if not out.exists():
         return
     if not out.is_dir():

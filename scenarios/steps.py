@@ -9,8 +9,7 @@ Importing this module is cheap: the engines are imported by the step that needs 
 
 import json
 import platform
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from scenarios import folder
 from scenarios.errors import ScenarioError
+from scenarios.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from calibration import Estimate, Evaluation
@@ -94,7 +94,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
         CalibrationError: The data do not allow a result that may be used; nothing is written.
     """
     scenario = scenario.quick() if quick else scenario
-    with folder.replacing(out, folder.RUN) as new, _one_blas_thread():
+    with folder.replacing(out, folder.RUN) as new, one_blas_thread():
         _simulate(scenario, new, progress)
         estimate = _calibrate(new / "dataset", new / "estimate", None, scenario.calibration, progress)
         evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
@@ -105,7 +105,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
 
 def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent) -> None:
     """Write dataset/, truth/ and scenario.yaml into the run folder `out`."""
-    with folder.replacing(out, folder.RUN) as new, _one_blas_thread():
+    with folder.replacing(out, folder.RUN) as new, one_blas_thread():
         _simulate(scenario, new, progress)
 
 
@@ -136,7 +136,7 @@ def calibrate(
     unknown = [name for name in stages or () if name not in STAGES]
     if unknown:
         raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
-    with folder.replacing(out, folder.ESTIMATE) as new, _one_blas_thread():
+    with folder.replacing(out, folder.ESTIMATE) as new, one_blas_thread():
         return _calibrate(Path(dataset), new, stages, options, progress)
 
 
@@ -167,7 +167,7 @@ def evaluate(
     progress: Progress = silent,
 ) -> tuple["Evaluation", "Score | None"]:
     """Write evaluation.json into the folder `out`, and score.json where a truth is given; the rest of `out` stays."""
-    with folder.updating(out, folder.EVALUATION) as new, _one_blas_thread():
+    with folder.updating(out, folder.EVALUATION) as new, one_blas_thread():
         evaluation = _evaluate(Path(estimate), Path(dataset), new, progress)
         score = None
         if truth is not None:
@@ -188,16 +188,6 @@ def report(run_folder: Path | str, progress: Progress = silent) -> Path:
 def versions() -> dict[str, str]:
     """Versions of what decides the figures of a run."""
     return {"python": platform.python_version(), **{package: version(package) for package in PACKAGES}}
-
-
-@contextmanager
-def _one_blas_thread() -> Iterator[None]:
-    """Keep linear algebra on one thread: faster for small matrices, and the same bits on any number of cores."""
-    import scipy.linalg  # noqa: F401  only what is loaded can be limited
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1, "blas"):
-        yield
 
 
 def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:

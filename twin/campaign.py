@@ -81,7 +81,9 @@ def second_session(lab: Laboratory) -> Laboratory:
     return replace(lab, robot=robot, T_lab_base=moved(lab.config, lab.T_lab_base, lab.seed))
 
 
-def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None = None) -> None:
+def record(
+    config: TwinConfig, seed: int, out: Path, progress: Progress | None = None, threads: int | None = None
+) -> None:
     """Simulate a campaign and write OUT/dataset and OUT/truth.
 
     Args:
@@ -89,6 +91,7 @@ def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None =
         seed: Root of every random stream.
         out: Folder to write into.
         progress: Called with a text and the fraction done.
+        threads: How many trials are simulated at once; None: one for each core.
 
     Raises:
         TwinError: The simulation failed; said where.
@@ -100,7 +103,7 @@ def record(config: TwinConfig, seed: int, out: Path, progress: Progress | None =
     motions = schedule(config.campaign, mjcf.spec().compile(), seed)
     starts = _EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
     entries, done, total = [], 0.0, sum(m.duration for m in motions)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         sessions = (later if m.role == CONFIRMATION else lab for m in motions)
         jobs = [pool.submit(_one, s, m, float(t), out) for s, m, t in zip(sessions, motions, starts, strict=True)]
         try:

@@ -28,6 +28,11 @@ from twin.config_values import (
 )
 from twin.uncertain import DRAWN
 
+TrialName = Literal[
+    "postures", "sweeps", "around_x", "around_y", "around_z", "x_fold", "y_fold",
+    "xyz", "xyz_mirror", "push", "postures_validation",
+]  # fmt: skip
+
 
 @dataclass(frozen=True, config=STRICT)
 class WheelType:
@@ -204,6 +209,7 @@ class Campaign:
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
         driving: Trials in which the base moves.
         carried: Whether every trial is without physics, joints and base where they are told to be.
+        only: Trials to record, `sweeps` for those of one joint; empty: all.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]
@@ -221,6 +227,7 @@ class Campaign:
     confirmation: bool = False
     driving: Driving = field(default_factory=Driving)
     carried: bool = False
+    only: tuple[TrialName, ...] = ()
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -15,8 +15,11 @@ _REGISTRATION_POSTURES = 8
 
 
 def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
-    """Calibration first (statics, spins and drives, sweeps, swings), then validation, then confirmation."""
-    return (
+    """Calibration first (statics, spins and drives, sweeps, swings), then validation, then confirmation.
+
+    Of them those the campaign asks for.
+    """
+    trials = (
         _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign),
         *driving.trials(campaign),
         *_sweeps(campaign),
@@ -27,6 +30,11 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         _statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
         *(_confirmation(campaign, nominal, seed) if campaign.confirmation else ()),
     )
+    return tuple(m for m in trials if not campaign.only or _group(m) in campaign.only)
+
+
+def _group(motion: Motion) -> str:
+    return "sweeps" if motion.kind == "sweep" else motion.name
 
 
 def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:

@@ -13,13 +13,14 @@ from twin.defects.base import Parameter
 
 _UNITS = {
     "t_mocap": "s",
-    "q_motor_true": "rad",
-    "q_link_true": "rad",
+    "q_motor_true": "rad, m for prismatic joints",
+    "q_link_true": "rad, m for prismatic joints",
     "base_pose": "1",
     "hand_pose": "1",
     "marker_position": "m",
     "plate_wrench": "N, N.m",
 }
+_FRAMES = {"t_mocap": "none", "q_motor_true": "joint axis", "q_link_true": "joint axis"}
 _DIMS = {
     "t_mocap": ("t_mocap",),
     "q_motor_true": ("t_mocap", "joint"),
@@ -72,14 +73,14 @@ def write_trial(path: Path, trial: TruthTrial) -> None:
         }
         for label in ("joint", "marker"):
             names = np.array(getattr(trial, label), dtype=object)
-            file.create_variable(label, (label,), dtype=h5py.string_dtype(), data=names)
+            variable = file.create_variable(label, (label,), dtype=h5py.string_dtype(), data=names)
+            variable.attrs.update(units="none", frame="none", clock="none")
         for name, dims in _DIMS.items():
             data = getattr(trial, name)
             variable = file.create_variable(
                 name, dims, dtype="f8", data=data, compression="gzip", compression_opts=4, shuffle=True
             )
-            variable.attrs["units"], variable.attrs["clock"] = _UNITS[name], "mocap"
-            variable.attrs["frame"] = "lab"
+            variable.attrs.update(units=_UNITS[name], frame=_FRAMES.get(name, "lab"), clock="mocap")
 
 
 def read_trial(path: Path) -> TruthTrial:

@@ -1,0 +1,27 @@
+"""Arguments and options that several commands have."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+FAILED = 1
+"""Exit code: the simulation or the fit failed, or its result must not be used."""
+
+ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.")]
+Out = Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, metavar="N", help="Root of all randomness, instead of the scenario's.")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="The scenario's short variant.")]
+Overrides = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="A value instead of the scenario's; repeatable.")
+]
+Workers = Annotated[int, typer.Option(min=0, metavar="K", help="Processes of our own; 0: this one.")]
+Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="A running dask scheduler instead.")]
+
+
+def overriding(given: Sequence[str] | None, seed: int | None) -> list[str]:
+    """The overrides with the seed among them."""
+    return [*(given or ()), *(() if seed is None else (f"seed={seed}",))]
