@@ -15,9 +15,8 @@ import typer
 
 from scenarios import command_dataset
 from scenarios.errors import ScenarioError
-from scenarios.options import Out, Overrides, Quick, ScenarioName, Seed, overriding
+from scenarios.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
 
-FAILED = 1
 WRONG_INPUT = 2
 TERMINATED = 128 + signal.SIGTERM
 
@@ -152,7 +151,7 @@ def import_(
     typer.echo(f"Dataset: {out}")
 
 
-app.command("dataset")(command_dataset.dataset)
+dataset = app.command()(command_dataset.dataset)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
