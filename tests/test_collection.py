@@ -56,7 +56,7 @@ class Started:
     said: Path
 
     def ended(self):
-        code = self.process.wait(timeout=120)
+        code = self.process.wait(timeout=300)
         return code, (self.said / "err").read_text()
 
     def kill(self):
