@@ -96,7 +96,7 @@ class Engines:
         return SimpleNamespace(calibrated=self.calibrated, verdicts=[verdict])
 
     def save_estimate(self, estimate, folder):
-        self.saves("estimate.json")(folder)
+        self.saves("estimate.json", {"main": "model_2"})(folder)
 
     def evaluate(self, estimate, dataset, progress=None):
         self.step("evaluate", dataset)
