@@ -27,7 +27,8 @@ from calibration.postures import dwell_windows
 from calibration.predict import REFERENCE, Prediction, Predictor, predictor
 from calibration.protocols import protocol_rows
 from calibration.recording import Trial
-from calibration.schema import Role
+from calibration.reregistration import registration_trials, reregistered
+from calibration.schema import Role, TrialEntry
 
 Trials = Literal["dynamic", "static", "all"]
 
@@ -71,11 +72,15 @@ class Row:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The ladder, the errors it is made of, and what the joint models explain of each joint's discrepancy."""
+    """The ladder, the errors it is made of, and what the joint models explain of each joint's discrepancy.
+
+    `confirmation` is the ladder of another session, its marker bodies registered anew; empty where there is none.
+    """
 
     rows: tuple[Row, ...]
     traces: tuple[Trace, ...]
     regimes: tuple[Explained, ...] = ()
+    confirmation: tuple[Row, ...] = ()
 
     def row(self, model: str, trials: Trials = "dynamic", base: str = "fixed", encoder: str = "motor") -> Row:
         """One line.
@@ -97,6 +102,7 @@ class Evaluation:
         content = {
             "schema": 1,
             "rows": [row_entry(r) for r in self.rows],
+            "confirmation": [row_entry(r) | {"role": "confirmation"} for r in self.confirmation],
             "trials": [trial_entry(t) for t in self.traces],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
             "regimes": [x.entry() for x in self.regimes],
@@ -122,7 +128,27 @@ def evaluate(
     entries = dataset.entries(role)
     if not entries:
         raise NotEnoughData(f"no {role} trial to score on")
-    predict, body, traces = predictor(estimate, dataset), hand_body(dataset.description), []
+    predict = predictor(estimate, dataset)
+    traces = _traces(predict, dataset, entries, progress)
+    registering = registration_trials(dataset) if role == "validation" else ()
+    confirmed: list[Trace] = []
+    if registering:
+        later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
+        confirmed = _traces(reregistered(predict, dataset), dataset, later, progress)
+    if progress is not None:
+        progress("joint models", 1.0)
+    rows, confirmation = tuple(ladder(traces, "mocap")), tuple(ladder(confirmed, "mocap"))
+    return Evaluation(rows, tuple(traces), regimes(predict, dataset, role), confirmation)
+
+
+def _traces(
+    predict: Predictor,
+    dataset: Dataset,
+    entries: tuple[TrialEntry, ...],
+    progress: Callable[[str, float], None] | None,
+) -> list[Trace]:
+    """Errors of every row in each of these trials."""
+    body, traces = hand_body(dataset.description), []
     for k, entry in enumerate(entries):
         if progress is not None:
             progress(f"evaluating {entry.id}", k / len(entries))
@@ -134,9 +160,7 @@ def evaluate(
         trial = dataset.read(entry)
         T_measured = poses_of(body, trial).T
         traces += [_trace(p, trial, pose_errors(p.T_lab_hand, T_measured)) for p in predict(entry, trial)]
-    if progress is not None:
-        progress("joint models", 1.0)
-    return Evaluation(tuple(ladder(traces, "mocap")), tuple(traces), regimes(predict, dataset, role))
+    return traces
 
 
 def regimes(predict: Predictor, dataset: Dataset, role: Role = "validation") -> tuple[Explained, ...]:

@@ -103,7 +103,7 @@ class Predictor:
     def __call__(self, entry: TrialEntry, trial: Trial) -> Iterator[Prediction]:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
         for name, hand, encoder, bases in self._rows():
-            q = self._positions(name, encoder, trial)
+            q = self.positions(name, encoder, trial)
             known = np.isfinite(q).all(axis=1)
             T_B_H = np.full((len(q), 4, 4), np.nan)
             T_B_H[known] = hand.poses(q[known])
@@ -129,7 +129,7 @@ class Predictor:
                 for encoder in encoders:
                     yield name, self.models[name], encoder, bases
 
-    def _positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
+    def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is asked with, at the motion capture's times."""
         if self.robot is None or not len(trial.t_robot):
             raise NotEnoughData(f"{trial.id}: no joint readings on a known clock, so no hand pose can be predicted")

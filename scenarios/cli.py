@@ -64,6 +64,7 @@ def run(
         console.show(console.verdicts([v for v in result.estimate.verdicts if v.stage in ("base_frame", "arm_tool")]))
         console.show(table)
     console.show(console.ladder(out))
+    console.show(console.confirmation(out))
     typer.echo(f"\nReport: {out / 'report.html'}")
 
 
@@ -119,6 +120,7 @@ def evaluate(
     with console.progress() as progress:
         steps.evaluate(estimate, dataset, out, truth, progress)
     console.show(console.ladder(out))
+    console.show(console.confirmation(out))
 
 
 @app.command()

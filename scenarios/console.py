@@ -75,8 +75,10 @@ def _lines(console: Console) -> Progress:
     return show
 
 
-def show(table: Table) -> None:
-    """Print a table on stdout."""
+def show(table: Table | None) -> None:
+    """Print a table on stdout, where there is one."""
+    if table is None:
+        return
     console = Console()
     if not console.is_terminal:
         console = Console(width=PLAIN_WIDTH)
@@ -97,16 +99,23 @@ def show_rows(rows: "Sequence[Row]", most: int = 5) -> None:
 
 
 def ladder(results: Path) -> Table:
-    """Return the table of a folder's evaluation: against the truth where score.json has it, else against mocap.
-
-    Dynamic and static trials apart; what is of both together stands in the file.
-    """
+    """Return the table of a folder's evaluation: against the truth where score.json has it, else against mocap."""
     path = results / "score.json"
-    rows = [row for row in _rows(path if path.is_file() else results / "evaluation.json") if row["trials"] != "all"]
+    rows = _rows(path if path.is_file() else results / "evaluation.json", "rows")
     against = ", ".join(sorted({row["against"] for row in rows}))
+    return _errors(f"Held-out error of the hand, against {against}", rows)
+
+
+def confirmation(results: Path) -> Table | None:
+    """Return the table of another session's errors, or None where no other session was recorded."""
+    rows = _rows(results / "evaluation.json", "confirmation")
+    return _errors("Another session, marker bodies registered anew, against mocap", rows) if rows else None
+
+
+def _errors(title: str, rows: Sequence[dict[str, Any]]) -> Table:
     columns = ("position RMSE\nper component [mm]", "position RMSE\nnorm [mm]", "orientation\nRMSE [deg]")
     table = _table("row", "base", "encoder", "trials", *columns)
-    table.title, table.title_justify = f"Held-out error of the hand, against {against}", "left"
+    table.title, table.title_justify = title, "left"
     for column in table.columns[4:]:
         column.justify = "right"
     for row in rows:
@@ -148,6 +157,7 @@ def _table(*columns: str) -> Table:
     return table
 
 
-def _rows(path: Path) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["rows"]
-    return rows
+def _rows(path: Path, key: str) -> list[dict[str, Any]]:
+    """Return the rows of dynamic and of static trials; what is of both together stands in the file."""
+    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8")).get(key, [])
+    return [row for row in rows if row["trials"] != "all"]
