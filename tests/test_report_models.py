@@ -268,6 +268,8 @@ def test_trials_are_apart_where_payload_or_push_differ(run, recording):
     write(run)
     trials = loads.loaded_trials(read(run))
     assert [(t.payload, t.pushed) for t in trials] == [(0.437, False), (2.0, False), (0.437, True)]
+    one, _ = loops.loops(read(run))
+    assert np.diff(one[0].t).min() > 0.0, "only the trial of the campaign's own load is drawn"
     assert row_of(run, "Trial by trial", "model_2, plate")[::2] == ["1.25", "2.50", "3.75"]
     assert row_of(run, "Trial by trial", "model_2, fixed")[::2] == ["4.00", "–", "–"]
     assert "2.00 kg" in text_of(run)

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 FORTH, BACK = "#1a5fa8", "#c2410c"
-_PALE = 0.45  # opacity of the dots
+_PALE = 0.6  # opacity of dots and lines
 _DOTS = 140  # drawn of each flank
 _GAP = 0.15  # [s] a line goes on for
 
@@ -40,10 +40,16 @@ def hysteresis(flanks: tuple[Flank, ...], ax: Axes) -> Axes:
     """Draw the flanks of one joint; the caller names the axes."""
     for f in flanks:
         if f.model is not None:
-            ax.plot(*strokes(f.t, f.position, f.model), color=f.colour, linewidth=0.8, label=f"model, {f.label}")
+            ax.plot(
+                *strokes(f.t, f.position, f.model),
+                color=f.colour,
+                alpha=_PALE,
+                linewidth=0.7,
+                label=f"model, {f.label}",
+            )
     for f in flanks:
         rows = slice(None, None, max(1, len(f.position) // _DOTS))
-        look: dict[str, Any] = {"color": f.colour, "alpha": _PALE, "markersize": 2.2, "markeredgewidth": 0.0}
+        look: dict[str, Any] = {"color": f.colour, "alpha": _PALE, "markersize": 2.4, "markeredgewidth": 0.0}
         ax.plot(f.position[rows], f.measured[rows], "o", **look, label=f"measured, {f.label}")
     return ax
 
