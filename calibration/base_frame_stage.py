@@ -85,7 +85,11 @@ def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarr
         xy = found.planar[stations.trial == index, :2]
         if kind == "spin":
             reach = 1e3 * float(np.linalg.norm(xy - xy.mean(axis=0), axis=1).max())
-            text = f"the centre wanders {1e3 * found.wander[index]:.3f} mm a step, {reach:.3f} mm in all"
+            own = 1e3 * float(np.hypot(*_eccentricity(found.planar[stations.trial == index])))
+            text = (
+                f"the centre wanders {1e3 * found.wander[index]:.3f} mm a step, {reach:.3f} mm in all; "
+                f"its own lies {own:.3f} mm from that of all spins together"
+            )
         else:
             way = float(np.linalg.norm(np.diff(xy, axis=0), axis=1).sum())
             text = f"{way:.2f} m, side slip {1e3 * found.wander[index]:.3f} mm a step"
@@ -98,3 +102,11 @@ def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarr
             f"rests differ by {np.sqrt(found.chi2):.1f} times the markers' noise in tilt and height; sigmas say so"
         )
         yield Verdict(STAGE, "warning", message)
+
+
+def _eccentricity(planar: np.ndarray) -> np.ndarray:
+    """Where planar poses (n, 3) alone put the centre, in base axes (2,) [m]: least squares of xy_i + R_i e = const."""
+    k, s, one, zero = np.cos(planar[:, 2]), np.sin(planar[:, 2]), np.ones(len(planar)), np.zeros(len(planar))
+    A = np.concatenate([np.column_stack([k, -s, one, zero]), np.column_stack([s, k, zero, one])])
+    found: np.ndarray = np.linalg.lstsq(A, -planar[:, :2].T.ravel(), rcond=None)[0][:2]
+    return found

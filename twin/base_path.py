@@ -1,8 +1,8 @@
 """Where a base is to go, and how its two driven wheels turn for it.
 
-    v = (dx, dy) . (cos yaw, sin yaw),    left = (v - w b/2) / r,    right = (v + w b/2) / r        [rad/s]
+    left = (way - yaw b/2) / r,    right = (way + yaw b/2) / r,    d way = (dx, dy) . (cos yaw, sin yaw)
 
-w the yaw rate, b the track, r the wheels' radius: a differential drive without slip.
+b the track, r the wheels' radius: a differential drive without slip; yaw in the middle of each step.
 """
 
 from dataclasses import dataclass
@@ -31,9 +31,10 @@ class BasePath:
         T[:, :2, 3] = self.planar[:, :2]
         return T
 
-    def wheel_speeds(self, rate: float, track: float, radius: float) -> np.ndarray:
-        """Speeds of the left and right wheel (n, 2) [rad/s] at set-points of a rate [Hz]."""
-        step = np.diff(self.planar, axis=0, append=self.planar[-1:]) * rate
-        ahead = step[:, 0] * np.cos(self.planar[:, 2]) + step[:, 1] * np.sin(self.planar[:, 2])
-        aside = 0.5 * track * step[:, 2]
-        return np.column_stack([ahead - aside, ahead + aside]) / radius
+    def wheel_angles(self, track: float, radius: float) -> np.ndarray:
+        """Angles of the left and right wheel (n, 2) [rad] for a track and a wheel's radius [m], from zero."""
+        step, yaw = np.diff(self.planar, axis=0), self.planar[:, 2]
+        middle = 0.5 * (yaw[1:] + yaw[:-1])
+        way = np.concatenate([[0.0], np.cumsum(step[:, 0] * np.cos(middle) + step[:, 1] * np.sin(middle))])
+        aside = 0.5 * track * (yaw - yaw[0])
+        return np.column_stack([way - aside, way + aside]) / radius

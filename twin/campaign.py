@@ -26,7 +26,9 @@ from twin.conventions import exp6
 from twin.declare import declaration
 from twin.defects.base import Defect, Parameter
 from twin.defects.departures import Warming
+from twin.defects.ground import Wheel
 from twin.defects.loads import Payload
+from twin.defects.rolling import Rolling
 from twin.draw import BASE, Robot, draw
 from twin.instruments import mocap, plate, robot_log
 from twin.instruments.clock import Clock
@@ -155,6 +157,8 @@ def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
     def now(defect: Defect) -> Defect:
         if isinstance(defect, Payload) and motion.payload is not None:
             return replace(defect, mass=motion.payload)
+        if isinstance(defect, Wheel) and motion.base is not None:
+            return Rolling(defect)
         return replace(defect, time=time) if isinstance(defect, Warming) else defect
 
     defects = tuple(now(d) for d in lab.robot.defects)

@@ -280,3 +280,8 @@ class TwinConfig:
     coupled_wrist: bool = False
     departures: Departures = field(default_factory=Departures)
     session: Session = field(default_factory=Session)
+
+    def __post_init__(self) -> None:
+        """Only wheels on bushings and contacts can roll."""
+        if "wheels" in self.campaign.driving.forms and self.base.wheels != "contact":
+            raise ValueError(f"campaign.driving.forms: wheels cannot roll where base.wheels is {self.base.wheels!r}")

@@ -22,7 +22,7 @@ class Driving:
         stride: From rest to rest of a drive [m].
         yaw_rate: Of a spin [rad/s].
         speed: Of a drive [m/s].
-        ramp: Duration of the velocity ramps [s]; the arm's are too short for a base.
+        ramp: Duration of the velocity ramps [s]: one period of the base on its wheels, which leaves it still.
     """
 
     forms: tuple[Form, ...] = ()
@@ -31,4 +31,4 @@ class Driving:
     stride: Annotated[float, Field(gt=0.0, le=0.5)] = 0.1
     yaw_rate: Annotated[float, Field(gt=0.0, le=2.0)] = 0.4
     speed: Annotated[float, Field(gt=0.0, le=1.0)] = 0.1
-    ramp: FixedPositive = 0.4
+    ramp: FixedPositive = 0.6

@@ -2,13 +2,21 @@
 
 import numpy as np
 
+import mjcf
 from calibration.schema import Kind
 from twin.base_path import BasePath
 from twin.config import Campaign
 from twin.config_driving import Form
+from twin.defects.rolling import DRIVES
 from twin.motions import JOINTS, RATE, Motion, path_time
 
 FOLDED = (0.15, 0.20, -1.34, -0.20, 1.94, -1.57, 1.37, 0.0)  # the arm against the chest, the posture for driving
+
+
+def differential_drive() -> tuple[float, float]:
+    """Track and wheel radius of the nominal robot [m]."""
+    left, right = (next(w for w in mjcf.wheels() if w.name == name) for name in DRIVES)
+    return left.centre[1] - right.centre[1], left.radius
 
 
 def trials(campaign: Campaign) -> tuple[Motion, ...]:

@@ -12,6 +12,8 @@ from mujoco import rollout
 from twin.build import PUSH, Twin
 from twin.conventions import states_with_their_sensors, transform
 from twin.defects.gear import rotor_joint
+from twin.defects.rolling import DRIVES, roll_joint
+from twin.driving import differential_drive
 from twin.errors import Diverged, NotStanding
 from twin.motions import JOINTS, RATE, SETTLE, Motion
 from twin.root import anchored, base_poses, floor_wrench, put_down
@@ -61,6 +63,9 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
     control = _controls(model, command)
     if motion.push is not None:
         control[:, [model.actuator(name).id for name in PUSH]] = _interpolated(motion.push, model.opt.timestep)
+    if motion.base is not None:
+        angles = _interpolated(motion.base.wheel_angles(*differential_drive()), model.opt.timestep)
+        control[:, [model.actuator(roll_joint(name)).id for name in DRIVES]] = angles
     first = _initial_state(model, data, motion.command[0])
     states, sensors = rollout.rollout(model, data, first[None], control[None])
     states = states_with_their_sensors(first, states[0])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios import load
+from scenarios.errors import ScenarioError
 from twin import driving, schedule
 from twin.base_path import BasePath
 from twin.campaign import _states, laboratory, measure  # noqa: PLC2701
@@ -31,18 +32,19 @@ def robot(heins):
     return laboratory(heins, 0)
 
 
-def test_the_wheels_speeds_integrate_to_the_path():
+def test_the_wheels_turn_by_what_the_path_asks():
     t = np.arange(0.0, 6.0, 1.0 / RATE)
     yaw = 0.8 * np.sin(t)
-    v = 0.2 * np.cos(0.5 * t)
-    steps = np.column_stack([v * np.cos(yaw), v * np.sin(yaw)])[:-1] / RATE
+    way, middle = 0.2 * np.cos(0.5 * t[1:]) / RATE, 0.5 * (yaw[1:] + yaw[:-1])
+    steps = way[:, None] * np.column_stack([np.cos(middle), np.sin(middle)])
     planar = np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), yaw])
-    left, right = BasePath("wheels", planar).wheel_speeds(RATE, TRACK, RADIUS).T
-    turned = yaw[0] + np.cumsum((right - left)[:-1] * RADIUS / TRACK) / RATE
-    np.testing.assert_allclose(turned, yaw[1:], atol=1e-12)
-    way = 0.5 * (left + right)[:-1] * RADIUS / RATE
-    end = (way[:, None] * np.column_stack([np.cos(yaw), np.sin(yaw)])[:-1]).sum(axis=0)
-    np.testing.assert_allclose(end, planar[-1, :2], atol=1e-12)
+    left, right = BasePath("wheels", planar).wheel_angles(TRACK, RADIUS).T
+    np.testing.assert_allclose((right - left) * RADIUS / TRACK, yaw - yaw[0], atol=1e-12)
+    np.testing.assert_allclose(0.5 * np.diff(left + right) * RADIUS, way, atol=1e-12)
+
+
+def test_the_nominal_robot_is_that_differential_drive():
+    np.testing.assert_allclose(driving.differential_drive(), (TRACK, RADIUS), atol=1e-12)
 
 
 def test_a_spin_and_a_drive_rest_where_they_say(moves):
@@ -71,6 +73,54 @@ def test_no_plate_feels_a_carried_robot(robot, moves):
     assert trial.plate == () and len(trial.t_plate) == 0
     assert len(trial.dwell_start) == 9
     np.testing.assert_allclose(np.ptp(true.base_pose[:, 1, 3]), 0.8 * abs(np.sin(robot.config.base.pose[2])), atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def driven(heins):
+    """A short spin and drive by the wheels, with the robot's model."""
+    quick = replace(heins.campaign.driving, forms=("wheels",), spin_rests=4, drive_rests=4, yaw_rate=2.0, speed=0.2)
+    short = replace(heins, campaign=replace(heins.campaign, driving=quick, dwell=0.8, rest=1.0))
+    robot = laboratory(short, 0)
+    return robot, {m.kind: (m, _states(robot, m, 0.0)) for m in driving.trials(short.campaign)}
+
+
+def rests(robot, motion, states):
+    """Planar poses in the start's frame at the end of each rest, and how far the base moved in its last 0.2 s."""
+    T = np.linalg.solve(robot.T_lab_base, states.poses["base_footprint"])
+    last = [round(stop * 1000) - 1 for _, stop in motion.dwells]
+    creep = max(np.ptp(T[k - 200 : k, :2, 3], axis=0).max() for k in last)
+    return np.column_stack([T[last, :2, 3], np.unwrap(rotation_vector(T[last])[:, 2])]), creep
+
+
+def test_wheels_spin_the_base_nearly_on_the_spot(driven):
+    robot, trials = driven
+    planar, creep = rests(robot, *trials["spin"])
+    np.testing.assert_allclose(planar[:, 2], np.arange(4) * np.pi / 2, rtol=0.02, atol=2e-3)
+    assert np.linalg.norm(planar[:, :2], axis=1).max() < 2e-3
+    assert np.linalg.norm(planar[1:, :2] - planar[:-1, :2], axis=1).max() > 1e-6  # it does wander
+    assert creep < 1e-4
+
+
+def test_wheels_drive_the_base_straight(driven):
+    robot, trials = driven
+    planar, creep = rests(robot, *trials["drive"])
+    np.testing.assert_allclose(planar[:, 0], np.arange(4) * 0.1, atol=1.5e-3)
+    assert np.abs(planar[:, 1:]).max() < 3e-3
+    assert creep < 1e-3
+
+
+def test_the_plate_feels_a_robot_that_drives_by_itself(driven):
+    robot, trials = driven
+    motion, states = trials["spin"]
+    trial, _ = measure(robot, motion, states, 50.0)
+    assert trial.plate == ("plate",)
+    weight = -9.81 * robot.twin.model.body_subtreemass[robot.twin.model.body("base_footprint").id]
+    assert abs(trial.plate_wrench[:, 0, 2].mean() / weight - 1.0) < 2e-3
+
+
+def test_an_anchored_base_cannot_drive():
+    with pytest.raises(ScenarioError, match="cannot roll where base.wheels is 'anchored'"):
+        load("heins2022", ["twin.base.wheels=anchored"])
 
 
 def test_a_campaign_without_sweeps_and_swings_has_none(heins, nominal):

@@ -1,0 +1,65 @@
+"""A wheel that rolls: the one under the base of a robot that drives.
+
+    drive     the wheel turns on its hub; servo torque kp (u - a) - kv da/dt: a velocity loop with integral
+    caster    the fork swivels on its bushing, the wheel rolls in the fork, trailing behind the swivel's axis
+
+Both against dry friction. Bushing and contact are those of the standing wheel.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from twin.defects.base import Defect, Parameter, body
+from twin.defects.gear import add_servo
+from twin.defects.ground import Wheel
+
+DRIVES = ("wheel_left", "wheel_right")
+_AXIS = np.array([0.0, 0.0, 1.0])  # of every hub and swivel, in its own body
+_SERVO = (2000.0, 60.0)  # of a drive [N.m/rad, N.m.s/rad]
+_ROTOR = 0.05  # motor of a drive, reflected [kg.m2]
+_CASTER_INERTIA = 5e-4  # of wheel and swivel each, bearings and tyre included [kg.m2]
+_SWIVEL = (0.02, 0.01)  # dry friction [N.m] and damping [N.m.s/rad] of a swivel, the tyre's scrub included
+_ROLL = (0.02, 1e-3)  # of a caster's wheel
+
+
+def roll_joint(wheel: str) -> str:
+    """Name of the joint, and of a drive's servo, about which a wheel rolls."""
+    return f"{wheel}.roll"
+
+
+@dataclass(frozen=True)
+class Rolling(Defect):
+    """A standing wheel let loose.
+
+    Attributes:
+        wheel: As it stands.
+    """
+
+    wheel: Wheel
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Add hub, swivel and servo behind the wheel's bushing."""
+        self.wheel.apply(spec)
+        carrier, name = body(spec, self.wheel.body_name), self.wheel.name
+        if name in DRIVES:
+            carrier.add_joint(name=roll_joint(name), type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXIS, armature=_ROTOR)
+            add_servo(spec, roll_joint(name), *_SERVO)
+            return
+        (hub,) = carrier.bodies
+        _free(carrier, f"{name}.swivel", *_SWIVEL)
+        _free(hub, roll_joint(name), *_ROLL)
+
+    def tune(self, model: mujoco.MjModel) -> None:
+        """As the standing wheel."""
+        self.wheel.tune(model)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """As the standing wheel."""
+        return self.wheel.parameters()
+
+
+def _free(carrier: mujoco.MjsBody, name: str, friction: float, damping: float) -> None:
+    joint = carrier.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXIS, armature=_CASTER_INERTIA)
+    joint.frictionloss, joint.damping = friction, np.array([damping, 0.0, 0.0])
