@@ -135,7 +135,7 @@ def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
 
 @app.command("import")
 def import_(
-    kind: Annotated[Literal["csv"], typer.Argument(metavar="FORMAT", help="csv: samples or static postures.")],
+    kind: Annotated[Literal["c3d", "csv"], typer.Argument(metavar="FORMAT", help="Of the files.")],
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Each belongs to the trial of its name.")],
     mapping: Annotated[
         Path, typer.Option("--map", metavar="YAML", help="What the files do not say: docs/recording.md.")

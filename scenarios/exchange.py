@@ -9,7 +9,7 @@ from scenarios.errors import ScenarioError
 
 if TYPE_CHECKING:
     from calibration.io.assemble import Reader
-    from calibration.io.mapping import Mapping
+    from calibration.io.mapping import Mapping, MappingFile
 
 PACKAGED = "tiago"
 """What a mapping calls the nominal robot that comes with this program."""
@@ -21,7 +21,7 @@ def import_files(
     """Write the dataset folder `out` from files of one format; return what was recognised in them.
 
     Args:
-        kind: `csv`.
+        kind: `csv` or `c3d`.
         files: The files; each belongs to the trial of its name.
         mapping: The mapping file.
         out: The dataset folder; an earlier dataset there is replaced.
@@ -33,20 +33,22 @@ def import_files(
     """
     from calibration.dataset import load
     from calibration.io.assemble import import_files as write
-    from calibration.io.mapping import Mapping
+    from calibration.io.mapping import Mapping, MappingFile
 
     described = yaml_file.read(mapping, Mapping)
+    source = MappingFile(mapping, described, _urdf(described, mapping))
     before = None if add_to is None else load(add_to)
     with folder.replacing(out, folder.DATASET) as new:
-        return write(files, _reader(kind, described, mapping), described, _urdf(described, mapping), new, before)
+        return write(files, _reader(kind, source), source, new, before)
 
 
-def _reader(kind: str, mapping: "Mapping", path: Path) -> "Reader":
+def _reader(kind: str, mapping: "MappingFile") -> "Reader":
+    from calibration.io.c3d_read import c3d_reader
     from calibration.io.csv_read import csv_reader
 
-    if kind == "csv" and not mapping.csv:
-        raise ScenarioError(f"{path}: csv: missing; say which column is what")
-    return csv_reader(mapping)
+    if not getattr(mapping.content, kind):
+        raise mapping.error(kind, "missing; say what is what in the files")
+    return {"csv": csv_reader, "c3d": c3d_reader}[kind](mapping.content)
 
 
 def _urdf(mapping: "Mapping", path: Path) -> str:

@@ -10,9 +10,9 @@ import pinocchio as pin
 
 from calibration.dataset import Dataset
 from calibration.errors import InputError, InputErrors, NoSuchElement
-from calibration.io import mapping as mapped
 from calibration.io.bodies import in_order, placed_bodies, unmatched
-from calibration.io.check import check
+from calibration.io.check import check, check_order
+from calibration.io.mapping import MappedTrial, MappingFile
 from calibration.io.recorded import Joints, Markers, Plates, Recorded
 from calibration.means import PostureMeans, write_means
 from calibration.recording import Trial, write_trial
@@ -32,7 +32,7 @@ class Reader:
 
 
 def import_files(
-    files: Sequence[Path], reader: Reader, mapping: mapped.Mapping, urdf: str, out: Path, before: Dataset | None = None
+    files: Sequence[Path], reader: Reader, mapping: MappingFile, out: Path, before: Dataset | None = None
 ) -> tuple[str, ...]:
     """Write a dataset from laboratory files into the folder `out`, and say what was recognised.
 
@@ -40,23 +40,22 @@ def import_files(
         files: All files; each belongs to the trial of its name.
         reader: Of their format.
         mapping: What the files do not say.
-        urdf: Text of the nominal robot.
         out: An empty folder.
         before: A dataset imported before from other instruments; its trials gain these files' channels.
 
     Raises:
         InputError: Something does not fit together; every finding of every file.
     """
-    chain = _chain(urdf, mapping)
-    recorded = _read_all(files, reader, mapping.trials)
-    calibration = [recorded[t.id] for t in mapping.trials if t.role == "calibration"]
+    chain, content = _chain(mapping), mapping.content
+    recorded = _read_all(files, reader, mapping)
+    calibration = [recorded[t.id] for t in content.trials if t.role == "calibration"]
     bodies = before.description.bodies if before else placed_bodies(mapping, chain, calibration)
-    together = sorted({name for r in recorded.values() for name in r.together} | set(mapping.setup.mocap_clock))
-    fields = mapping.setup.model_dump() | {"mocap_clock": together, "bodies": bodies, "trials": ()}
+    together = sorted({name for r in recorded.values() for name in r.together} | set(content.setup.mocap_clock))
+    fields = content.setup.model_dump() | {"mocap_clock": together, "bodies": bodies, "trials": ()}
     description = Description.model_validate(fields)
-    mass = float(pin.computeTotalMass(pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())))
+    mass = float(pin.computeTotalMass(pin.buildModelFromXML(mapping.urdf, pin.JointModelFreeFlyer())))
     found, problems = [], []
-    for entry in mapping.trials:
+    for entry in content.trials:
         try:
             trial = _trial(entry, recorded[entry.id], description, before)
             check(recorded[entry.id].file, trial, description, chain, mass)
@@ -65,21 +64,23 @@ def import_files(
             problems.append(error)
     if problems:
         raise InputErrors(problems)
-    _write(out, urdf, description, found)
+    check_order(mapping, [trial for _, trial in found])
+    _write(out, mapping.urdf, description, found)
     return tuple(dict.fromkeys(note for r in recorded.values() for note in r.notes))
 
 
-def _chain(urdf: str, mapping: mapped.Mapping) -> Chain:
-    s = mapping.setup
+def _chain(mapping: MappingFile) -> Chain:
+    s = mapping.content.setup
     try:
-        return chain_of_frames(urdf, s.joint_names, s.base_frame, s.tool_frame)
+        return chain_of_frames(mapping.urdf, s.joint_names, s.base_frame, s.tool_frame)
     except NoSuchElement as error:
-        raise InputError("mapping", f"setup: {error}") from error
+        raise mapping.error("setup", str(error)) from error
 
 
-def _read_all(files: Sequence[Path], reader: Reader, trials: Sequence[mapped.MappedTrial]) -> dict[str, Recorded]:
+def _read_all(files: Sequence[Path], reader: Reader, mapping: MappingFile) -> dict[str, Recorded]:
     """Every trial's channels on their clocks."""
     by_stem: dict[str, list[Path]] = {}
+    trials = mapping.content.trials
     for path in files:
         by_stem.setdefault(reader.stem(path), []).append(path)
     known = {t.stem for t in trials}
@@ -89,7 +90,7 @@ def _read_all(files: Sequence[Path], reader: Reader, trials: Sequence[mapped.Map
         if stem not in known
     ]
     problems += [
-        InputError("mapping", f"trials.{t.id}: no file {t.stem!r} was given") for t in trials if t.stem not in by_stem
+        mapping.error(f"trials.{t.id}", f"no file {t.stem!r} was given") for t in trials if t.stem not in by_stem
     ]
     read: dict[str, Recorded] = {}
     for stem in (s for s in by_stem if s in known):
@@ -102,7 +103,7 @@ def _read_all(files: Sequence[Path], reader: Reader, trials: Sequence[mapped.Map
     return {t.id: _placed(t, read[t.stem]) for t in trials}
 
 
-def _placed(trial: mapped.MappedTrial, recorded: Recorded) -> Recorded:
+def _placed(trial: MappedTrial, recorded: Recorded) -> Recorded:
     """The part of the file that is the trial, at its time."""
     if trial.part is not None:
         recorded = recorded.part(*trial.part)
@@ -113,7 +114,7 @@ def _placed(trial: mapped.MappedTrial, recorded: Recorded) -> Recorded:
 
 
 def _trial(
-    entry: mapped.MappedTrial, recorded: Recorded, description: Description, before: Dataset | None
+    entry: MappedTrial, recorded: Recorded, description: Description, before: Dataset | None
 ) -> Trial | PostureMeans:
     owner = {m.name: b.name for b in description.bodies for m in b.markers}
     if recorded.means is not None:
@@ -176,9 +177,7 @@ def _plate_fields(plates: Plates) -> dict[str, Any]:
     return {"plate": plates.names, "t_plate": plates.t, "plate_wrench": plates.wrench, "plate_centre": plates.centre}
 
 
-def _means(
-    entry: mapped.MappedTrial, recorded: Recorded, description: Description, owner: Mapping[str, str]
-) -> PostureMeans:
+def _means(entry: MappedTrial, recorded: Recorded, description: Description, owner: Mapping[str, str]) -> PostureMeans:
     means = recorded.means
     if means is None or entry.kind != "static":
         raise InputError(recorded.file, f"holds static postures, trial {entry.id} is declared as {entry.kind}")
@@ -192,7 +191,7 @@ def _means(
 
 
 def _write(
-    out: Path, urdf: str, description: Description, trials: Sequence[tuple[mapped.MappedTrial, Trial | PostureMeans]]
+    out: Path, urdf: str, description: Description, trials: Sequence[tuple[MappedTrial, Trial | PostureMeans]]
 ) -> None:
     (out / "trials").mkdir()
     entries = []

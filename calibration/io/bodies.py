@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.bodies import body_poses
 from calibration.errors import InputError, NotEnoughData
-from calibration.io.mapping import MappedBody, Mapping
+from calibration.io.mapping import MappedBody, MappingFile
 from calibration.io.place_bodies import hand_eye, mean_shape, standing_shape
 from calibration.io.recorded import Recorded
 from calibration.markers import BASE, HAND
@@ -18,23 +18,24 @@ from calibration.se3 import inverse, to_vector
 _REST = 1.0  # [s]
 
 
-def placed_bodies(mapping: Mapping, chain: Chain, calibration: Sequence[Recorded]) -> tuple[Body, ...]:
+def placed_bodies(mapping: MappingFile, chain: Chain, calibration: Sequence[Recorded]) -> tuple[Body, ...]:
     """All bodies, those to be placed by the calibration trials placed.
 
     Raises:
         InputError: The recordings do not allow it.
     """
-    bodies = {b.name: _with_shape(b, calibration) for b in mapping.bodies}
-    if any(b.fitted for b in mapping.bodies):
+    mapped = mapping.content.bodies
+    bodies = {b.name: _with_shape(mapping, b, calibration) for b in mapped}
+    if any(b.fitted for b in mapped):
         bodies |= _fitted(mapping, chain, bodies, calibration)
     return tuple(bodies.values())
 
 
-def _with_shape(body: MappedBody, calibration: Sequence[Recorded]) -> Body:
+def _with_shape(mapping: MappingFile, body: MappedBody, calibration: Sequence[Recorded]) -> Body:
     if not body.undrawn:
         return body.drawn()
     if not calibration:
-        raise InputError("mapping", f"bodies.{body.name}: undrawn, and there is no calibration trial to take it from")
+        raise mapping.error(f"bodies.{body.name}", "undrawn, and there is no calibration trial to take it from")
     try:
         if body.standing is None:
             xyz = mean_shape(np.concatenate([_positions(r, body.undrawn) for r in calibration]))
@@ -62,14 +63,14 @@ def _positions(recorded: Recorded, names: Sequence[str], rest: bool = False) -> 
 
 
 def _fitted(
-    mapping: Mapping, chain: Chain, bodies: Lookup[str, Body], calibration: Sequence[Recorded]
+    mapping: MappingFile, chain: Chain, bodies: Lookup[str, Body], calibration: Sequence[Recorded]
 ) -> dict[str, Body]:
     """Base and hand with placements from the nominal robot at the postures."""
     postures = [r for r in calibration if r.means is not None]
     missing = [name for name in (BASE, HAND) if name not in bodies]
     if missing or not postures:
-        why = f"bodies: no {missing[0]!r}" if missing else "trials: no calibration file of static postures"
-        raise InputError("mapping", f"{why}; a fitted body is placed by base and hand in static postures")
+        place, why = ("bodies", f"no {missing[0]!r}") if missing else ("trials", "no calibration file of postures")
+        raise mapping.error(place, f"{why}; a fitted body is placed by base and hand in static postures")
     base, hand = bodies[BASE], bodies[HAND]
     A, B = [], []
     for r in postures:
@@ -80,7 +81,7 @@ def _fitted(
         X, Y = hand_eye(np.concatenate(A), np.concatenate(B))
     except NotEnoughData as error:
         raise InputError(postures[0].file, str(error)) from error
-    fitted = {b.name for b in mapping.bodies if b.fitted}
+    fitted = {b.name for b in mapping.content.bodies if b.fitted}
     T = {BASE: inverse(X), HAND: Y}
     return {n: bodies[n].model_copy(update={"placement": _six(T[n])}) for n in (BASE, HAND) if n in fitted}
 

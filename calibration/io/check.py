@@ -5,12 +5,14 @@ against the robot's weight. Swapped or mislabelled columns show in bodies that a
 a hand that is not where the nominal robot has it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from calibration.errors import InputError
 from calibration.hand import nominal_hand
+from calibration.io.mapping import MappingFile
 from calibration.io.place_bodies import hand_eye
 from calibration.means import PostureMeans
 from calibration.parameters import nominal_frames
@@ -51,6 +53,24 @@ def check(file: str, trial: Trial | PostureMeans, description: Description, chai
         found += [*_hand(trial, description, chain)]
     if found:
         raise InputError(file, "; ".join(found))
+
+
+def check_order(mapping: MappingFile, trials: Sequence[Trial | PostureMeans]) -> None:
+    """Refuse trials that overlap in time: files that each begin at zero do not say when they began.
+
+    Raises:
+        InputError: Two do.
+    """
+    continuous = [t for t in trials if isinstance(t, Trial)]
+    for clock in ("mocap", "robot", "plate"):
+        spans = [(t[0], t[-1], trial.id) for trial in continuous if len(t := getattr(trial, f"t_{clock}"))]
+        for (_, stop, a), (start, _, b) in pairwise(sorted(spans)):
+            if start <= stop:
+                raise mapping.error(
+                    "trials",
+                    f"{a} and {b} overlap in time on the {clock} clock: their files do not say when they began; "
+                    "give each a `start` [s]",
+                )
 
 
 def _markers(trial: Trial | PostureMeans, description: Description) -> Iterator[str]:

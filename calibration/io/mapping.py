@@ -4,16 +4,20 @@ Which column or label is which marker, joint or plate channel; units; whose wren
 sit on the robot; which file is which trial. It is a YAML file of these fields, strictly validated.
 """
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from calibration.schema import Body, Declaration, Kind, Marker, NonNegative, Positive, Role, Setup
+from calibration.errors import InputError
+from calibration.schema import Body, Declaration, Kind, Marker, NonNegative, Positive, Role, Setup, Vector6
 
 Columns = tuple[str, str, str]
 LENGTHS = {"m": 1.0, "mm": 1e-3}
 ANGLES = {"rad": 1.0, "deg": 0.017453292519943295}
 MOMENTS = {"N.m": 1.0, "N.mm": 1e-3}
+MOMENT_NAMES = {"Nm": "N.m", "N.m": "N.m", "N*m": "N.m", "Nmm": "N.mm", "N.mm": "N.mm", "N*mm": "N.mm"}
 
 
 class Standing(Declaration):
@@ -31,6 +35,7 @@ class MappedBody(Declaration):
         name: Its name.
         link: The link it is fixed on.
         markers: Drawn markers, with their coordinates in the link's frame [m].
+        placement: Of drawn markers, where their coordinates are not in the link's frame; see `schema.Body`.
         undrawn: Names of markers whose coordinates nobody measured: their shape is the mean over calibration trials.
         standing: Places an undrawn body on the base by where the base stands at rest.
         fitted: Places an undrawn body, or the frame of the marker positions, by the nominal robot's fit to the
@@ -40,6 +45,7 @@ class MappedBody(Declaration):
     name: str
     link: str
     markers: tuple[Marker, ...] = ()
+    placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     undrawn: tuple[str, ...] = ()
     standing: Standing | None = None
     fitted: bool = False
@@ -61,7 +67,7 @@ class MappedBody(Declaration):
 
     def drawn(self) -> Body:
         """The body as it is drawn."""
-        return Body(name=self.name, link=self.link, markers=self.markers)
+        return Body(name=self.name, link=self.link, markers=self.markers, placement=self.placement)
 
 
 class MappedTrial(Declaration):
@@ -173,6 +179,37 @@ class CsvTable(Declaration):
         return self
 
 
+class C3dPlateMap(Declaration):
+    """One plate of a C3D file.
+
+    Attributes:
+        number: Its place in FORCE_PLATFORM, from 1.
+        convention: Whose wrench is stored: laboratories store the `reaction`, but no C3D file says so.
+        moment_unit: Of its moments, where ANALOG:UNITS does not say.
+        origin: What ORIGIN is: from the transducers' origin to the surface centre as C3D has it (z negative), or the
+            other way round.
+    """
+
+    number: Annotated[int, Field(ge=1)]
+    convention: Literal["action", "reaction"]
+    moment_unit: Literal["N.m", "N.mm"] | None = None
+    origin: Literal["transducer_to_surface", "surface_to_transducer"] = "transducer_to_surface"
+
+
+class C3dLayout(Declaration):
+    """What is what in the C3D files.
+
+    Attributes:
+        markers: POINT label of each marker.
+        plates: Plates by their name in the setup.
+        dwell_events: Labels of the events at start and stop of each static posture.
+    """
+
+    markers: dict[str, str]
+    plates: dict[str, C3dPlateMap] = {}
+    dwell_events: tuple[str, str] | None = None
+
+
 class Mapping(Declaration):
     """The whole mapping file.
 
@@ -182,6 +219,7 @@ class Mapping(Declaration):
         bodies: The marker bodies.
         trials: The trials.
         csv: Kinds of CSV files.
+        c3d: What is what in the C3D files.
     """
 
     urdf: str
@@ -189,6 +227,7 @@ class Mapping(Declaration):
     bodies: tuple[MappedBody, ...]
     trials: Annotated[tuple[MappedTrial, ...], Field(min_length=1)]
     csv: tuple[CsvTable, ...] = ()
+    c3d: C3dLayout | None = None
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> "Mapping":
@@ -202,3 +241,22 @@ class Mapping(Declaration):
             if twice:
                 raise ValueError(f"{group} named more than once: {twice}")
         return self
+
+
+@dataclass(frozen=True)
+class MappingFile:
+    """A mapping file as it was read.
+
+    Attributes:
+        path: Where, for messages.
+        content: What it says.
+        urdf: Text of the nominal robot it names.
+    """
+
+    path: Path
+    content: Mapping
+    urdf: str
+
+    def error(self, place: str, message: str) -> InputError:
+        """An error of the mapping file, or of what it does not fit."""
+        return InputError(self.path, f"{place}: {message}")

@@ -5,10 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from calibration import load
-from scenarios import cli, exchange
 from tests.calibration import matched
 
 JOINTS = {name: {"motor": name, "unit": "m" if name.startswith("torso") else "rad"} for name in matched.JOINTS}
@@ -31,35 +29,6 @@ def write_csv(path: Path, columns: dict[str, np.ndarray]) -> Path:
     lines = [",".join(columns), *(",".join("" if x != x else repr(float(x)) for x in row) for row in rows)]
     path.write_text("\n".join(lines) + "\n")
     return path
-
-
-@pytest.fixture
-def lab(tmp_path):
-    return Laboratory(tmp_path)
-
-
-class Laboratory:
-    """A folder with files and a mapping, and the command run on them."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.out = folder, folder / "out"
-
-    def run(self, described: dict, *files: Path, kind: str = "csv") -> tuple[str, ...]:
-        path = self.folder / "map.yaml"
-        with path.open("w") as stream:
-            YAML().dump(described, stream)
-        return exchange.import_files(kind, files, path, self.out)
-
-    def refused(self, capsys, described: dict, *files: Path, kind: str = "csv") -> str:
-        """What the command says when it ends with 2 and writes nothing."""
-        path = self.folder / "map.yaml"
-        with path.open("w") as stream:
-            YAML().dump(described, stream)
-        before = sorted(self.folder.rglob("*"))
-        with pytest.raises(SystemExit) as exit:
-            cli.main(["import", kind, *map(str, files), "--map", str(path), "--out", str(self.out)])
-        assert exit.value.code == 2 and sorted(self.folder.rglob("*")) == before
-        return capsys.readouterr().err
 
 
 def postures(n: int = 12, seed: int = 0) -> dict[str, np.ndarray]:
