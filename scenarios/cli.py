@@ -9,11 +9,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from scenarios import command_dataset
+from scenarios import command_dataset, command_exchange
 from scenarios.errors import ScenarioError
 from scenarios.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
 
@@ -133,26 +133,8 @@ def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
     typer.echo(f"Report: {page}")
 
 
-@app.command("import")
-def import_(
-    kind: Annotated[Literal["c3d", "csv"], typer.Argument(metavar="FORMAT", help="Of the files.")],
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Each belongs to the trial of its name.")],
-    mapping: Annotated[
-        Path, typer.Option("--map", metavar="YAML", help="What the files do not say: docs/recording.md.")
-    ],
-    out: Out,
-    add_to: Annotated[
-        Path | None, typer.Option(metavar="DATASET", help="Add these instruments to the trials of this dataset.")
-    ] = None,
-) -> None:
-    """Write a dataset from laboratory files."""
-    from scenarios import exchange
-
-    for note in exchange.import_files(kind, files, mapping, out, add_to):
-        typer.echo(note)
-    typer.echo(f"Dataset: {out}")
-
-
+import_ = app.command("import")(command_exchange.import_)
+export = app.command()(command_exchange.export)
 dataset = app.command()(command_dataset.dataset)
 
 

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 PACKAGED = "tiago"
 """What a mapping calls the nominal robot that comes with this program."""
 
+MAPPING = "mapping.yaml"
+"""The mapping file beside exported files."""
+
 
 def import_files(
     kind: str, files: Sequence[Path], mapping: Path, out: Path, add_to: Path | None = None
@@ -21,7 +24,7 @@ def import_files(
     """Write the dataset folder `out` from files of one format; return what was recognised in them.
 
     Args:
-        kind: `csv` or `c3d`.
+        kind: `c3d`, `csv` or `bag`.
         files: The files; each belongs to the trial of its name.
         mapping: The mapping file.
         out: The dataset folder; an earlier dataset there is replaced.
@@ -42,13 +45,69 @@ def import_files(
         return write(files, _reader(kind, source), source, new, before)
 
 
+def export_files(kind: str, dataset: Path, out: Path, ros: int = 1) -> tuple[str, ...]:
+    """Write the trials of a dataset as files of one format into the folder `out`, with the mapping that reads them.
+
+    Returns:
+        Trials the format has nothing of, and why.
+
+    Raises:
+        ScenarioError: `out` must not be overwritten.
+        InputError: The dataset cannot be read, or the format cannot hold it.
+    """
+    from calibration.dataset import load
+    from calibration.io.export import export_trials
+
+    source = load(dataset)
+    with folder.replacing(out, _exported(kind, [t.id for t in source.description.trials])) as new:
+        mapping, notes = export_trials(kind, source, new, ros)
+        yaml_file.write(new / MAPPING, mapping)
+    return notes
+
+
+def export_urdf(estimate: Path, out: Path) -> None:
+    """Write the calibrated URDF of an estimate as the file `out`.
+
+    Raises:
+        InputError: There is no estimate, or it must not be used.
+    """
+    from calibration.errors import NotCalibrated
+    from calibration.estimate_files import CALIBRATED, load_estimate
+
+    found = load_estimate(estimate)
+    path = (estimate if estimate.is_dir() else estimate.parent) / CALIBRATED
+    if not found.calibrated or not path.is_file():
+        raise NotCalibrated([v.message for v in found.verdicts if v.verdict == "refused"])
+    if out.exists() and out.is_dir():
+        raise ScenarioError(f"{out}: is a folder; name a file")
+    with folder.updating(out.parent, [out.name]) as new:
+        (new / out.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+
+
+def _exported(kind: str, trials: Sequence[str]) -> folder.Kind:
+    """Folders of exported files that may be replaced: those of the same trials."""
+    suffixes = {
+        "csv": (".mocap.csv", ".robot.csv", ".plate.csv", ".postures.csv"),
+        "c3d": (".c3d",),
+        "bag": (".bag", ""),
+    }
+    files = {f"{trial}{suffix}" for trial in trials for suffix in suffixes[kind]}
+    return folder.Kind(f"{kind} export", MAPPING, frozenset(files | {MAPPING, "nominal.urdf"}))
+
+
 def _reader(kind: str, mapping: "MappingFile") -> "Reader":
+    from calibration.io.bag_read import bag_reader
     from calibration.io.c3d_read import c3d_reader
     from calibration.io.csv_read import csv_reader
 
-    if not getattr(mapping.content, kind):
-        raise mapping.error(kind, "missing; say what is what in the files")
-    return {"csv": csv_reader, "c3d": c3d_reader}[kind](mapping.content)
+    content = mapping.content
+    if kind == "csv" and content.csv:
+        return csv_reader(content.csv, content.setup)
+    if kind == "c3d" and content.c3d is not None:
+        return c3d_reader(content.c3d, content.setup)
+    if kind == "bag" and content.bag is not None:
+        return bag_reader(content.bag)
+    raise mapping.error(kind, "missing; say what is what in the files")
 
 
 def _urdf(mapping: "Mapping", path: Path) -> str:

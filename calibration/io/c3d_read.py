@@ -13,7 +13,7 @@ from calibration.errors import InputError
 from calibration.io.assemble import Reader
 from calibration.io.c3d_file import CLOCK, C3dFile
 from calibration.io.c3d_read_plates import read_plates
-from calibration.io.mapping import LENGTHS, C3dLayout, Mapping
+from calibration.io.mapping import LENGTHS, C3dLayout
 from calibration.io.recorded import Markers, Recorded
 from calibration.schema import Setup
 
@@ -89,6 +89,8 @@ def _dwells(file: C3dFile, layout: C3dLayout, start: float) -> np.ndarray | None
     if layout.dwell_events is None:
         return None
     labels, times = file.parameter("EVENT", "LABELS", []), file.parameter("EVENT", "TIMES")
+    if not labels:
+        return None
     pairs = []
     for wanted in layout.dwell_events:
         at = [60.0 * m + s for label, m, s in zip(labels, *np.reshape(times, (2, -1)), strict=True) if label == wanted]
@@ -99,9 +101,6 @@ def _dwells(file: C3dFile, layout: C3dLayout, start: float) -> np.ndarray | None
     return np.stack(pairs, axis=1)
 
 
-def c3d_reader(mapping: Mapping) -> Reader:
+def c3d_reader(layout: C3dLayout, setup: Setup) -> Reader:
     """C3D files by the layout of a mapping."""
-    layout = mapping.c3d
-    if layout is None:
-        raise InputError("mapping", "c3d: missing")
-    return Reader(lambda files: read_c3d(files, layout, mapping.setup), lambda path: path.stem)
+    return Reader(lambda files: read_c3d(files, layout, setup), lambda path: path.stem)

@@ -9,7 +9,7 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.io.assemble import Reader
 from calibration.io.csv_text import CsvText, read_text
-from calibration.io.mapping import ANGLES, LENGTHS, MOMENTS, CsvTable, Mapping, PlateChannels
+from calibration.io.mapping import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels
 from calibration.io.plate_convention import checked_against_cop, to_action
 from calibration.io.recorded import Joints, Markers, Means, Plates, Recorded
 from calibration.schema import Plate, Setup
@@ -80,17 +80,15 @@ def _check_times(text: CsvText, column: str, t: np.ndarray) -> None:
 
 
 def _joints(text: CsvText, table: CsvTable, t: np.ndarray) -> Joints:
-    def of(field: str, per_second: bool = True) -> np.ndarray:
+    def of(field: str) -> np.ndarray:
         columns = []
         for channel in table.joints.values():
-            name = getattr(channel, field)
-            factor = _UNITS[channel.unit] if per_second else 1.0
-            columns.append(np.full(len(t), np.nan) if name is None else text.numbers([name], factor)[:, 0])
+            name, factor = getattr(channel, field), 1.0 if field == "effort" else _UNITS[channel.unit]
+            known = [np.nan] * len(t) if name is None else text.numbers([name], factor, gaps=field != "motor")[:, 0]
+            columns.append(np.asarray(known))
         return np.stack(columns, axis=1)
 
-    return Joints(
-        t, tuple(table.joints), of("motor"), of("link"), of("velocity"), of("effort", per_second=False), of("command")
-    )
+    return Joints(t, tuple(table.joints), of("motor"), of("link"), of("velocity"), of("effort"), of("command"))
 
 
 def _plates(text: CsvText, table: CsvTable, setup: Setup, t: np.ndarray) -> tuple[Plates | None, tuple[str, ...]]:
@@ -125,9 +123,9 @@ def _unused(text: CsvText, table: CsvTable) -> tuple[str, ...]:
     return (f"{text.path.name}: columns not used: {', '.join(left)}",) if left else ()
 
 
-def csv_reader(mapping: Mapping) -> Reader:
+def csv_reader(tables: Sequence[CsvTable], setup: Setup) -> Reader:
     """CSV files by the tables of a mapping."""
     return Reader(
-        lambda files: read_csv(files, mapping.csv, mapping.setup),
-        lambda path: path.name.removesuffix(table_of(path, mapping.csv).suffix),
+        lambda files: read_csv(files, tables, setup),
+        lambda path: path.name.removesuffix(table_of(path, tables).suffix),
     )

@@ -54,7 +54,7 @@ class MappedBody(Declaration):
     def _is_placed_once(self) -> "MappedBody":
         if self.markers and (self.undrawn or self.fitted or self.standing):
             raise ValueError(f"body {self.name}: markers are drawn, so it is neither undrawn, standing nor fitted")
-        if not self.markers and self.fitted == (self.standing is not None):
+        if (self.undrawn or self.fitted or self.standing) and self.fitted == (self.standing is not None):
             raise ValueError(
                 f"body {self.name}: say how it is placed: `markers` with xyz, `standing`, or `fitted: true`"
             )
@@ -210,6 +210,35 @@ class C3dLayout(Declaration):
     dwell_events: tuple[str, str] | None = None
 
 
+class BagLayout(Declaration):
+    """What is what in the bags; ROS has radians and metres.
+
+    Attributes:
+        source: Where the readings are: in JointState topics, or in PAL's introspection.
+        joints: Name of each joint in the bag.
+        motor: JointState topic of the motor side.
+        link: JointState topic of the link encoders.
+        command: JointState topic of the set-points.
+        names: Introspection topic of the names.
+        values: Introspection topic of the values.
+    """
+
+    source: Literal["joint_states", "introspection"]
+    joints: dict[str, str]
+    motor: str = "/joint_states"
+    link: str | None = None
+    command: str | None = None
+    names: str = "/introspection_data/names"
+    values: str = "/introspection_data/values"
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics that are read."""
+        if self.source == "introspection":
+            return self.names, self.values
+        return tuple(topic for topic in (self.motor, self.link, self.command) if topic is not None)
+
+
 class Mapping(Declaration):
     """The whole mapping file.
 
@@ -220,6 +249,7 @@ class Mapping(Declaration):
         trials: The trials.
         csv: Kinds of CSV files.
         c3d: What is what in the C3D files.
+        bag: What is what in the bags.
     """
 
     urdf: str
@@ -228,6 +258,7 @@ class Mapping(Declaration):
     trials: Annotated[tuple[MappedTrial, ...], Field(min_length=1)]
     csv: tuple[CsvTable, ...] = ()
     c3d: C3dLayout | None = None
+    bag: BagLayout | None = None
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> "Mapping":

@@ -1,0 +1,83 @@
+"""The mapping file that reads exported files back: what a dataset knows and its files do not say."""
+
+from collections.abc import Sequence
+
+from calibration.io.bag_messages import ABSOLUTE, COMMAND, MOTOR
+from calibration.io.c3d_write import DWELL_EVENTS
+from calibration.io.csv_write import FIELDS, plate_columns
+from calibration.io.mapping import (
+    BagLayout,
+    C3dLayout,
+    C3dPlateMap,
+    CsvTable,
+    CsvTime,
+    JointChannels,
+    MappedBody,
+    MappedTrial,
+    Mapping,
+)
+from calibration.means import PostureMeans
+from calibration.recording import Trial
+from calibration.robot import Chain
+from calibration.schema import Description, Setup, TrialEntry
+
+_T = CsvTime(column="t", unit="s")
+
+
+def mapping_of(
+    description: Description, chain: Chain, trials: Sequence[tuple[TrialEntry, Trial | PostureMeans]]
+) -> Mapping:
+    """The mapping of exported trials; it reads them from any of the formats, the robot beside it in `nominal.urdf`."""
+    setup = Setup.model_validate({name: getattr(description, name) for name in Setup.model_fields})
+    names = [m.name for b in description.bodies for m in b.markers]
+    plates = {p.name: C3dPlateMap(number=k + 1, convention="reaction") for k, p in enumerate(description.plates)}
+    static = any(isinstance(trial, Trial) and len(trial.dwell_start) for _, trial in trials)
+    return Mapping(
+        urdf="nominal.urdf",
+        setup=setup,
+        bodies=tuple(
+            MappedBody(name=b.name, link=b.link, markers=b.markers, placement=b.placement) for b in description.bodies
+        ),
+        trials=tuple(_trial(entry, trial) for entry, trial in trials),
+        csv=_tables(description, chain, trials),
+        c3d=C3dLayout(
+            markers={n: n for n in names}, plates=plates, dwell_events=DWELL_EVENTS if static else None
+        ),
+        bag=BagLayout(
+            source="joint_states", motor=MOTOR, link=ABSOLUTE, command=COMMAND,
+            joints={j: j for j in description.joint_names},
+        ),
+    )  # fmt: skip
+
+
+def _trial(entry: TrialEntry, trial: Trial | PostureMeans) -> MappedTrial:
+    dwells = None
+    if isinstance(trial, Trial) and len(trial.dwell_start):
+        dwells = tuple((float(a), float(b)) for a, b in zip(trial.dwell_start, trial.dwell_stop, strict=True))
+    approach = tuple(tuple(int(x) for x in row) for row in trial.approach) if trial.approach.any() else None
+    known = {"id": entry.id, "role": entry.role, "kind": entry.kind, "motion": entry.motion, "payload": entry.payload}
+    return MappedTrial.model_validate(known | {"dwells": dwells, "approach": approach})
+
+
+def _tables(
+    description: Description, chain: Chain, trials: Sequence[tuple[TrialEntry, Trial | PostureMeans]]
+) -> tuple[CsvTable, ...]:
+    names = [m.name for b in description.bodies for m in b.markers]
+    markers = {n: (f"{n}_x", f"{n}_y", f"{n}_z") for n in names}
+    units = {j: "m" if chain.is_prismatic(j) else "rad" for j in description.joint_names}
+    tables = []
+    stds = [float(t.marker_position_std.max()) for _, t in trials if isinstance(t, PostureMeans)]
+    if stds:
+        joints = {j: JointChannels.model_validate({"motor": j, "unit": u}) for j, u in units.items()}
+        tables.append(CsvTable(suffix=".postures.csv", marker_std=max(stds), markers=markers, joints=joints))
+    channels = {j: {f: f"{j}_{f}" for f in FIELDS} | {"unit": u} for j, u in units.items()}
+    tables += [
+        CsvTable(suffix=".mocap.csv", time=_T, markers=markers),
+        CsvTable(
+            suffix=".robot.csv", time=_T, joints={j: JointChannels.model_validate(c) for j, c in channels.items()}
+        ),
+    ]
+    if description.plates:
+        plates = {p.name: plate_columns(p.name) for p in description.plates}
+        tables.append(CsvTable(suffix=".plate.csv", time=_T, plates=plates))
+    return tuple(tables)
