@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -5,6 +7,7 @@ import pytest
 import mjcf
 from scenarios import load
 from twin import build, load_test, release_test
+from twin.defects.contact import TurnsLate
 from twin.draw import draw
 from twin.stiffness import spatial_stiffness
 
@@ -57,6 +60,46 @@ def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
     base = twin.model.body("base_footprint").id
     weight, centre = 9.81 * twin.model.body_subtreemass[base], data.subtree_com[base] - data.xpos[base]
     np.testing.assert_allclose(np.diag(found.K_gravity)[3:5], -weight * centre[2], rtol=0.2)  # loads turn with the base
+
+
+TORSION = {
+    "z": ["twin.base.drive.torsion=[0.0, 0.0, 400.0]"],
+    "xyz": [f"twin.base.{w}.torsion=[600.0, 500.0, 400.0]" for w in ("drive", "caster_front", "caster_back")],
+}
+
+
+@pytest.mark.parametrize(("axes", "ground"), [("z", "contact"), ("xyz", "contact"), ("xyz", "anchored")])
+def test_torsion_is_carried_to_the_floor(nominal, axes, ground):
+    twin, wheels = standing(nominal, *TORSION[axes], f"twin.base.wheels={ground}")
+    K, _ = spatial_stiffness(wheels)
+    found = load_test(twin).K
+    assert error(found, K) < 1e-3
+    plain, _ = spatial_stiffness([replace(w, bushing=replace(w.bushing, torsion=(0.0, 0.0, 0.0))) for w in wheels])
+    assert error(found, plain) > 0.2  # what a contact that cannot transmit it would leave
+
+
+def test_a_point_contact_carries_no_torsion(nominal):
+    twin, wheels = standing(nominal, *TORSION["z"])
+    for wheel in wheels:
+        twin.model.geom(wheel.contact_geom).condim[0] = 3
+    plain, _ = spatial_stiffness([replace(w, bushing=replace(w.bushing, torsion=(0.0, 0.0, 0.0))) for w in wheels])
+    assert error(load_test(twin).K, plain) < 1e-3
+
+
+def test_torsional_damping_that_a_light_wheel_cannot_follow_is_refused(nominal):
+    with pytest.raises(TurnsLate, match="torsional damping 5 .*anchored"):
+        standing(nominal, *TORSION["xyz"], "twin.base.caster_back.torsion_damping=[5.0, 5.0, 5.0]")
+
+
+@pytest.mark.parametrize("stiffness", [2e5, 8e5, 3e6])
+def test_soft_contacts_alone_carry_heave_and_tilt(nominal, stiffness):
+    kinds = ("drive", "caster_front", "caster_back")
+    contacts = [f"twin.base.{w}.contact_stiffness={stiffness}" for w in kinds]
+    twin, wheels = standing(nominal, "twin.base.wheels=rigid", *contacts)
+    K, C = spatial_stiffness(wheels)
+    assert error(load_test(twin).K, K) < 0.01
+    if stiffness == 8e5:
+        np.testing.assert_allclose(np.diag(release_test(twin))[2:5], np.diag(C)[2:5], rtol=0.05)
 
 
 def test_the_bare_nominal_robot_can_be_tested():

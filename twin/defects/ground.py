@@ -15,10 +15,11 @@ from scipy.spatial.transform import Rotation
 
 from twin.defects.base import Defect, Parameter, body
 from twin.defects.bushing import DIRECTIONS, Bushing
-from twin.defects.contact import Contact
+from twin.defects.contact import Contact, TurnsLate
 
 Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
+_LATE = 0.1  # torsional damping times step over inertia of the wheel [-]
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,15 @@ class Wheel(Defect):
         if self.footing is not None:
             torsion = None if self.bushing is None else np.array(self.bushing.torsion)
             self.footing.tune(model, self.name, self.contact_geom, torsion)
+            self._check_torsion(model)
+
+    def _check_torsion(self, model: mujoco.MjModel) -> None:
+        """The contact holds the wheel by its bare inertia, the damper acts on what it holds."""
+        if self.bushing is None or not any(self.bushing.torsion_damping):
+            return
+        limit = _LATE * float(model.body(self.body_name).inertia.min()) / model.opt.timestep
+        if max(self.bushing.torsion_damping) > limit:
+            raise TurnsLate(self.name, max(self.bushing.torsion_damping), limit)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Bushing and contact, what there is of them."""
