@@ -16,7 +16,7 @@ from scipy.linalg import lapack
 
 from calibration.linearised import Linearised, Prior
 
-_HELD = 4.0
+_HELD = 20.0
 _STEPS = 30
 _SAME = 1e-3  # iterations stop below this change of any log v, or log f [-]
 _LARGEST = 1.0  # of a standard deviation [rad, m]: data that ask for more do not belong to the model
@@ -115,9 +115,9 @@ def _point(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> _Point
     step = covariance @ (flat.T @ r.ravel() + precision * off)
     rest, off = r - (flat @ step).reshape(n, d), off - step
     K = root @ noise.B
-    KA = np.swapaxes(K, 1, 2) @ A
-    trace = (K**2).sum(axis=(0, 1)) - ((KA @ covariance) * KA).sum(axis=(0, 2))
-    slope = 0.5 * (trace - (np.einsum("ndm,nd->nm", K, rest) ** 2).sum(axis=0))
+    known = ((flat @ covariance).reshape(n, d, p) @ np.swapaxes(A, 1, 2)) @ K
+    trace = (K * (K - known)).sum(axis=(0, 1))
+    slope = 0.5 * (trace - ((K * rest[..., None]).sum(axis=1) ** 2).sum(axis=0))
     together = 0.5 * ((np.swapaxes(K, 1, 2) @ K) ** 2).sum(axis=0)
     groups = np.eye(len(noise.floor))[noise.group]
     value = log_det - 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())

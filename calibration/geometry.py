@@ -10,11 +10,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from calibration.estimate import Model
+from calibration.geometry_guards import distinct, joint_lengths
 from calibration.hand import nominal_hand
 from calibration.hand_fit import fit
 from calibration.identifiability import Identifiability, identifiability
 from calibration.map_fit import Fit
-from calibration.parameters import METRES_PER_RAD, ParameterSet, geometry_parameters, play_floor, play_start
+from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
 from calibration.postures import Postures
 from calibration.result import model_of
 from calibration.robot import Chain
@@ -53,27 +54,14 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     return model_of("model_2", chain, parameters, found), tuple(verdicts)
 
 
-def distinct(q: np.ndarray, apart: np.ndarray) -> int:
-    """Number of postures q (n, k) that differ from all earlier counted ones by `apart` (k,) in some joint."""
-    kept: list[np.ndarray] = []
-    for row in q:
-        if all((np.abs(row - other) > apart).any() for other in kept):
-            kept.append(row)
-    return len(kept)
-
-
-def _lengths(chain: Chain) -> np.ndarray:
-    return np.array([METRES_PER_RAD if chain.is_prismatic(name) else 1.0 for name in chain.joints])
-
-
 def _spans(chain: Chain, postures: Postures) -> np.ndarray:
-    return np.ptp(postures.q[:, chain.columns], axis=0) / _lengths(chain)
+    return np.ptp(postures.q[:, chain.columns], axis=0) / joint_lengths(chain)
 
 
 def _too_little(chain: Chain, postures: Postures, known: Identifiability) -> Iterator[str]:
     """Why the postures cannot carry the model."""
     needed = int(np.ceil(2 * (6 + 4 * len(chain.joints)) / 6))
-    n = distinct(postures.q[:, chain.columns], _APART * _lengths(chain))
+    n = distinct(postures.q[:, chain.columns], _APART * joint_lengths(chain))
     if n < needed:
         yield f"{n} distinct postures among {len(postures)}; at least {needed} are needed, spread over all joints"
     if not known.clear or known.condition > _CONDITION:
@@ -89,7 +77,7 @@ def _implausible(parameters: ParameterSet, found: Fit, play: np.ndarray, chain: 
         yield "the fit did not converge: model and data do not belong together"
     p, k = len(parameters), len(chain.joints)
     off = np.abs(found.theta - parameters.nominal)
-    limit = np.append(_TOLERANCES * parameters.tolerance[: p - k], _OFFSET * _lengths(chain))
+    limit = np.append(_TOLERANCES * parameters.tolerance[: p - k], _OFFSET * joint_lengths(chain))
     for i in np.flatnonzero(off > limit):
         yield f"{parameters.names[i]} = {found.theta[i]:.3g} {parameters.units[i]} is beyond belief ({limit[i]:.2g})"
     for name, s, limit_s in zip(chain.joints, found.play, _TOLERANCES * play, strict=True):

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.kinematics import Path
+from calibration.kinematics import Path, along, joints_to_end
 from calibration.robot import Chain
 from calibration.se3 import adjoint, from_vector, inverse, local_twist
 from calibration.twists import jexp6
@@ -100,12 +100,12 @@ class HandModel:
         if tau is None:
             tau = self.chain.gravity_torques(q)
         placed = self._path().placed(q[:, self.chain.columns] - self.offset - self.compliance * tau)
-        G, S = placed.to_end(), self.chain.path.twists
-        J, J_joint = np.empty((len(q), 6, p)), np.einsum("nakb,kb->nak", G[:, :, 1:], S)
-        J[:, :, :6], J[:, :, 6:12] = -G[:, :, 0] @ local_twist(self.base), local_twist(self.hand)
+        A, L = placed.to_end()
+        J, J_joint = np.empty((len(q), 6, p)), joints_to_end(A, L, self.chain.path.twists)
+        J[:, :, :6], J[:, :, 6:12] = along(A[0], L[0], -local_twist(self.base)), local_twist(self.hand)
         if p > 12:
-            for i, xi in enumerate(self.chain.xi):
-                J[:, :, 12 + 6 * i : 18 + 6 * i] = G[:, :, i + 1] @ jexp6(xi)
+            for i, M in enumerate(jexp6(self.chain.xi), start=1):
+                J[:, :, 6 + 6 * i : 12 + 6 * i] = along(A[i], L[i], M)
             J[:, :, 12 + 6 * k : 12 + 7 * k] = -J_joint
         if p > 12 + 7 * k:
             J[:, :, 12 + 7 * k :] = -tau[:, None, :] * J_joint

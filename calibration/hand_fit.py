@@ -1,7 +1,7 @@
 """The hand model fitted to static postures: residuals, sources of random errors, priors.
 
     r_i = log6(T_measured_i^-1 T_B_H(q_i, theta))       local twist [m, rad], where the hand's pose was measured
-    r_i = T_B_H(q_i, theta) x_m - y_im                  [m, base body], where single points x_m of it were
+    r_i = p_B_H(q_i, theta) - p_measured_i              [m, base body's axes], where its position alone was
 
 Random errors: each joint's reading along its lever arms, the hand's position and rotation where asked for, the markers.
 """
@@ -86,6 +86,9 @@ def fit_weighted(model: HandModel, parameters: ParameterSet, postures: Postures,
 def linearised(model: HandModel, theta: np.ndarray, postures: Postures, tau: np.ndarray | None = None) -> Linearised:
     """Residuals and derivatives by theta, the first (p,) of the model's parameters; tau as the model takes it."""
     found = model.with_theta(theta).poses_and_derivatives(postures.q, tau, len(theta))
+    if postures.covariance.shape[1] == 3:
+        R, r = found.T[:, :3, :3], found.T[:, :3, 3] - postures.T_base_hand[:, :3, 3]
+        return Linearised(theta, r, R @ found.J[:, :3], R @ found.J_joint[:, :3])
     r = log6(inverse(postures.T_base_hand) @ found.T)
     J_log = jlog6(r)
     return Linearised(theta, r, J_log @ found.J, J_log @ found.J_joint)

@@ -89,6 +89,8 @@ def identifiability(J: np.ndarray, parameters: ParameterSet) -> Identifiability:
     """Rank and combinations of the whitened Jacobian J (m, p)."""
     scale = parameters.scale
     A = J * scale
+    if len(A) > A.shape[1]:
+        A = np.linalg.qr(A, mode="r")  # the same lengths and angles between columns, fewer rows
     values = np.linalg.svd(A, compute_uv=False)
     values = np.concatenate([values, np.zeros(max(0, len(scale) - len(values)))])
     rank = int((values > _CLIFF * values[0]).sum())

@@ -32,20 +32,17 @@ class Placed:
     R: np.ndarray
     p: np.ndarray
 
-    def to_end(self) -> np.ndarray:
-        """G of the start and of the frame before each joint, (n, 6, k + 1, 6)."""
+    def to_end(self) -> tuple[np.ndarray, np.ndarray]:
+        """A and A x u of the start and of the frame before each joint, both (k + 1, n, 3, 3)."""
         n, _, k = self.p.shape
-        R_end, p_end = self.T[:, :3, :3], self.T[:, :3, 3]
-        columns = np.concatenate(
-            [np.broadcast_to(np.eye(3), (n, 3, 3)), self.R, p_end[:, :, None], p_end[:, :, None] - self.p], axis=2
-        )
+        R_end, p_end = self.T[:, :3, :3], self.T[:, :3, 3:]
+        columns = np.concatenate([np.broadcast_to(np.eye(3), (n, 3, 3)), self.R, p_end, p_end - self.p], axis=2)
         turned = np.swapaxes(R_end, 1, 2) @ columns
-        A, u = turned[:, :, : 3 * (k + 1)].reshape(n, 3, k + 1, 3), turned[:, :, 3 * (k + 1) :, None]
-        G = np.zeros((n, 6, k + 1, 6))
-        G[:, :3, :, :3] = G[:, 3:, :, 3:] = A
+        A = np.ascontiguousarray(turned[:, :, : 3 * (k + 1)].reshape(n, 3, k + 1, 3).transpose(2, 0, 1, 3))
+        u, L = turned[:, :, 3 * (k + 1) :].transpose(2, 0, 1)[..., None], np.empty_like(A)
         for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            G[:, i, :, 3:] = A[:, j] * u[:, l] - A[:, l] * u[:, j]
-        return G
+            L[:, :, i] = A[:, :, j] * u[:, :, l] - A[:, :, l] * u[:, :, j]
+        return A, L
 
 
 @dataclass(frozen=True)
@@ -97,6 +94,21 @@ def _turned(R: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
     rows = R.reshape(-1, 3)
     first, second = (rows @ W).reshape(R.shape), (rows @ (W @ W)).reshape(R.shape)
     return R + np.sin(angle)[:, None, None] * first + (1.0 - np.cos(angle))[:, None, None] * second
+
+
+def along(A: np.ndarray, L: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """G M (n, 6, c) of one frame's A and L (n, 3, 3) and constant local twists M (6, c)."""
+    n, c = len(A), M.shape[1]
+    J = np.empty((n, 6, c))
+    J[:, :3] = (A.reshape(-1, 3) @ M[:3] + L.reshape(-1, 3) @ M[3:]).reshape(n, 3, c)
+    J[:, 3:] = (A.reshape(-1, 3) @ M[3:]).reshape(n, 3, c)
+    return J
+
+
+def joints_to_end(A: np.ndarray, L: np.ndarray, twists: np.ndarray) -> np.ndarray:
+    """Local twists of the end (n, 6, k) at unit joint velocities, A and L as `Placed.to_end` gives them."""
+    v, w = twists[:, None, :3, None], twists[:, None, 3:, None]
+    return np.concatenate([(A[1:] @ v + L[1:] @ w)[..., 0], (A[1:] @ w)[..., 0]], axis=2).transpose(1, 2, 0)
 
 
 def path_of(model: pin.Model, start: int, end: int) -> Path:

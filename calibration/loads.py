@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from calibration.kinematics import Path
+from calibration.se3 import skew
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,12 @@ def loads_of(model: pin.Model, joints: tuple[str, ...], base_frame: str) -> Load
 def gravity_torques(path: Path, loads: Loads, q: np.ndarray) -> np.ndarray:
     """Torques (n, k) [N.m, N] that hold the joints at positions q (n, k) [rad, m]."""
     placed, (n, k) = path.placed(q), q.shape
-    R = np.concatenate([placed.R.reshape(n, 3, k, 3)[:, :, 1:], placed.T[:, :3, None, :3]], axis=2)
-    moved = np.einsum("naib,icb->naic", R, path.fixed[1:, :3, :3])
-    origin = np.moveaxis(placed.p, 1, 2)
-    moment = loads.mass[:, None] * (origin + np.einsum("naib,ib->nia", moved, loads.centre))
-    if path.prismatic.any():  # what slides has its frame's origin elsewhere than the frame before the joint
-        slid = np.where(path.prismatic, q, 0.0)[..., None] * np.einsum("naib,ib->nia", moved, path.axis)
-        moment = moment + loads.mass[:, None] * slid
+    after = np.concatenate([placed.R.reshape(n, 3, k, 3)[:, :, 1:], placed.T[:, :3, None, :3]], axis=2)
+    moved = np.swapaxes(after, 1, 2) @ np.swapaxes(path.fixed[1:, :3, :3], 1, 2)  # joint frames after their motion
+    origin, axis = np.moveaxis(placed.p, 1, 2), (moved @ path.axis[..., None])[..., 0]
+    moment = origin + (moved @ loads.centre[..., None])[..., 0] + np.where(path.prismatic, q, 0.0)[..., None] * axis
     carried = np.cumsum(loads.mass[::-1])[::-1]
-    lever = np.cumsum(moment[:, ::-1], axis=1)[:, ::-1] - carried[:, None] * origin
-    axis = np.einsum("naib,ib->nia", moved, path.axis)
-    turning = -np.cross(axis, lever) @ loads.gravity
+    lever = np.cumsum((loads.mass[:, None] * moment)[:, ::-1], axis=1)[:, ::-1] - carried[:, None] * origin
+    # -g . (a x lever) = (g x a) . (-lever)
+    turning = -(lever * (axis @ skew(loads.gravity).T)).sum(axis=2)
     return np.where(path.prismatic, -(axis @ loads.gravity) * carried, turning)

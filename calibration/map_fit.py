@@ -21,10 +21,11 @@ from scipy.linalg import lapack
 from calibration.evidence import Noise, Widths, inverse_and_log_det, moved_by, refined
 from calibration.linearised import Linearised, Prior
 
-_OUTER = 30
+_OUTER = 15
 _PROMISE = 1e-10  # Gauss-Newton stops when a step promises a smaller decrease of the cost [-]: 1e-5 sigma
 _SAME = 1e-3  # outer iterations stop below this change of log s [-]
-_MANY = 256  # postures the evidence is asked with: standard deviations to 3 %
+_HASTY = 0.05
+_MANY = 160  # postures the evidence is asked with: standard deviations to 4 %
 _LEVERAGE = 20.0  # components per parameter above which a posture hardly moves its own prediction
 _ALIKE = 1e-5  # smallest over largest pivot of the normal equations [-]
 _log = logging.getLogger(__name__)
@@ -98,20 +99,24 @@ class _Step:
     cost: float
 
 
-def solve(problem: Problem, theta: np.ndarray, weigh: Callable[[np.ndarray], np.ndarray] | None = None) -> Fit:
+def solve(
+    problem: Problem, theta: np.ndarray, weigh: Callable[[np.ndarray], np.ndarray] | None = None, hasty: bool = False
+) -> Fit:
     """Alternate evidence and Gauss-Newton from theta (p,) until both stand still.
 
     Args:
         problem: What is to be fitted.
         theta: Start.
         weigh: Weights (n,) from squared distances (n,) as `distances` gives them; one where it is not given.
+        hasty: Be content with widths to a twentieth and theta to a tenth of a sigma.
     """
+    same, promise = (_HASTY, _HASTY) if hasty else (_SAME, _PROMISE)
     at, widths = problem.linearise(theta), problem.widths
     noise = problem.sources(at)
     some = np.unique(np.linspace(0, len(at.r) - 1, _MANY).astype(int))
     change = np.inf
     for _ in range(_OUTER):
-        settled = change < _SAME
+        settled = change < same
         old = widths
         widths = old if settled else refined(at.rows(some), noise.rows(some), problem.prior, widths)
         W = noise.whitener(widths.noise)
@@ -119,9 +124,12 @@ def solve(problem: Problem, theta: np.ndarray, weigh: Callable[[np.ndarray], np.
         if not settled:
             change = max(moved_by(old.noise, widths.noise, 10.0 * noise.floor), moved_by(old.prior, widths.prior, 0.0))
         if weigh is not None and not settled:
-            noise, before = replace(noise, weight=weigh(distances(at, noise, widths, step))), noise
+            noise, before = (
+                replace(noise, weight=weigh(distances(at, noise, widths, step.covariance, step.change))),
+                noise,
+            )
             change = max(change, float(np.abs(noise.weight - before.weight).max()))
-        still = step.promise < _PROMISE
+        still = step.promise < promise
         if still and settled:
             return Fit(at, noise, widths, step.covariance, W, True)
         lower = at if still else _descended(problem, at, W, widths, step)
@@ -131,17 +139,17 @@ def solve(problem: Problem, theta: np.ndarray, weigh: Callable[[np.ndarray], np.
     return Fit(at, noise, widths, step.covariance, W, False)
 
 
-def distances(at: Linearised, noise: Noise, widths: Widths, step: _Step) -> np.ndarray:
-    """Squared Mahalanobis distance (n,) of each posture from what all others predict of it [-].
+def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Squared Mahalanobis distance (n,) of each posture from what all others predict, theta moved by `change` [-].
 
     r' (I - w M)^-1 (I - w M + M)^-1 r,     M = W J covariance J' W'
     """
     root, (n, d, p) = noise.roots(widths.noise), at.J.shape
-    r = (root @ (at.r + at.J @ step.change)[..., None])[..., 0]
+    r = (root @ (at.r + at.J @ change)[..., None])[..., 0]
     if n * d > _LEVERAGE * p:
         return (r**2).sum(axis=1)
     A = root @ at.J
-    M, eye = A @ step.covariance @ np.swapaxes(A, 1, 2), np.eye(d)
+    M, eye = A @ covariance @ np.swapaxes(A, 1, 2), np.eye(d)
     left = eye - noise.weight[:, None, None] * M
     # Rounding may leave a posture that is nowhere else in the data a negative share.
     inner = np.linalg.solve(left, np.linalg.solve(left + M, r[..., None]))[..., 0]

@@ -21,7 +21,11 @@ def implausible_inputs(description: Description, chain: Chain, trials: Sequence[
         if np.isfinite(ratio) and not 1.0 / _SCALE < ratio < _SCALE:
             unit = " (recorded in millimetres?)" if 500.0 < ratio < 2000.0 else ""
             yield f"markers of body {body.name!r} are {ratio:.3g} times as far apart as dataset.json says{unit}"
-    q = np.concatenate([trial.q_motor for trial in trials])
+    yield from implausible_readings(chain, np.concatenate([trial.q_motor for trial in trials]))
+
+
+def implausible_readings(chain: Chain, q: np.ndarray) -> Iterator[str]:
+    """Joints whose readings q (n, n_measured) are far outside their limits."""
     if not len(q):
         return
     for name, column, low, high in zip(chain.measured, q.T, *chain.limits(), strict=True):

@@ -36,8 +36,10 @@ class Postures:
 
     Attributes:
         q: (n, n_measured) mean motor-side readings [rad, m].
-        T_base_hand: (n, 4, 4) measured pose of the hand body in the base body.
-        covariance: (n, 6, 6) of its local twist [m, rad].
+        T_base_hand: (n, 4, 4) measured pose of the hand body in the base body; its rotation means nothing where only a
+            point of the hand was seen.
+        covariance: (n, 6, 6) of its local twist [m, rad]; (n, 3, 3) of its position in the base body's axes where only
+            a point was seen.
         misfit: (n,) rms distance of markers from their nominal places in their cluster [m].
     """
 
@@ -48,6 +50,10 @@ class Postures:
 
     def __len__(self) -> int:
         return len(self.q)
+
+    def rows(self, chosen: np.ndarray) -> "Postures":
+        """Some of the postures."""
+        return Postures(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
     def joined(self, other: "Postures") -> "Postures":
         """These postures, then the other ones."""

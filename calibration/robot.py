@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from calibration.errors import InputError, NoSuchElement, ShapeError
-from calibration.kinematics import Path, path_of
+from calibration.kinematics import Path, along, joints_to_end, path_of
 from calibration.loads import Loads, gravity_torques, loads_of
 from calibration.schema import Description
 from calibration.twists import exp6, jexp6
@@ -98,15 +98,14 @@ class Chain:
         """Poses of the tool frame with d(pose)/d(xi) and d(pose)/dq, at q (n, n_measured) [rad, m]."""
         self._check(q)
         placed = self.path.placed(q[:, self.columns])
-        G, k = placed.to_end(), len(self.joints)
-        J = np.concatenate([G[:, :, i + 1] @ jexp6(xi) for i, xi in enumerate(self.xi)], axis=2)
-        J_joint = np.einsum("nakb,kb->nak", G[:, :, 1:], self.path.twists)
-        return ChainPoses(placed.T, J.reshape(len(q), 6, 6 * k), J_joint)
+        A, L = placed.to_end()
+        J = [along(A[i], L[i], M) for i, M in enumerate(jexp6(self.xi), start=1)]
+        return ChainPoses(placed.T, np.concatenate(J, axis=2), joints_to_end(A, L, self.path.twists))
 
     def joint_jacobians(self, q: np.ndarray) -> np.ndarray:
         """Derivatives of the tool's pose by joint position (n, 6, k), local twists, at q (n, n_measured)."""
         self._check(q)
-        return np.einsum("nakb,kb->nak", self.path.placed(q[:, self.columns]).to_end()[:, :, 1:], self.path.twists)
+        return joints_to_end(*self.path.placed(q[:, self.columns]).to_end(), self.path.twists)
 
     def gravity_torques(self, q: np.ndarray) -> np.ndarray:
         """Torques (n, k) [N.m, N] that hold the chain's joints at q (n, n_measured), nominal geometry and masses."""

@@ -14,6 +14,7 @@ from calibration.se3 import compose, rotation_vector, skew
 
 _SMALL = 0.25  # t^2 below which series are used [rad^2]
 _D = np.array([1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600])
+_INVERSE_FACTORIALS = 1.0 / np.cumprod(np.maximum(np.arange(22.0), 1.0))
 _NEAR_PI = 3.0  # rotations beyond this angle [rad] have no reliable axis in R - R'
 
 
@@ -51,7 +52,7 @@ def log3(R: np.ndarray) -> np.ndarray:
 
 
 def jexp6(twist: np.ndarray) -> np.ndarray:
-    """Right derivatives of exp6 (6, 6): exp6(x + dx) = exp6(x) exp6(Jexp6 dx), of one twist (6,)."""
+    """Right derivatives of exp6 (..., 6, 6) at twists (..., 6): exp6(x + dx) = exp6(x) exp6(Jexp6 dx)."""
     return np.linalg.inv(jlog6(twist))
 
 
@@ -85,13 +86,9 @@ def _sines(t2: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     series = [np.zeros_like(y) for _ in range(3)]
     for n in range(9, -1, -1):
         for k in range(3):
-            series[k] = 1.0 / _factorial(2 * n + 1 + k) - y * series[k]
+            series[k] = _INVERSE_FACTORIALS[2 * n + 1 + k] - y * series[k]
     a, b, c = (np.where(small, s, f)[..., None, None] for s, f in zip(series, closed, strict=True))
     return a, b, c
-
-
-def _factorial(n: int) -> float:
-    return float(np.prod(np.arange(1.0, n + 1.0)))
 
 
 def _d_and_slope(t2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,230 @@
+"""Full geometric calibration from arrays: a URDF, joint readings, marker positions. No file, no datasheet.
+
+The laboratory's frame, the marker body's place on the tool and its shape are unknown; three markers or more are
+compressed to one pose a posture, fewer give a position. Estimated are both frames, six increments for every joint
+placement, the zero of every reading and the compliance of every gear, together with the readings' and the hand's random
+errors and the priors' widths (`evidence`). Postures that no error of the robot explains are left out and named.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.errors import NotCalibrated, NotEnoughData, ShapeError
+from calibration.geometry_guards import joint_lengths, unusable_data, unusable_fit
+from calibration.hand import HandModel, nominal_hand
+from calibration.hand_fit import Errors, hand_problem
+from calibration.identifiability import Identifiability, identifiability
+from calibration.map_fit import Fit
+from calibration.marker_shape import Cluster, cluster, in_line
+from calibration.parameters import ParameterSet, parameter_names
+from calibration.postures import Postures
+from calibration.registration_start import Start, registration_start
+from calibration.robot import Chain, chain_of_frames
+from calibration.robust import robust_fit
+from calibration.se3 import adjoint, compose, inverse, skew
+from calibration.verdict import Verdict
+
+_STAGE = "geometry"
+_LEAST = 1e-6  # [m, rad] smallest noise of a measured pose
+_TORQUE = 0.5  # [N.m, N] a joint that gravity loads less has no own range of torque
+_FIXED = 1e-6  # [rad]
+_SPREAD = 250  # postures from which rank and combinations are told
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Standard deviations to begin with; the data move them.
+
+    Attributes:
+        translation: Of a joint placement, per axis [m].
+        rotation: Of a joint placement, per axis [rad].
+        offset: Of a reading's zero [rad, a tenth of it in m].
+        deflection: Of a gear at its own largest gravity torque [rad, a tenth of it in m].
+        reading: Of a joint's random reading error [rad, a tenth of it in m].
+        position: Of the hand's random position error [m].
+        orientation: Of the hand's random rotation error [rad].
+    """
+
+    translation: float = 4e-3
+    rotation: float = 8e-3
+    offset: float = 4e-2
+    deflection: float = 3e-2
+    reading: float = 2e-3
+    position: float = 5e-4
+    orientation: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Session:
+    """How far marker body and base are from where they were, on another day; standard deviations per axis.
+
+    Attributes:
+        base: Of the laboratory's frame in the base: translation [m], rotation [rad].
+        hand: Of the marker body in the tool: translation [m], rotation [rad].
+    """
+
+    base: tuple[float, float] = (1e-3, 2e-3)
+    hand: tuple[float, float] = (1e-3, 5e-3)
+
+    @property
+    def variances(self) -> np.ndarray:
+        """(12,) of the two local twists."""
+        return np.repeat([*self.base, *self.hand], 3) ** 2
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Predicted marker positions with their uncertainty.
+
+    Attributes:
+        positions: (n, m, 3) [m, lab].
+        covariance: (n, m, 3, 3) [m^2, lab]: parameters, random errors and, where asked for, another session.
+    """
+
+    positions: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True)
+class GeometryFit:
+    """A calibrated robot.
+
+    Attributes:
+        hand: The robot: T_B_H is the marker body's pose in the laboratory.
+        parameters: What was estimated.
+        fit: Values, covariance, random errors.
+        markers: (m, 3) in the hand's frame [m]; one at its origin where a point was seen.
+        left_out: Numbers of the postures that were not used.
+        verdicts: Findings, postures left out among them.
+        known: Rank, condition and combinations of parameters.
+    """
+
+    hand: HandModel
+    parameters: ParameterSet
+    fit: Fit
+    markers: np.ndarray
+    left_out: tuple[int, ...]
+    verdicts: tuple[Verdict, ...]
+    known: Identifiability
+
+    def predict(self, q: np.ndarray) -> np.ndarray:
+        """Marker positions (n, m, 3) [m, lab] at readings q (n, n_joints) [rad, m]."""
+        T = self.hand.poses(q)
+        return np.einsum("nij,mj->nmi", T[:, :3, :3], self.markers) + T[:, None, :3, 3]
+
+    def predict_with_covariance(self, q: np.ndarray, session: Session | None = None) -> Predicted:
+        """The same with covariance, of this session, or of any other one where `session` is given."""
+        found = self.hand.poses_and_derivatives(np.asarray(q, dtype=float))
+        k = len(self.fit.play)
+        sources = [found.J @ np.linalg.cholesky(self.fit.covariance), found.J_joint * self.fit.play]
+        pose = np.zeros(6)
+        pose[: 3 * len(self.fit.widths.noise[k:-1])] = np.repeat(self.fit.widths.noise[k:-1], 3)
+        sources.append(np.broadcast_to(np.diag(pose), (len(q), 6, 6)))
+        if session is not None:
+            both = np.concatenate([adjoint(inverse(found.T)), np.broadcast_to(np.eye(6), (len(q), 6, 6))], axis=2)
+            sources.append(both * np.sqrt(session.variances))
+        B = np.concatenate(sources, axis=2)
+        moved = found.T[:, None, :3, :3] @ (B[:, None, :3] - skew(self.markers) @ B[:, None, 3:])
+        positions = np.einsum("nij,mj->nmi", found.T[:, :3, :3], self.markers) + found.T[:, None, :3, 3]
+        return Predicted(positions, moved @ np.swapaxes(moved, 2, 3))
+
+
+def fit_geometry(
+    urdf: str,
+    joints: Sequence[str],
+    tool: str,
+    q: np.ndarray,
+    positions: np.ndarray,
+    base: str = "universe",
+    widths: Widths | None = None,
+) -> GeometryFit:
+    """Calibrate a robot's chain.
+
+    Args:
+        urdf: Text of a URDF.
+        joints: Names of the columns of q.
+        tool: Frame that carries the markers.
+        q: (n, n_joints) readings at rest [rad, m].
+        positions: (n, m, 3) markers in a frame that stands still with the base [m]; NaN where not seen.
+        base: Frame the chain starts from.
+        widths: To begin with.
+
+    Raises:
+        ShapeError, NotEnoughData: The arrays do not belong together or hold no usable posture.
+        NoSuchElement, InputError: Not a joint, frame or URDF.
+        NotCalibrated: The result must not be used, with every reason.
+    """
+    return fit_chain(chain_of_frames(urdf, tuple(joints), base, tool), q, positions, widths or Widths())
+
+
+def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths) -> GeometryFit:
+    """`fit_geometry` of a chain that was made before."""
+    q, positions = np.asarray(q, dtype=float), np.asarray(positions, dtype=float)
+    if positions.ndim != 3 or positions.shape[0] != len(q) or positions.shape[2] != 3:
+        raise ShapeError("positions", positions.shape, (len(q), "markers", 3))
+    postures, markers, usable = _postures(q, positions)
+    oriented = len(markers) > 1
+    start = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
+    if refused := list(unusable_data(chain, postures.q, start, 6 if oriented else 3)):
+        raise NotCalibrated(refused)
+    parameters = _parameters(chain, start, widths, postures, oriented)
+    nominal, reading = nominal_hand(chain, start.frames), widths.reading * joint_lengths(chain)
+    pose = np.array([widths.position, widths.orientation][: 1 + oriented])
+    errors = Errors(reading, 1e-2 * reading, pose)
+    found = robust_fit(
+        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors), len(postures), parameters.nominal
+    )
+    known = identifiability(found.fit.J_white[: 6 * _SPREAD], parameters)
+    if refused := list(unusable_fit(chain, parameters, found, known, len(postures))):
+        raise NotCalibrated(refused)
+    left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~found.kept].tolist()}))
+    verdicts = _verdicts(left_out, len(q), known, parameters)
+    return GeometryFit(nominal.with_theta(found.fit.theta), parameters, found.fit, markers, left_out, verdicts, known)
+
+
+def _verdicts(
+    left_out: tuple[int, ...], n: int, known: Identifiability, parameters: ParameterSet
+) -> tuple[Verdict, ...]:
+    message = f"{known.rank} combinations of {len(parameters)} parameters from {n - len(left_out)} postures"
+    said = [Verdict(_STAGE, "ok", f"{message}, condition {known.condition:.0f}")]
+    if left_out:
+        message = f"{len(left_out)} of {n} postures contradict the others and were left out, counted from 0: "
+        said.append(Verdict(_STAGE, "warning", message + ", ".join(map(str, left_out))))
+    return tuple(said)
+
+
+def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarray, np.ndarray]:
+    """Postures of the usable rows, the markers in the hand's frame, and which rows (n,) are usable."""
+    finite = np.isfinite(q).all(axis=1)
+    if positions.shape[1] == 1:
+        usable = finite & np.isfinite(positions[:, 0]).all(axis=1)
+        T = compose(np.tile(np.eye(3), (int(usable.sum()), 1, 1)), positions[usable, 0])
+        noise = np.tile(_LEAST**2 * np.eye(3), (len(T), 1, 1))
+        return Postures(q[usable], T, noise, np.zeros(len(T))), np.zeros((1, 3)), usable
+    if in_line(positions):
+        raise NotEnoughData("markers of a body must be three or more, not in line; or give one of them alone")
+    body: Cluster = cluster(positions)
+    usable = finite & ~body.odd & np.isfinite(body.T).all(axis=(1, 2))
+    covariance = body.covariance[usable] + np.diag(np.full(6, _LEAST**2))
+    return Postures(q[usable], body.T[usable], covariance, np.zeros(int(usable.sum()))), body.xyz, usable
+
+
+def _parameters(chain: Chain, start: Start, widths: Widths, postures: Postures, oriented: bool) -> ParameterSet:
+    """Everything, frames without a prior; what a single point cannot tell of the hand's rotation stays at zero."""
+    k, lengths = len(chain.joints), joint_lengths(chain)
+    torque = np.maximum(np.abs(chain.gravity_torques(postures.q)).max(axis=0), _TORQUE)
+    frames = np.full(12, np.inf)
+    frames[9:] = np.inf if oriented else _FIXED
+    placement = [widths.translation] * 3 + [widths.rotation] * 3
+    slides = [chain.is_prismatic(name) for name in chain.joints]
+    return ParameterSet(
+        parameter_names(chain),
+        ("m", "m", "m", "rad", "rad", "rad") * (2 + k)
+        + tuple("m" if s else "rad" for s in slides)
+        + tuple("m/N" if s else "rad/(N.m)" for s in slides),
+        np.concatenate([start.frames, np.zeros(8 * k)]),
+        np.concatenate([frames, placement * k, widths.offset * lengths, widths.deflection * lengths / torque]),
+        np.concatenate([np.full(12, -1), np.tile([0, 0, 0, 1, 1, 1], k), np.full(k, 2), np.full(k, 3)]),
+    )
