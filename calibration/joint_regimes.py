@@ -86,6 +86,8 @@ def on_repetitions(models: JointModels, trials: Iterable[Trial], terms: Terms) -
     """What the model explains of motions it has seen, in repetitions it has not: moving calibration trials."""
     moving = (trial for trial in trials if not len(trial.dwell_start))
     of_trials = [samples_of(models.inputs.of_trial(trial.id), trial, models.zero) for trial in moving]
+    if not of_trials:
+        return ()
     noise = models.inputs.description.sigmas.encoder
     columns = zip(models.inputs.measured, models.zero, zip(*of_trials, strict=True), strict=True)
     return tuple(

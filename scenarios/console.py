@@ -149,6 +149,14 @@ def verdicts(found: Sequence[Any]) -> Table:
     return table
 
 
+def records(found: Sequence[dict[str, str]]) -> Table:
+    """Return a table with a line for each record, its names as columns."""
+    table = _table(*found[0])
+    for record in found:
+        table.add_row(*(escape(text) for text in record.values()))
+    return table
+
+
 def _table(*columns: str) -> Table:
     """Return an empty table without lines; a unit in brackets is no markup."""
     table = Table(box=None, pad_edge=False)
