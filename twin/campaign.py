@@ -10,14 +10,13 @@ and the instrument, so that the files do not depend on the number of threads.
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 import mjcf
-from calibration.recording import Trial, write_trial
+from calibration.recording import write_trial
 from calibration.schema import TrialEntry
 from twin import session, truth
 from twin.build import Twin, build
@@ -29,48 +28,25 @@ from twin.defects.departures import Warming
 from twin.defects.ground import Wheel
 from twin.defects.loads import Payload
 from twin.defects.rolling import Rolling
-from twin.draw import BASE, Robot, draw
-from twin.instruments import mocap, plate, robot_log
-from twin.instruments.clock import Clock
-from twin.instruments.sampling import averaged, interpolate, interpolate_poses
-from twin.kinematic import arm_frame, carried, without_plate
-from twin.motions import JOINTS, Motion
-from twin.randomness import generator
+from twin.draw import draw
+from twin.kinematic import arm_frame, carried
+from twin.laboratory import EPOCH, Laboratory
+from twin.measure import instrument_errors, is_carried, links_seen, measure, plate_centre
+from twin.motions import Motion
 from twin.schedule import schedule
 from twin.session import CONFIRMATION, moved, remounted
 from twin.simulate import States, simulate
 from twin.stiffness import spatial_stiffness
-from twin.truth import TruthTrial
 from twin.uncertain import drawn
 
 Progress = Callable[[str, float], None]
-_EPOCH = 100.0  # [s] on the mocap clock when the first trial starts
-
-
-@dataclass(frozen=True)
-class Laboratory:
-    """One robot in its laboratory.
-
-    Attributes:
-        config: What the scenario says, its uncertain values drawn.
-        seed: Root of every random stream.
-        robot: The drawn robot.
-        twin: Its model.
-        T_lab_base: Where it is put down (4, 4).
-    """
-
-    config: TwinConfig
-    seed: int
-    robot: Robot
-    twin: Twin
-    T_lab_base: np.ndarray
 
 
 def laboratory(config: TwinConfig, seed: int) -> Laboratory:
     """Draw a robot and put it on its plate."""
     config, spec = drawn(config, seed), mjcf.spec()
     robot = draw(config, spec.compile(), seed)
-    twin = build(spec, robot.defects, sorted({c.link for c in robot.clusters} | {BASE}), config.timestep)
+    twin = build(spec, robot.defects, links_seen(config, robot), config.timestep)
     x, y, yaw = config.base.pose
     T_lab_base = exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, yaw]))
     T_lab_base[:2, 3] = x, y
@@ -103,7 +79,7 @@ def record(
     for folder in ("dataset/trials", "truth/trials"):
         (out / folder).mkdir(parents=True, exist_ok=True)
     motions = schedule(config.campaign, mjcf.spec().compile(), seed)
-    starts = _EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
+    starts = EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
     entries, done, total = [], 0.0, sum(m.duration for m in motions)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         sessions = (later if m.role == CONFIRMATION else lab for m in motions)
@@ -124,7 +100,7 @@ def record(
 
 
 def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry:
-    states = _states(lab, motion, start - _EPOCH + motion.duration / 2.0)
+    states = _states(lab, motion, start - EPOCH + motion.duration / 2.0)
     trial, true = measure(lab, motion, states, start)
     file = f"trials/{motion.id}.nc"
     digest = write_trial(out / "dataset" / file, trial)
@@ -142,13 +118,9 @@ def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry
 
 def _states(lab: Laboratory, motion: Motion, time: float) -> States:
     """What the motion does at `time` [s] of the campaign."""
-    if _is_carried(lab, motion):
+    if is_carried(lab, motion):
         return carried(lab.twin, motion, lab.T_lab_base)
     return simulate(_in_trial(lab, motion, time), motion, lab.T_lab_base)
-
-
-def _is_carried(lab: Laboratory, motion: Motion) -> bool:
-    return lab.config.campaign.carried or (motion.base is not None and motion.base.form == "kinematic")
 
 
 def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
@@ -167,82 +139,15 @@ def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
     return build(mjcf.spec(), defects, lab.twin.links, lab.config.timestep)
 
 
-def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tuple[Trial, TruthTrial]:
-    """What the instruments say of a trial that starts at `start` [s, mocap clock], and what was true."""
-    i, joints = lab.config.instruments, JOINTS
-    t = states.t + start
-    robot, force, camera = _clocks(lab.config)
-    stop = float(t[-1])
-    t_robot, true_robot = robot.ticks(start, stop, i.robot_rate)
-    t_plate, true_plate = force.ticks(start, stop, i.plate_rate)
-    t_mocap, _ = camera.ticks(start, stop, i.mocap_rate)
-    true = _true(lab, states, t_mocap, start)
-    log = robot_log.measured(true_robot - start, states, lab.robot.encoders, lab.config)
-    sigma = np.repeat([i.plate_force_noise, i.plate_moment_noise], 3)
-    wrench = plate.measured(true_plate, t, states.wrench, i.plate_rate, sigma, generator(lab.seed, motion.id, "plate"))
-    trial = Trial(
-        id=motion.id,
-        joint=joints,
-        t_robot=t_robot,
-        **asdict(log),
-        marker=true.marker,
-        marker_body=tuple(c.name for c in lab.robot.clusters for _ in c.marker_names),
-        t_mocap=t_mocap,
-        marker_position=mocap.measured(true.marker_position, i.marker_noise, generator(lab.seed, motion.id, "mocap")),
-        plate=("plate",),
-        t_plate=t_plate,
-        plate_wrench=wrench[:, None],
-        plate_centre=_plate_centre(lab.twin.model)[None],
-        dwell_start=motion.dwells[:, 0] + start,
-        dwell_stop=motion.dwells[:, 1] + start,
-        approach=motion.approach,
-    )
-    return (without_plate(trial) if _is_carried(lab, motion) else trial), true
-
-
-def _clocks(config: TwinConfig) -> tuple[Clock, Clock, Clock]:
-    i = config.instruments
-    robot = Clock("robot", i.robot_clock.offset, i.robot_clock.drift)
-    return robot, Clock("plate", i.plate_clock.offset, i.plate_clock.drift), Clock("mocap")
-
-
-def _true(lab: Laboratory, states: States, t_mocap: np.ndarray, start: float) -> TruthTrial:
-    t, clusters = t_mocap - start, lab.robot.clusters
-    poses = {name: interpolate_poses(t, states.t, T) for name, T in states.poses.items()}
-    hand = next(c for c in clusters if c.name == "gripper")
-    names = tuple(m for c in clusters for m in c.marker_names)
-    markers = np.concatenate([mocap.marker_positions(poses[c.link], c) for c in clusters], axis=1)
-    for marker in lab.robot.loose:
-        markers = marker.moved(t_mocap - _EPOCH, names, markers)
-    return TruthTrial(
-        joint=JOINTS,
-        marker=names,
-        t_mocap=t_mocap,
-        q_motor_true=interpolate(t, states.t, states.motor),
-        q_link_true=interpolate(t, states.t, states.link),
-        base_pose=poses[BASE],
-        hand_pose=poses[hand.link] @ hand.T_link_body,
-        marker_position=markers,
-        plate_wrench=averaged(t, states.t, states.wrench, 1.0 / lab.config.instruments.mocap_rate),
-    )
-
-
-def _plate_centre(model: mujoco.MjModel) -> np.ndarray:
-    """Surface centre of the plate in the lab (3,) [m]."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    return data.site("plate").xpos.copy()
-
-
 def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:
     robot = lab.robot
     K, C = spatial_stiffness(robot.wheels)
     parameters: list[Parameter] = list(lab.twin.truth)
-    for source in (*robot.encoders, *robot.clusters, *robot.loose, *_clocks(lab.config)[:2]):
+    for source in (*robot.encoders, *robot.clusters, *robot.loose, *instrument_errors(lab)):
         parameters += source.parameters()
     if lab.config.campaign.driving.forms:
         parameters += arm_frame(lab.twin, next(iter(lab.config.arm)))
-    derived = {"K": K, "C": C, "T_lab_base": lab.T_lab_base, "plate_centre": _plate_centre(lab.twin.model)}
+    derived = {"K": K, "C": C, "T_lab_base": lab.T_lab_base, "plate_centre": plate_centre(lab.twin.model)}
     derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}
     if later is not None:
         parameters += session.parameters(later.robot)

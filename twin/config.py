@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
 from twin.config_departures import Departures
 from twin.config_driving import Driving
+from twin.config_instruments import LogErrors, MocapErrors, PlateErrors
 from twin.config_session import Session
 from twin.config_values import (
     STRICT,
@@ -173,6 +174,9 @@ class Instruments:
         robot_clock: The robot's.
         plate_clock: The plate's.
         motor_encoders: Eccentricity on the motor side.
+        mocap: What is wrong with the motion capture.
+        plate: With the plate.
+        log: With the robot's log.
     """
 
     bodies: dict[Literal["base", "shoulder", "gripper"], MarkerBody]
@@ -187,6 +191,9 @@ class Instruments:
     robot_clock: ClockSetting
     plate_clock: ClockSetting
     motor_encoders: MotorEncoders = field(default_factory=MotorEncoders)
+    mocap: MocapErrors = field(default_factory=MocapErrors)
+    plate: PlateErrors = field(default_factory=PlateErrors)
+    log: LogErrors = field(default_factory=LogErrors)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -38,3 +38,15 @@ class Clock:
         """Offset and drift."""
         name = f"clock.{self.instrument}"
         return Parameter(f"{name}.offset", "s", self.offset), Parameter(f"{name}.drift", "-", self.drift)
+
+
+@dataclass(frozen=True)
+class Latency:
+    """From the instant an instrument measures to its stamp: value [s]."""
+
+    instrument: str
+    value: float
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The latency."""
+        return (Parameter(f"latency.{self.instrument}", "s", self.value),)

@@ -1,16 +1,103 @@
-"""Force plate: the wrench averaged over each sample, with white noise.
+"""Force plate: the wrench averaged over each sample, with white noise and what one plate gets wrong.
 
-Action of the robot on the plate, lab axes, about the plate's surface centre [N, N.m].
+    w_m = round(F[G w] + r (t - t0) + n)
+
+Action of the robot on the plate, lab axes, about the plate's surface centre [N, N.m]. F is the anti-alias filter, G
+the gain matrix with crosstalk, r the drift of the offset since the campaign's start t0. F delays by
+sqrt(2) / (2 pi cutoff) at low frequency, which no time stamp knows.
 """
 
-import numpy as np
+from dataclasses import dataclass
 
+import numpy as np
+from scipy.signal import butter, sosfilt, sosfilt_zi
+
+from twin.config_instruments import PlateErrors
+from twin.defects.base import Defect, Parameter
 from twin.instruments.sampling import averaged
 
 
+@dataclass(frozen=True)
+class PlateDefect(Defect):
+    """One plate.
+
+    Attributes:
+        name: Its name.
+        gain: G (6, 6) [-, m, 1/m].
+        drift: r (6,) [N/s, N.m/s].
+        resolution: (6,) [N, N.m]; 0: none.
+        cutoff: Of the filter [Hz]; 0: none.
+    """
+
+    name: str
+    gain: np.ndarray
+    drift: np.ndarray
+    resolution: np.ndarray
+    cutoff: float
+
+    @property
+    def delay(self) -> float:
+        """Of the filter at low frequency [s]."""
+        return float(np.sqrt(2.0) / (2.0 * np.pi * self.cutoff)) if self.cutoff else 0.0
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Gains, drift and filter, where they are not ideal."""
+        found, name = [], f"plate.{self.name}"
+        if (self.gain != np.eye(6)).any():
+            units = [["-", "1/m"], ["m", "-"]]
+            found += [
+                Parameter(f"{name}.gain_{i + 1}{j + 1}", units[i // 3][j // 3], float(self.gain[i, j]))
+                for i in range(6)
+                for j in range(6)
+            ]
+        if self.drift.any():
+            units_of = ("N/s",) * 3 + ("N.m/s",) * 3
+            found += [Parameter(f"{name}.drift_{i + 1}", units_of[i], float(r)) for i, r in enumerate(self.drift)]
+        if self.cutoff:
+            found.append(Parameter(f"{name}.cutoff", "Hz", self.cutoff))
+        return tuple(found)
+
+
+def draw(name: str, errors: PlateErrors, rng: np.random.Generator) -> PlateDefect:
+    """One plate of the kind `errors` describes."""
+    width = np.where(np.eye(6) == 1.0, errors.gain, errors.crosstalk)
+    return PlateDefect(
+        name,
+        np.eye(6) + width * rng.normal(size=(6, 6)),
+        np.repeat([errors.force_drift, errors.moment_drift], 3) * rng.normal(size=6),
+        np.repeat([errors.force_resolution, errors.moment_resolution], 3),
+        errors.cutoff,
+    )
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Samples of a plate.
+
+    Attributes:
+        t: True times (n,) [s].
+        since: The campaign's start [s].
+        rate: [Hz].
+        sigma: White noise per sample (6,) [N, N.m].
+    """
+
+    t: np.ndarray
+    since: float
+    rate: float
+    sigma: np.ndarray
+
+
 def measured(
-    t: np.ndarray, grid: np.ndarray, wrench: np.ndarray, rate: float, sigma: np.ndarray, rng: np.random.Generator
+    at: Sampling, grid: np.ndarray, wrench: np.ndarray, defect: PlateDefect, rng: np.random.Generator
 ) -> np.ndarray:
-    """Samples (n, 6) at true times t of the dense wrench (m, 6); sigma (6,) per sample [N, N.m]."""
-    samples = averaged(t, grid, wrench, 1.0 / rate)
-    return samples + sigma * rng.normal(size=samples.shape)
+    """Samples (n, 6) of the dense wrench (m, 6) at times grid (m,) [s]."""
+    seen = wrench if (defect.gain == np.eye(6)).all() else wrench @ defect.gain.T
+    if defect.cutoff:
+        sos = butter(2, defect.cutoff, fs=1.0 / (grid[1] - grid[0]), output="sos")
+        seen = sosfilt(sos, seen, axis=0, zi=sosfilt_zi(sos)[:, :, None] * seen[0])[0]
+    samples = averaged(at.t, grid, seen, 1.0 / at.rate)
+    samples = samples + at.sigma * rng.normal(size=samples.shape)
+    if defect.drift.any():
+        samples += defect.drift * (at.t - at.since)[:, None]
+    step = np.where(defect.resolution > 0.0, defect.resolution, 1.0)
+    return np.where(defect.resolution > 0.0, np.round(samples / step) * step, samples)

@@ -1,14 +1,22 @@
-"""The robot's own log: encoders on both sides, velocity, motor current, set-points."""
+"""The robot's own log: encoders on both sides, velocity, motor current, set-points.
 
-from dataclasses import dataclass
+Stamps jitter about the ticks of the robot's clock, messages are lost, velocity passes a first-order low-pass.
+"""
+
+from dataclasses import dataclass, fields
 
 import numpy as np
+from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from twin.config import TwinConfig
+from twin.config_instruments import LogErrors
 from twin.defects.sensing import Encoder
+from twin.instruments.events import windows, within
 from twin.instruments.sampling import interpolate
 from twin.motions import JOINTS
 from twin.simulate import States
+
+_MOST = 0.45  # of the interval between ticks that a stamp may be off [-]
 
 
 @dataclass(frozen=True)
@@ -33,10 +41,34 @@ def measured(t: np.ndarray, states: States, encoders: tuple[Encoder, ...], confi
     return RobotLog(
         q_motor=_read(sampled(states.motor), encoders, "motor"),
         q_link=_read(sampled(states.link), encoders, "link"),
-        v_motor=sampled(states.motor_velocity),
+        v_motor=sampled(_slowed(states, config.instruments.log.velocity_cutoff)),
         effort=np.round(sampled(states.torque) / per_ampere / quantum) * quantum,
         q_command=sampled(states.command),
     )
+
+
+def stamped(t: np.ndarray, rate: float, errors: LogErrors, rng: np.random.Generator) -> np.ndarray:
+    """Stamps (n,) [s] that jitter about the ticks t; they never overtake each other."""
+    if not errors.jitter:
+        return t
+    return t + np.clip(errors.jitter * rng.normal(size=len(t)), -_MOST / rate, _MOST / rate)
+
+
+def kept(t: np.ndarray, log: RobotLog, errors: LogErrors, rng: np.random.Generator) -> tuple[np.ndarray, RobotLog]:
+    """The messages that were not lost."""
+    if not errors.dropouts:
+        return t, log
+    there = ~within(t, windows(t, errors.dropouts, errors.dropout_duration, rng))
+    return t[there], RobotLog(**{f.name: getattr(log, f.name)[there] for f in fields(log)})
+
+
+def _slowed(states: States, cutoff: float) -> np.ndarray:
+    """Motor velocity (n, 8) through dv/dt = 2 pi cutoff (v_motor - v)."""
+    if not cutoff:
+        return states.motor_velocity
+    sos = butter(1, cutoff, fs=1.0 / (states.t[1] - states.t[0]), output="sos")
+    first = sosfilt_zi(sos)[:, :, None] * states.motor_velocity[0]
+    return np.asarray(sosfilt(sos, states.motor_velocity, axis=0, zi=first)[0])
 
 
 def _read(q: np.ndarray, encoders: tuple[Encoder, ...], side: str) -> np.ndarray:

@@ -1,0 +1,78 @@
+"""What a scenario may say is wrong with the instruments, beside noise and clocks; all of it is off unless named. SI."""
+
+from typing import Annotated
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from twin.config_values import STRICT, FixedNonNegative, FixedPositive, NonNegative, Vector3
+from twin.uncertain import DRAWN
+
+Small = Annotated[float, Field(ge=-0.05, le=0.05), DRAWN]
+
+
+@dataclass(frozen=True, config=STRICT)
+class MocapErrors:
+    """Of the motion capture.
+
+    Attributes:
+        scale: Relative error of all lengths [-].
+        bias: Standard deviation of a smooth field of position errors, per axis [m].
+        bias_length: Over which that field changes [m].
+        latency: From exposure to time stamp [s].
+        cameras: Where they are [m]; a marker that fewer than two see past the arm is lost. None: all is seen.
+        arm_radius: Of what hides markers [m].
+        swaps: Times per minute that two markers of a body exchange labels [1/min].
+        swap_duration: Of each [s].
+    """
+
+    scale: Small = 0.0
+    bias: NonNegative = 0.0
+    bias_length: FixedPositive = 1.5
+    latency: NonNegative = 0.0
+    cameras: tuple[Vector3, ...] = ()
+    arm_radius: FixedPositive = 0.06
+    swaps: FixedNonNegative = 0.0
+    swap_duration: FixedPositive = 0.3
+
+
+@dataclass(frozen=True, config=STRICT)
+class PlateErrors:
+    """Of the force plate; widths are standard deviations of what is drawn for one plate.
+
+    Attributes:
+        gain: Of each diagonal entry of the gain matrix about 1 [-].
+        crosstalk: Of each other entry, relative; a length of 1 m relates forces and moments [-].
+        force_drift: Of the offset's rate [N/s].
+        moment_drift: Of the offset's rate [N.m/s].
+        force_resolution: Step [N].
+        moment_resolution: Step [N.m].
+        cutoff: Of the anti-alias filter, Butterworth of order 2 [Hz]; 0: none.
+    """
+
+    gain: NonNegative = 0.0
+    crosstalk: NonNegative = 0.0
+    force_drift: NonNegative = 0.0
+    moment_drift: NonNegative = 0.0
+    force_resolution: FixedNonNegative = 0.0
+    moment_resolution: FixedNonNegative = 0.0
+    cutoff: FixedNonNegative = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class LogErrors:
+    """Of the robot's log.
+
+    Attributes:
+        jitter: Standard deviation of the stamps about the ticks of the robot's clock [s].
+        latency: From sampling to time stamp [s].
+        velocity_cutoff: Of the velocity's first-order low-pass [Hz]; 0: none.
+        dropouts: Times per minute that messages are lost [1/min].
+        dropout_duration: Of each [s].
+    """
+
+    jitter: FixedNonNegative = 0.0
+    latency: NonNegative = 0.0
+    velocity_cutoff: FixedNonNegative = 0.0
+    dropouts: FixedNonNegative = 0.0
+    dropout_duration: FixedPositive = 0.15
