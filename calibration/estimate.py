@@ -14,6 +14,7 @@ from calibration.identifiability import Combination, Status
 from calibration.options import Options
 from calibration.parameters import AXES, parameter_names
 from calibration.robot import Chain
+from calibration.schema import Description
 from calibration.se3 import from_vector
 from calibration.verdict import Verdict
 
@@ -125,6 +126,7 @@ class Estimate:
         joint_models: Printed joint models, of row `model_3`.
         link_zero: Motor minus link reading of each measured joint over the calibration postures [rad, m].
         options: What was chosen.
+        laboratory: What dataset.json declares, without its trials; None where the source does not say.
     """
 
     status: Literal["calibrated", "not_calibrated"]
@@ -138,6 +140,7 @@ class Estimate:
     joint_models: "tuple[JointModel, ...]" = ()
     link_zero: tuple[float, ...] = ()
     options: Options = field(default_factory=Options)
+    laboratory: Description | None = None
 
     def model(self, name: str) -> Model:
         """The model of that name.

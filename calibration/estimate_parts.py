@@ -45,6 +45,7 @@ class HeldOutEntry(Part):
     error: Rows
     motion: Rows
     noise: Rows
+    count: tuple[float, ...]
 
 
 class SuspensionEntry(Part):
@@ -102,7 +103,13 @@ def suspension_entry(suspension: Suspension) -> SuspensionEntry:
         tangent=_rows(suspension.tangent),
         gravity=_rows(suspension.gravity),
         held_out=tuple(
-            HeldOutEntry(source=source, error=_rows(h.error), motion=_rows(h.motion), noise=_rows(h.noise))
+            HeldOutEntry(
+                source=source,
+                error=_rows(h.error),
+                motion=_rows(h.motion),
+                noise=_rows(h.noise),
+                count=tuple(map(float, h.count)),
+            )
             for source, h in suspension.held_out
         ),
     )
@@ -119,7 +126,10 @@ def suspension_of(entry: SuspensionEntry) -> Suspension:
         unknown,
         np.array(entry.tangent),
         np.array(entry.gravity),
-        tuple((h.source, HeldOut(np.array(h.error), np.array(h.motion), np.array(h.noise))) for h in entry.held_out),
+        tuple(
+            (h.source, HeldOut(np.array(h.error), np.array(h.motion), np.array(h.noise), np.array(h.count)))
+            for h in entry.held_out
+        ),
         (),
         (),
     )

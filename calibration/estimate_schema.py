@@ -18,6 +18,7 @@ from calibration.estimate_parts import (
 )
 from calibration.identifiability import Combination, Status
 from calibration.options import Options
+from calibration.schema import Description
 from calibration.verdict import Verdict
 
 
@@ -105,6 +106,7 @@ class EstimateFile(Entry):
     joint_models: tuple[JointEntry, ...] = ()
     link_zero: tuple[float | None, ...] = ()
     options: Options = Field(default_factory=Options)
+    laboratory: Description | None = None
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore", validate_by_name=True)
 
@@ -136,6 +138,7 @@ def to_file(estimate: Estimate) -> EstimateFile:
         joint_models=tuple(joint_entry(m) for m in estimate.joint_models),
         link_zero=tuple(_finite(z) for z in estimate.link_zero),
         options=estimate.options,
+        laboratory=estimate.laboratory,
     )
 
 
@@ -154,6 +157,7 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
         tuple(joint_model(entry) for entry in file.joint_models),
         tuple(float("nan") if z is None else z for z in file.link_zero),
         file.options,
+        file.laboratory,
     )
 
 

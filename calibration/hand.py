@@ -12,13 +12,13 @@ with L = diag(R', Jr(phi)) from (dp, dphi) to the local twist of a frame given a
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from calibration.kinematics import Path, along, joints_to_end
 from calibration.robot import Chain
 from calibration.se3 import adjoint, from_vector, inverse, local_twist
-from calibration.twists import jexp6
 
 
 @dataclass(frozen=True)
@@ -98,19 +98,21 @@ class HandModel:
         k = len(self.offset)
         p = 12 + 8 * k if n_parameters is None else n_parameters
         if tau is None:
-            tau = self.chain.gravity_torques(q)
-        placed = self._path().placed(q[:, self.chain.columns] - self.offset - self.compliance * tau)
+            yields = self.compliance.any() or p > 12 + 7 * k
+            tau = self.chain.gravity_torques(q) if yields else np.zeros((len(q), k))
+        placed = self._path.placed(q[:, self.chain.columns] - self.offset - self.compliance * tau)
         A, L = placed.to_end()
         J, J_joint = np.empty((len(q), 6, p)), joints_to_end(A, L, self.chain.path.twists)
         J[:, :, :6], J[:, :, 6:12] = along(A[0], L[0], -local_twist(self.base)), local_twist(self.hand)
         if p > 12:
-            for i, M in enumerate(jexp6(self.chain.xi), start=1):
+            for i, M in enumerate(self.chain.slopes, start=1):
                 J[:, :, 6 + 6 * i : 12 + 6 * i] = along(A[i], L[i], M)
             J[:, :, 12 + 6 * k : 12 + 7 * k] = -J_joint
         if p > 12 + 7 * k:
             J[:, :, 12 + 7 * k :] = -tau[:, None, :] * J_joint
         return HandPoses(placed.T, J, J_joint)
 
+    @cached_property
     def _path(self) -> Path:
         """From the base's marker body to the hand's."""
         fixed = np.array(self.chain.path.fixed)

@@ -52,10 +52,14 @@ class Corrected:
     Attributes:
         q: (n, n_measured) [rad, m].
         outside: (n, n_measured) where a model was asked outside its domain, at the nearest value inside.
+        modelled: (n_measured,) which joints have a model that corrects.
+        variance: (n, n_measured) of the corrections [rad2]; 0 without one.
     """
 
     q: np.ndarray
     outside: np.ndarray
+    modelled: np.ndarray
+    variance: np.ndarray
 
     @property
     def share_outside(self) -> np.ndarray:
@@ -77,9 +81,11 @@ def correct(models: JointModels, t: np.ndarray, q_motor: np.ndarray, velocity: n
     """
     inputs = models.inputs.inputs(t, q_motor, velocity)
     q, outside = np.array(q_motor, dtype=float), np.zeros(q_motor.shape, dtype=bool)
-    for model in models.models:
+    modelled, variance = np.zeros(q.shape[1], dtype=bool), np.zeros_like(q)
+    for model in (m for m in models.models if m.powers):
         j = models.inputs.measured.index(model.joint)
-        asked = inputs.theta[:, j], inputs.tau[:, j]
-        q[:, j] -= model.discrepancy(*asked, inputs.velocity[:, j])
-        outside[:, j] = model.is_outside(*asked)
-    return Corrected(q, outside)
+        asked = inputs.theta[:, j], inputs.tau[:, j], inputs.velocity[:, j]
+        q[:, j] -= model.discrepancy(*asked)
+        outside[:, j] = model.is_outside(*asked[:2])
+        modelled[j], variance[:, j] = True, model.variance(*asked)
+    return Corrected(q, outside, modelled, variance)

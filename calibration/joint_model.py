@@ -33,7 +33,8 @@ def exponents(terms: Terms, degree: int) -> tuple[Exponent, ...]:
 
 def monomials(theta: np.ndarray, tau: np.ndarray, powers: tuple[Exponent, ...]) -> np.ndarray:
     """theta^i tau^j (n, k) at theta (n,) [rad] and tau (n,) [N.m]."""
-    return np.stack([theta**i * tau**j for i, j in powers], axis=1) if powers else np.zeros((len(theta), 0))
+    i, j = np.array(powers, dtype=int).reshape(-1, 2).T
+    return np.asarray(theta[:, None] ** i * tau[:, None] ** j)
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,16 @@ class JointModel:
         M = monomials(*self.inside(theta, tau), self.powers)
         S = expit(self.rho * velocity)
         return (M @ self.A) * S + (M @ self.B) * (1.0 - S)
+
+    def variance(self, theta: np.ndarray, tau: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Of the predicted discrepancy (n,) [rad2]: of the side the gear is on, and of what left-out trials kept.
+
+        S is the chance of the right flank, so the side adds S (1 - S) (C_r - C_l)^2: half the play at rest.
+        """
+        M = monomials(*self.inside(theta, tau), self.powers)
+        S = expit(self.rho * velocity)
+        kept = self.quality.rms**2 * (1.0 - self.quality.r2_out)
+        return S * (1.0 - S) * (M @ (self.A - self.B)) ** 2 + kept
 
     def inside(self, theta: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The nearest angle and torque in the domain."""

@@ -183,4 +183,4 @@ def _empty(dataset: Dataset, options: Options) -> Estimate:
     """Nothing to be used so far."""
     d = dataset.description
     names = RobotNames(d.joint_names, d.base_frame, d.tool_frame)
-    return Estimate("not_calibrated", (), (), (), "", dataset.urdf, names, options=options)
+    return Estimate("not_calibrated", (), (), (), "", dataset.urdf, names, options=options, laboratory=d.alone)

@@ -78,6 +78,11 @@ class Chain:
         """The path from base to tool with the placement twists applied."""
         return self.drawn.moved(np.concatenate([exp6(self.xi), np.eye(4)[None]]))
 
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """Local twist of each placement by its placement twist (k, 6, 6): exp6's right derivative."""
+        return jexp6(self.xi)
+
     def with_placements(self, xi: np.ndarray) -> "Chain":
         """The chain with placement twists `xi` (k, 6) [m, rad] instead of those it has."""
         if xi.shape != self.xi.shape:
@@ -99,7 +104,7 @@ class Chain:
         self._check(q)
         placed = self.path.placed(q[:, self.columns])
         A, L = placed.to_end()
-        J = [along(A[i], L[i], M) for i, M in enumerate(jexp6(self.xi), start=1)]
+        J = [along(A[i], L[i], M) for i, M in enumerate(self.slopes, start=1)]
         return ChainPoses(placed.T, np.concatenate(J, axis=2), joints_to_end(A, L, self.path.twists))
 
     def joint_jacobians(self, q: np.ndarray) -> np.ndarray:

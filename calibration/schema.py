@@ -196,9 +196,18 @@ class Description(Setup):
 
     def loaded(self, entry: TrialEntry) -> "Description":
         """The description with the payload of one trial."""
-        if entry.payload is None or self.payload is None:
+        return self.carrying(entry.payload)
+
+    def carrying(self, mass: float | None) -> "Description":
+        """The description with another mass [kg] of its payload; itself where None, or where it has no payload."""
+        if mass is None or self.payload is None:
             return self
-        return self.model_copy(update={"payload": self.payload.model_copy(update={"mass": entry.payload})})
+        return self.model_copy(update={"payload": self.payload.model_copy(update={"mass": mass})})
+
+    @property
+    def alone(self) -> "Description":
+        """The description without its trials."""
+        return self.model_copy(update={"trials": ()})
 
     def body(self, name: str) -> Body | None:
         """The marker body of that name, or None where the laboratory has none."""

@@ -7,6 +7,7 @@ that the springs do not predict better than a base that stays is left still.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from calibration.estimate import Parameter
 from calibration.identifiability import Combination
 from calibration.signals import RATE
 from calibration.suspension_held_out import HeldOut, predicted
+from calibration.suspension_modes import Modes, modes_of
 from calibration.suspension_sway import Forcing
 
 Source = Literal["plate", "dynamics"]
@@ -51,6 +53,11 @@ class Suspension:
     held_out: tuple[tuple[Source, HeldOut], ...]
     parameters: tuple[Parameter, ...]
     combinations: tuple[Combination, ...]
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Modes of the base under wrenches the floor feels."""
+        return modes_of(self.K + self.tangent, self.C, np.zeros((6, 6)))
 
     def moves(self, source: Source) -> np.ndarray:
         """(6,) axes that are moved when the wrench comes from a source; none where it was not tried."""

@@ -31,16 +31,23 @@ class HeldOut:
         error: Squared error.
         motion: Squared displacement.
         noise: Squared noise to be expected.
+        count: (n_trials,) samples.
     """
 
     error: np.ndarray
     motion: np.ndarray
     noise: np.ndarray
+    count: np.ndarray
 
     @property
     def r2(self) -> np.ndarray:
         """(6,) of all trials together."""
         return 1.0 - self.error.sum(axis=0) / np.maximum(self.motion.sum(axis=0), np.finfo(float).tiny)
+
+    def variance(self, moves: np.ndarray) -> np.ndarray:
+        """(6,) mean square of what is left of the displacement where an axis moves, of all of it where it stays."""
+        left = np.where(moves, np.minimum(self.error, np.finfo(float).max), self.motion).sum(axis=0)
+        return np.maximum(left - self.noise.sum(axis=0), 0.0) / max(float(self.count.sum()), 1.0)
 
     @property
     def explained(self) -> np.ndarray:
@@ -74,9 +81,9 @@ def held_out(sways: Sequence[Sway], without: Callable[[int], tuple[np.ndarray, n
     rows = []
     for k, sway in enumerate(sways):
         e = (sway.x - predicted(*without(k), sway.forcing))[sway.valid]
-        rows.append(((e**2).sum(axis=0), (sway.x[sway.valid] ** 2).sum(axis=0), len(e) * sway.noise))
-    error, motion, noise = (np.array(a) for a in zip(*rows, strict=True))
-    return HeldOut(error, motion, noise)
+        rows.append(((e**2).sum(axis=0), (sway.x[sway.valid] ** 2).sum(axis=0), len(e) * sway.noise, len(e)))
+    error, motion, noise, count = (np.array(a, dtype=float) for a in zip(*rows, strict=True))
+    return HeldOut(error, motion, noise, count)
 
 
 def predicted(K: np.ndarray, C: np.ndarray, forcing: Forcing) -> np.ndarray:

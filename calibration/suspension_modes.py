@@ -41,6 +41,14 @@ class Modes:
         """Channels u (n, c) through every mode's lag, (n, c, k); in balance with their first sample before."""
         return np.stack([_lag(u, tau, step) for tau in self.tau], axis=2)
 
+    def advanced(self, y: np.ndarray, u_before: np.ndarray, u: np.ndarray, step: float) -> np.ndarray:
+        """Every mode's lag (k,) one step [s] on, from y (k,), driven linearly from u_before to u (k,)."""
+        ratio = self.tau / step
+        late = np.abs(ratio) > _INSTANT
+        e = np.where(late, np.exp(-1.0 / np.where(late, ratio, 1.0)), 0.0)
+        b1 = 1.0 - ratio * (1.0 - e)
+        return np.asarray(e * y + (1.0 - e - b1) * u_before + b1 * u)
+
     def respond(self, w: np.ndarray, step: float) -> np.ndarray:
         """Displacement (n, 6) [m, rad] under w (n, 6) [N, N.m], sampled every `step` [s]."""
         u = w @ self.b.T

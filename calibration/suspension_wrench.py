@@ -54,11 +54,20 @@ def plate_load(trial: Trial, plate: Clock, T_lab_0: np.ndarray, cutoff: float = 
     n = len(trial.t_plate) // size * size
     t = plate.to_mocap(trial.t_plate[:n]).reshape(-1, size).mean(axis=1)
     lab = trial.plate_wrench[:n].reshape(-1, size, *trial.plate_wrench.shape[1:]).mean(axis=1)
-    force, moment = lab[..., :3], lab[..., 3:]
-    moment = moment + np.cross(trial.plate_centre - T_lab_0[:3, 3], force)
-    w = np.concatenate([force.sum(axis=1) @ T_lab_0[:3, :3], moment.sum(axis=1) @ T_lab_0[:3, :3]], axis=1)
-    T_0_plate = inverse(T_lab_0) @ compose(np.eye(3), trial.plate_centre[0])
+    return floor_load(t, in_frame(lab, trial.plate_centre, T_lab_0), T_lab_0, trial.plate_centre[0], cutoff)
+
+
+def floor_load(t: np.ndarray, w: np.ndarray, T_lab_0: np.ndarray, centre: np.ndarray, cutoff: float = CUTOFF) -> Load:
+    """A wrench that the floor felt, w (n, 6) in frame 0 at t (n,) [s], read about a centre (3,) [m, lab]."""
+    T_0_plate = inverse(T_lab_0) @ compose(np.eye(3), centre)
     return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3), T_0_plate)
+
+
+def in_frame(wrench: np.ndarray, centre: np.ndarray, T_lab_0: np.ndarray) -> np.ndarray:
+    """Sum (n, 6) [N, N.m, frame 0] of wrenches (n, p, 6) in lab axes about their centres (p, 3) [m, lab]."""
+    force, moment = wrench[..., :3], wrench[..., 3:]
+    moment = moment + np.cross(centre - T_lab_0[:3, 3], force)
+    return np.concatenate([force.sum(axis=1) @ T_lab_0[:3, :3], moment.sum(axis=1) @ T_lab_0[:3, :3]], axis=1)
 
 
 def dynamics_load(

@@ -2,14 +2,26 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray
 
 import calibration
+from calibration import Compensator
+from calibration.bodies import poses_of
+from calibration.clock import Clock
+from calibration.errors import NotEnoughData, ShapeError
+from calibration.joint_inputs import velocities
+from calibration.markers import base_body
+from calibration.postures import readings_at
+from calibration.predict import predictor
+from calibration.se3 import from_vector, inverse, mean, to_vector
 from scenarios import load, run, steps
-from twin.truth import read_parameters
+from twin.truth import read_parameters, read_trial
+
+SAME = Clock("one", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -139,3 +151,112 @@ def test_one_estimate_is_scored_under_both_protocols(result):
     better = {tuple(c["b"]): c["finding"] for c in found["comparisons"]}
     assert better["model_2", "plate"] == "better"
     assert better["model_1", "plate"] != "worse"
+
+
+@pytest.fixture(scope="module")
+def compensator(result):
+    return Compensator.load(result.folder / "estimate")
+
+
+@pytest.fixture(scope="module")
+def swing(result, compensator):
+    """A validation swing with every instrument at the motion capture's times, and the ladder's predictions of it."""
+    dataset = calibration.load(result.folder / "dataset")
+    entry = dataset.entries("validation", "swing")[0]
+    trial, predict = dataset.read(entry), predictor(result.estimate, dataset)
+    t_robot, t_plate = predict.robot.from_mocap(trial.t_mocap), predict.plate.from_mocap(trial.t_mocap)
+    ok = (t_robot >= trial.t_robot[0]) & (t_robot <= trial.t_robot[-1])
+    ok &= (t_plate >= trial.t_plate[0]) & (t_plate <= trial.t_plate[-1])
+    t, q = trial.t_mocap[ok], readings_at(trial, predict.robot, trial.t_mocap[ok], trial.q_motor)
+    w = np.stack([np.interp(t_plate[ok], trial.t_plate, column) for column in trial.plate_wrench[:, 0].T], axis=1)
+    nothing = np.full_like(q, np.nan)
+    same = replace(
+        trial, t_mocap=t, marker_position=trial.marker_position[ok], t_robot=t, q_motor=q, q_link=nothing,
+        v_motor=nothing, effort=nothing, q_command=nothing, t_plate=t, plate_wrench=w[:, None],
+    )  # fmt: skip
+    rows = {
+        (p.model, p.base): p.T_lab_hand
+        for p in replace(predict, robot=SAME, plate=SAME)(entry, same)
+        if p.encoder == "motor"
+    }
+    real = {(p.model, p.base): p.T_lab_hand[ok] for p in predict(entry, trial) if p.encoder == "motor"}
+    T_lab_B = poses_of(base_body(dataset.description), same).T
+    start = mean(T_lab_B[t <= t[0] + 1.0]) @ inverse(from_vector(compensator.hand.base))
+    true = read_trial(result.folder / "truth" / entry.file).hand_pose[ok]
+    return t, q, w, start, rows, real, true
+
+
+def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(compensator, swing):
+    t, q, w, start, rows, real, _ = swing
+    found = compensator.predict(t, q, w, start)
+    np.testing.assert_allclose(found.T, rows["model_3", "plate"], atol=1e-9)
+    # as recorded: the plate's noise is averaged over its samples there, and picked at the camera's times here
+    np.testing.assert_allclose(found.T[:, :3, 3], real["model_3", "plate"][:, :3, 3], atol=2e-4)
+    still = compensator.predict(t, q, T_lab_base_start=start)
+    np.testing.assert_allclose(still.T, rows["model_3", "fixed"], atol=1e-9)
+    assert 1e3 * np.abs(found.T - still.T)[:, :3, 3].max() > 1.0
+
+
+def test_without_velocities_the_readings_stay_as_they_are(compensator, swing):
+    t, q, _, start, rows, *_ = swing
+    found = compensator.predict(t[::100], q[::100], T_lab_base_start=start)
+    np.testing.assert_allclose(found.T, rows["model_2", "fixed"][::100], atol=1e-9)
+    one = compensator.step(t[300], q[300], T_lab_base_start=start)
+    np.testing.assert_allclose(one.T[0], rows["model_2", "fixed"][300], atol=1e-9)
+
+
+def test_a_step_is_the_prediction_of_its_sample(compensator, swing):
+    t, q, w, start, *_ = swing
+    v, whole = velocities(t, q), compensator.predict(t, q, T_lab_base_start=start)
+    for k in range(0, len(t), 97):
+        one = compensator.step(t[k], q[k], T_lab_base_start=start, velocity=v[k])
+        np.testing.assert_allclose(one.T[0], whole.T[k], atol=1e-12)
+        np.testing.assert_allclose(one.covariance[0], whole.covariance[k], atol=1e-15)
+
+
+def test_steps_under_a_wrench_follow_the_prediction_but_for_its_filter(compensator, swing):
+    t, q, w, start, *_ = swing
+    v, whole, before, found = velocities(t, q), compensator.predict(t, q, w, start), None, []
+    for k in range(500):
+        pose = compensator.step(t[k], q[k], w[k], start, v[k], before)
+        before = pose.base
+        found.append(pose.T[0])
+    e = (np.array(found) - whole.T[:500])[:, :3, 3]
+    moved = (whole.T - compensator.predict(t, q, T_lab_base_start=start).T)[:500, :3, 3]
+    assert np.sqrt((e**2).mean()) < 0.1 * np.sqrt((moved**2).mean())
+
+
+def test_the_covariance_holds_the_truth_and_knows_what_it_was_not_told(compensator, swing):
+    t, q, w, start, _, _, true = swing
+    told, still, in_base = (
+        compensator.predict(t, q, w, start),
+        compensator.predict(t, q, None, start),
+        compensator.predict(t, q),
+    )
+    after = slice(200, None)
+    for pose in (told, still):
+        e = to_vector(inverse(pose.T[after]) @ true[after])
+        nees = np.einsum("ni,nij,nj->n", e, np.linalg.inv(pose.covariance[after]), e)
+        assert 0.1 < nees.mean() / 6.0 < 2.0
+    traces = [np.trace(p.covariance[:, :3, :3], axis1=1, axis2=2).mean() for p in (in_base, told, still)]
+    assert traces[0] < traces[1] < traces[2]
+
+
+def test_another_payload_turns_the_joints(result, compensator, swing):
+    t, q, *_ = swing
+    heavy = Compensator.load(result.folder / "estimate", payload=2.0)
+    assert np.abs(heavy.predict(t, q).T - compensator.predict(t, q).T)[:, :3, 3].max() > 1e-4
+
+
+def test_what_is_missing_is_told(compensator, swing):
+    t, q, w, start, *_ = swing
+    with pytest.raises(NotEnoughData, match="no suspension"):
+        replace(compensator, suspension=None).predict(t, q, w, start)
+    with pytest.raises(NotEnoughData, match="second"):
+        compensator.predict(t[:20], q[:20], w[:20], start)
+    with pytest.raises(ShapeError, match="wrench"):
+        compensator.predict(t, q, w[:5], start)
+    no_plate = replace(compensator, laboratory=compensator.laboratory.model_copy(update={"plates": ()}))
+    with pytest.raises(NotEnoughData, match="no plate"):
+        no_plate.predict(t, q, w, start)
+    assert np.isfinite(no_plate.predict(t, q, w).T).all()

@@ -9,7 +9,8 @@ import numpy as np
 from mujoco import rollout
 
 import mjcf
-from scenarios import load
+from calibration import Compensator
+from scenarios import load, run
 from twin import motions
 from twin.build import build
 from twin.campaign import laboratory, measure
@@ -52,3 +53,29 @@ def test_speed_of_the_twin():
     for name, value in figures.items():
         print(f"{name:45s} {value:10.3g}")
     assert all(np.isfinite(v) and v > 0.0 for v in figures.values())
+
+
+def test_speed_of_the_compensator(tmp_path):
+    """One sample, joint models and suspension included: a robot's control loop has 10 ms, a mocap's 5."""
+    result = run(load("humanoids2024"), tmp_path / "quick", quick=True)
+    compensator = Compensator.load(result.folder / "estimate")
+    rng, n = np.random.default_rng(0), len(compensator.hand.chain.measured)
+    q, v = rng.uniform(-0.3, 0.3, (2000, n)), rng.uniform(-0.3, 0.3, (2000, n))
+    w, T, t = rng.normal(size=(2000, 6)), np.eye(4), np.arange(2000) / 100.0
+
+    def steps() -> None:
+        before = None
+        for k in range(500):
+            before = compensator.step(t[k], q[k], w[k], T, v[k], before).base
+
+    figures = {
+        "compensator_step_ms": 1e3 * seconds(steps) / 500,
+        "compensator_step_without_wrench_ms": 1e3
+        * seconds(lambda: [compensator.step(0.0, q[k], velocity=v[k]) for k in range(500)])
+        / 500,
+        "compensator_predict_us_per_sample": 1e6 * seconds(lambda: compensator.predict(t, q, w, T, v)) / 2000,
+    }
+    print()
+    for name, value in figures.items():
+        print(f"{name:45s} {value:10.3g}")
+    assert figures["compensator_step_ms"] < 2.0

@@ -105,7 +105,7 @@ def springs(K, C):
 
 def judged(r2):
     motion = np.ones((2, 6))
-    return HeldOut(motion * (1.0 - np.array(r2)), motion, 1e-6 * motion)
+    return HeldOut(motion * (1.0 - np.array(r2)), motion, 1e-6 * motion, np.full(len(motion), 500.0))
 
 
 def test_a_printed_fit_that_cannot_be_used_is_refused():
@@ -149,10 +149,10 @@ def test_one_trial_alone_does_not_move_an_axis():
     motion = np.ones((5, 6))
     error = motion.copy()
     error[0] = 0.0
-    assert HeldOut(error, motion, 0.0 * motion).r2[0] == pytest.approx(0.2)
-    assert not HeldOut(error, motion, 0.0 * motion).moves.any()
+    assert HeldOut(error, motion, 0.0 * motion, np.ones(len(motion))).r2[0] == pytest.approx(0.2)
+    assert not HeldOut(error, motion, 0.0 * motion, np.ones(len(motion))).moves.any()
     error[1] = 0.5
-    assert HeldOut(error, motion, 0.0 * motion).moves.all()
+    assert HeldOut(error, motion, 0.0 * motion, np.ones(len(motion))).moves.all()
 
 
 def test_what_slips_is_no_spring_and_is_not_reported_as_one():
