@@ -7,16 +7,19 @@ Reference: Kuensch, Annals of Statistics 1989 (block bootstrap).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from calibration.comparison_reason import base_reason
 
 if TYPE_CHECKING:
     from calibration.evaluate import Trace
 
 _BLOCK = 2.0  # [s]
 _DRAWS = 2000
+_BASE = "model_1"  # the row that moves the base and nothing else
 _SEED = 20241122  # of the bootstrap alone: the same traces give the same interval
 _PAIRS = (
     (("nominal", "fixed"), ("model_1", "plate")),
@@ -42,6 +45,7 @@ class Comparison:
         high_mm: 97.5th percentile [mm].
         blocks: Number of blocks.
         finding: `better`, `worse` or `no difference`, of b.
+        reason: Why, in one sentence, where `b` moves the base and nothing else; empty else.
     """
 
     a: Key
@@ -51,6 +55,7 @@ class Comparison:
     high_mm: float
     blocks: int
     finding: str
+    reason: str = ""
 
 
 def comparisons(traces: Sequence["Trace"]) -> Iterator[Comparison]:
@@ -58,7 +63,8 @@ def comparisons(traces: Sequence["Trace"]) -> Iterator[Comparison]:
     present = {(t.model, t.base) for t in traces if t.encoder == "motor"}
     for a, b in _PAIRS:
         if a in present and b in present:
-            yield compare(traces, a, b)
+            found = compare(traces, a, b)
+            yield replace(found, reason=base_reason(_base_errors(traces, b), found.finding)) if b[0] == _BASE else found
 
 
 def compare(traces: Sequence["Trace"], a: Key, b: Key) -> Comparison:
@@ -69,6 +75,21 @@ def compare(traces: Sequence["Trace"], a: Key, b: Key) -> Comparison:
     finding = "better" if high < 0.0 else "worse" if low > 0.0 else "no difference"
     whole = float(_difference(sums.sum(axis=0)[None])[0])
     return Comparison(a, b, whole, float(low), float(high), len(sums), finding)
+
+
+def _base_errors(traces: Sequence["Trace"], b: Key) -> dict[str, np.ndarray]:
+    """Errors (n, 3) [m] of the nominal hand by where the base's motion came from, where all three are known."""
+    rows = {"fixed": ("nominal", "fixed"), "measured": ("nominal", "measured"), "predicted": b}
+    kept = {key: [t for t in traces if (t.model, t.base, t.encoder) == (*key, "motor")] for key in rows.values()}
+    e = {
+        name: np.concatenate([t.scored.position for t in kept[key] if t.kind != "static"])
+        for name, key in rows.items()
+        if any(t.kind != "static" for t in kept[key])
+    }
+    if len(e) < len(rows) or len({len(x) for x in e.values()}) > 1:
+        return {}
+    good = np.isfinite(np.concatenate(list(e.values()), axis=1)).all(axis=1)
+    return {name: x[good] for name, x in e.items()}
 
 
 def _difference(sums: np.ndarray) -> np.ndarray:

@@ -64,6 +64,8 @@ def run(
         console.show(console.verdicts([v for v in result.estimate.verdicts if v.stage in ("base_frame", "arm_tool")]))
         console.show(table)
     console.show(console.ladder(out))
+    for line in console.reasons(out):
+        typer.echo(line)
     console.show(console.confirmation(out))
     typer.echo(f"\nReport: {out / 'report.html'}")
 
@@ -120,6 +122,8 @@ def evaluate(
     with console.progress() as progress:
         steps.evaluate(estimate, dataset, out, truth, progress)
     console.show(console.ladder(out))
+    for line in console.reasons(out):
+        typer.echo(line)
     console.show(console.confirmation(out))
 
 

@@ -141,6 +141,17 @@ def frames(results: Path) -> Table | None:
     return table
 
 
+def reasons(results: Path) -> list[str]:
+    """Return one line for each row that is told to be worse than the one it builds on, and why."""
+    found = json.loads((results / "evaluation.json").read_text(encoding="utf-8")).get("comparisons", [])
+    return [
+        f"{c['b'][0]} ({c['b'][1]}) is worse than {c['a'][0]} by {c['difference_mm']:.2f} mm"
+        + (f": {c['reason']}" if c.get("reason") else "")
+        for c in found
+        if c["finding"] == "worse"
+    ]
+
+
 def verdicts(found: Sequence[Any]) -> Table:
     """Return the table of what each stage says of its own result."""
     table = _table("stage", "verdict", "message")

@@ -75,6 +75,7 @@ class Compared(Entry):
     low_mm: float
     high_mm: float
     finding: str
+    reason: str = ""
 
 
 class Regime(Entry):

@@ -35,3 +35,23 @@ def test_what_is_not_there_is_not_compared(common):
     assert list(comparisons([trace("nominal", "fixed", common)])) == []
     found = list(comparisons([trace("nominal", "fixed", common), trace("model_1", "plate", 0.5 * common)]))
     assert [c.b for c in found] == [("model_1", "plate")] and found[0].finding == "better"
+
+
+@pytest.mark.parametrize(
+    ("share", "against", "finding", "said"),
+    [
+        (1.0, 1.0, "better", "moved the hand by 1.00 mm per component, predicted within 0.00"),
+        (1.0, -1.0, "worse", "even with the base measured 10.00 mm are left of 9.00"),
+        (-2.0, 1.0, "worse", "the prediction of it misses by 3.00; measured, it would leave 10.00 mm of 11.00"),
+    ],
+)
+def test_why_moving_the_base_helps_or_does_not_is_said_in_figures(share, against, finding, said):
+    """The hand is 10 mm off by itself; the base moves it by 1 mm with or against that, a share of it predicted."""
+    hand = 1e-2 * np.ones((6000, 3))
+    base = against * 1e-3 * np.ones((6000, 3))
+    rows = (("nominal", "fixed", hand + base), ("nominal", "measured", hand))
+    found = list(comparisons([trace(*r) for r in (*rows, ("model_1", "plate", hand + (1.0 - share) * base))]))
+    assert (found[0].finding, len(found)) == (finding, 1)
+    assert said in found[0].reason
+    without = list(comparisons([trace(*rows[0]), trace("model_1", "plate", hand)]))
+    assert without[0].reason == ""
