@@ -94,6 +94,7 @@ class Independent:
         to_surface = self.origin[k] / 1e3
         assert R[2, 2] < -0.999 and to_surface[2] <= 0.0
         at_centre = m - np.cross(to_surface, f)
+        f, at_centre = (np.where(f[:, 2:] != 0.0, x, np.nan) for x in (f, at_centre))  # past the last sample
         cop = np.stack([-at_centre[:, 1] / f[:, 2], at_centre[:, 0] / f[:, 2], 0.0 * f[:, 0]], axis=1)
         return f @ R.T, at_centre @ R.T, cop @ R.T + c.mean(axis=0)
 
@@ -117,7 +118,7 @@ def test_an_independent_reader_finds_the_same_markers_wrench_and_centre_of_press
 
 def test_a_laboratory_reads_the_reaction_upwards(file):
     f, *_ = Independent(file).reaction(0)
-    assert f[:, 2].mean() > 300.0
+    assert np.nanmean(f[:, 2]) > 300.0
 
 
 def test_the_transducers_are_below_the_surface_in_the_raw_file(file):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration import calibrate, load
+from calibration import calibrate, load, save_estimate
 from calibration.recording import Trial
 from scenarios import cli, exchange
 from tests.calibration import matched
@@ -77,11 +77,15 @@ def largest(a: Path, b: Path, names: tuple[str, ...]) -> dict[str, float]:
     return found
 
 
-def test_csv_gives_every_bit_back(source, tmp_path):
-    files = exported(source, tmp_path / "csv", "csv")
-    run("import", "csv", *files, "--map", tmp_path / "csv/mapping.yaml", "--out", tmp_path / "back")
+@pytest.fixture(scope="module")
+def csv(source, tmp_path_factory) -> list[Path]:
+    """The campaign as CSV files."""
+    return exported(source, tmp_path_factory.mktemp("csv") / "csv", "csv")
+
+
+def test_csv_gives_every_bit_back(source, csv, tmp_path):
+    run("import", "csv", *csv, "--map", csv[0].parent / "mapping.yaml", "--out", tmp_path / "back")
     assert set(largest(source, tmp_path / "back", SIGNALS + PLACES).values()) == {0.0}
-    assert (tmp_path / "back/dataset.json").read_bytes() != b""
 
 
 @pytest.fixture(scope="module")
@@ -127,11 +131,11 @@ def test_posture_means_go_out_as_csv_and_come_back(tmp_path, capsys):
     assert "posture means have no time; export csv" in capsys.readouterr().err
 
 
-def test_the_calibrated_urdf_is_written_and_only_of_an_estimate_that_may_be_used(source, tmp_path, capsys):
-    run("calibrate", source, "--out", tmp_path / "estimate", "--stages", "registration,geometry")
+def test_the_calibrated_urdf_is_written_and_only_of_an_estimate_that_may_be_used(estimate, tmp_path, capsys):
+    save_estimate(estimate, tmp_path / "estimate")
     run("export", "urdf", tmp_path / "estimate", "--out", tmp_path / "robot.urdf")
     text = (tmp_path / "robot.urdf").read_text()
-    assert text == (tmp_path / "estimate/calibrated.urdf").read_text() != load(source).urdf
+    assert text == (tmp_path / "estimate/calibrated.urdf").read_text() != estimate.urdf
     path = tmp_path / "estimate/estimate.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"status": "not_calibrated"}))
     with pytest.raises(SystemExit) as exit:
@@ -148,16 +152,16 @@ def test_an_export_replaces_an_export_and_nothing_else(source, tmp_path):
     assert exit.value.code == 2 and [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
-def test_importing_into_the_dataset_that_is_added_to_keeps_it_when_it_fails(source, tmp_path):
-    files = exported(source, tmp_path / "csv", "csv")
-    mocap = [p for p in files if p.name.endswith("mocap.csv")]
-    robot = [p for p in files if p.name.endswith("robot.csv")]
-    exchange.import_files("csv", mocap, tmp_path / "csv/mapping.yaml", tmp_path / "d")
+def test_importing_into_the_dataset_that_is_added_to_keeps_it_when_it_fails(csv, tmp_path):
+    mapping = csv[0].parent / "mapping.yaml"
+    mocap = [p for p in csv if p.name.endswith("mocap.csv")]
+    robot = [tmp_path / p.name for p in csv if p.name.endswith("robot.csv")]
+    exchange.import_files("csv", mocap, mapping, tmp_path / "d")
     before = (tmp_path / "d/dataset.json").read_bytes()
-    robot[0].write_text("t\n1.0\n")
-    with pytest.raises(SystemExit):
-        cli.main(
-            ["import", "csv", *map(str, robot), "--map", str(tmp_path / "csv/mapping.yaml"), "--out",
-             str(tmp_path / "d"), "--add-to", str(tmp_path / "d")]
-        )  # fmt: skip
+    for path in robot:
+        path.write_text("t\n1.0\n")
+    arguments = ["--map", mapping, "--out", tmp_path / "d", "--add-to", tmp_path / "d"]
+    with pytest.raises(SystemExit) as exit:
+        cli.main(["import", "csv", *map(str, [*robot, *arguments])])
+    assert exit.value.code == 2
     assert (tmp_path / "d/dataset.json").read_bytes() == before
