@@ -33,18 +33,18 @@ def picture(config: TwinConfig, seed: int, path: Path, size: tuple[int, int] = S
         size: Width and height [pixel].
     """
     lab, nominal = laboratory(config, seed), mjcf.spec().compile()
-    model = build(_with_markers(lab), lab.robot.defects, timestep=config.timestep, visual=True).model
+    model = build(with_markers(lab), lab.robot.defects, timestep=config.timestep, visual=True).model
     model, data = put_down(model, lab.T_lab_base)
     held_out = nominal.key("reach").qpos
     for joint in JOINTS:
         data.joint(joint).qpos = held_out[nominal.joint(joint).qposadr[0]]
     mujoco.mj_kinematics(model, data)
-    image = render(model, data, _view(nominal, lab.T_lab_base, size))
+    image = render(model, data, portrait(nominal, lab.T_lab_base, size))
     path.parent.mkdir(parents=True, exist_ok=True)
     matplotlib.image.imsave(path, image, metadata={"Software": "tiago-twin"}, pil_kwargs={"optimize": True})
 
 
-def _with_markers(lab: Laboratory) -> mujoco.MjSpec:
+def with_markers(lab: Laboratory) -> mujoco.MjSpec:
     """The nominal robot with a sphere at every marker's true place on its link."""
     spec = mjcf.spec()
     for cluster in lab.robot.clusters:
@@ -57,7 +57,7 @@ def _with_markers(lab: Laboratory) -> mujoco.MjSpec:
     return spec
 
 
-def _view(nominal: mujoco.MjModel, T_lab_base: np.ndarray, size: tuple[int, int]) -> View:
+def portrait(nominal: mujoco.MjModel, T_lab_base: np.ndarray, size: tuple[int, int]) -> View:
     """The scene's portrait, turned with the robot."""
     camera, root = nominal.camera("portrait"), nominal.key("reach").qpos[:7]
     T = T_lab_base @ np.linalg.inv(transform(root[:3], root[3:]))
