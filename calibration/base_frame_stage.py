@@ -1,7 +1,8 @@
 """Stage `base_frame`: the marker body in the base frame, from yaw spins and straight drives.
 
-See `base_frame` for the model. On top of its covariance comes what no motion on a floor can tell: how upright and how
-high a base on soft wheels stands in its own frame, the same at every heading.
+See `base_frame` for the model. A base on soft wheels stands neither quite upright nor quite where its drawing has it,
+the same at every heading, so that no motion on a floor tells it from a marker body that is mounted so. It may differ
+from trial to trial, and what all trials have in common comes on top of the covariance.
 """
 
 from collections.abc import Iterator
@@ -35,7 +36,7 @@ def locate_base(chain: Chain, description: Description, stations: Stations) -> t
         floor = np.array(description.plates[0].centre)
     free = np.array([True, True, bool(description.plates), True, True, "drive" in stations.kinds])
     printed = printed_base_frame(stations)
-    found = fit_base_frame(stations, np.where(free, printed.start(nominal), nominal), floor, free)
+    found = fit_base_frame(stations, np.where(free, printed.start(nominal), nominal), floor, free, STANDING[2:5])
     model = _model(description, found, nominal, free)
     return model, (*_refused(description, model, found), *_told(stations, found, printed, free))
 
@@ -45,7 +46,7 @@ def _model(description: Description, found: BaseFrame, nominal: np.ndarray, free
     held = np.repeat([tol.body_translation, tol.body_rotation], 3)
     covariance = max(1.0, found.chi2) * found.covariance[:6, :6] + np.diag(np.where(free, STANDING, held) ** 2)
     status: tuple[Status, ...] = tuple("estimated" if f else "not_identifiable" for f in free)
-    rows = zip(AXES, nominal, found.base, np.sqrt(np.diag(covariance)), status, strict=True)
+    rows = zip(AXES, nominal, found.common.base, np.sqrt(np.diag(covariance)), status, strict=True)
     prefix = frame_names()[0]
     return Model(
         STAGE,
@@ -72,13 +73,13 @@ def _refused(description: Description, model: Model, found: BaseFrame) -> Iterat
 
 def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarray) -> Iterator[Verdict]:
     """What was found, trial by trial where the base wandered."""
-    away = found.base - printed.start(found.base)
+    away = found.common.base - printed.start(found.common.base)
     forward = f", forward {1e3 * abs(away[5]):.2f} mrad" if free[5] else ""
     yield Verdict(
         STAGE,
         "ok",
         f"{len(stations)} rests, {stations.kinds.count('spin')} spins and {stations.kinds.count('drive')} drives; "
-        f"floor tilted {1e3 * float(np.hypot(*found.tilt)):.2f} mrad; the printed estimator's centre is "
+        f"floor tilted {1e3 * float(np.hypot(*found.common.tilt)):.2f} mrad; the printed estimator's centre is "
         f"{1e3 * float(np.hypot(*away[:2])):.3f} mm away{forward}",
     )
     for index, (name, kind) in enumerate(zip(stations.ids, stations.kinds, strict=True)):

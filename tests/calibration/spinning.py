@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from calibration.base_frame import from_planar
 from calibration.base_motion import Stations
+from calibration.base_poses import from_planar
 from calibration.bodies import body_poses
 from calibration.se3 import compose, from_vector
 from tests.calibration import matched

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 import mjcf
-from calibration.base_frame import fit_base_frame, residuals
+from calibration.base_frame import fit_base_frame
 from calibration.base_frame_heins import printed_base_frame
 from calibration.base_frame_stage import STANDING, locate_base
+from calibration.base_motion import Stations
+from calibration.base_poses import Common, residuals
 from calibration.base_ties import ties
 from calibration.robot import chain_of
+from calibration.se3 import from_vector, to_vector
 from tests.calibration import matched
 from tests.calibration.spinning import EVERY, FLOOR, SIGMA, TILT, TRUE, path, stations
 
@@ -26,39 +29,40 @@ def sampled(n: int, wander: float):
         rng = np.random.default_rng(seed)
         found.append(fitted(stations(*path(wander, rng=rng), SIGMA, rng)))
     assert all(f.converged for f in found)
-    return np.array([f.base for f in found]) - TRUE, found
+    return np.array([f.common.base for f in found]) - TRUE, found
 
 
 def test_without_noise_the_truth_is_found():
     found = fitted(stations(*path()))
-    np.testing.assert_allclose(found.base, TRUE, atol=1e-12)
-    np.testing.assert_allclose(found.tilt, TILT, atol=1e-12)
+    np.testing.assert_allclose(found.common.base, TRUE, atol=1e-12)
+    np.testing.assert_allclose(found.common.tilt, TILT, atol=1e-12)
     assert found.converged and not found.wander.any()
 
 
 def test_the_start_does_not_matter():
     far = np.array([0.3, -0.2, 0.0, 0.02, -0.05, 2.5])
     data = stations(*path(), base=far)
-    np.testing.assert_allclose(fitted(data, printed_base_frame(data).start(np.zeros(6))).base, far, atol=1e-11)
+    np.testing.assert_allclose(fitted(data, printed_base_frame(data).start(np.zeros(6))).common.base, far, atol=1e-11)
 
 
 def test_derivatives_are_those_of_the_residuals():
     planar, index, kinds = path()
-    data, base, tilt = stations(planar, index, kinds), TRUE + 0.02, TILT - 0.01
-    x0 = np.concatenate([base, tilt, planar.ravel() + 0.01])
+    data = stations(planar, index, kinds)
+    x0 = np.concatenate([TRUE + 0.02, TILT - 0.01, 0.03 * np.arange(6) - 0.1, planar.ravel() + 0.01])
 
     def at(x):
-        return residuals(x[:6], x[6:8], x[8:].reshape(-1, 3), data, FLOOR)
+        common = Common(x[:6], x[6:8], x[8:14].reshape(2, 3))
+        return residuals(common, x[14:].reshape(-1, 3), data, FLOOR)
 
     _, J, J_planar = at(x0)
-    for k in range(14):
+    for k in range(20):
         h = 1e-6 * np.eye(len(x0))[k]
         difference = (at(x0 + h)[0] - at(x0 - h)[0]) / 2e-6
         exact = np.zeros_like(difference)
-        if k < 8:
+        if k < 14:
             exact = J[:, :, k]
         else:
-            exact[(k - 8) // 3] = J_planar[(k - 8) // 3, :, (k - 8) % 3]
+            exact[(k - 14) // 3] = J_planar[(k - 14) // 3, :, (k - 14) % 3]
         np.testing.assert_allclose(difference, exact, atol=1e-8)
 
 
@@ -88,13 +92,37 @@ def test_a_wandering_spin_is_covered_and_its_wander_found():
     np.testing.assert_allclose(wander, 5e-4, rtol=0.1)
 
 
+def test_a_base_that_stands_otherwise_in_every_trial_is_allowed_for():
+    """Trials upright and tilted, together: the axis stays, the scatter is not called noise."""
+    planar, index, kinds = path()
+    lean = np.array([0.0, 0.0, -8e-4, 4e-4, 9e-4, 0.0])
+    upright, leaning = stations(planar, index, kinds), stations(planar, index, kinds, base=leaned(lean))
+    both = Stations(
+        np.concatenate([upright.T, leaning.T]),
+        np.concatenate([upright.covariance, leaning.covariance]),
+        np.concatenate([index, index + 2]),
+        kinds * 2,
+        kinds * 2,
+    )
+    stiff, soft = fitted(both), fit_base_frame(both, np.zeros(6), FLOOR, EVERY, STANDING[2:5])
+    assert stiff.chi2 > 100.0 and soft.chi2 < 1.0 and soft.converged
+    np.testing.assert_allclose(soft.common.base[[0, 1, 5]], TRUE[[0, 1, 5]], atol=5e-6)
+    lean_found = soft.common.standing[2:] - soft.common.standing[:2]
+    np.testing.assert_allclose(lean_found, np.tile(lean[2:5], (2, 1)), atol=1e-5)
+
+
+def leaned(lean):
+    """T_base_B of a base that leans."""
+    return to_vector(from_vector(lean) @ from_vector(TRUE))
+
+
 def test_leaning_on_the_first_rest_costs_accuracy():
     """The printed estimator and ours, on the same wandering spins."""
     ours, theirs = [], []
     for seed in range(60):
         rng = np.random.default_rng(seed)
         data = stations(*path(5e-4, rng=rng), SIGMA, rng)
-        ours.append((fitted(data).base - TRUE)[[0, 1, 5]])
+        ours.append((fitted(data).common.base - TRUE)[[0, 1, 5]])
         theirs.append((printed_base_frame(data).start(TRUE) - TRUE)[[0, 1, 5]])
     rms, rms_printed = (np.sqrt((np.array(e) ** 2).mean(axis=0)) for e in (ours, theirs))
     assert (rms_printed > np.array([1.3, 1.3, 1.0]) * rms).all()
