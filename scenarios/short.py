@@ -1,4 +1,4 @@
-"""20 postures and one unseen swing of a randomised robot, under a minute - for Monte-Carlo studies."""
+"""The whole pipeline in under a minute of simulated time: one robot of the Monte-Carlo studies."""
 
 from scenarios import load, run
 

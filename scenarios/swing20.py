@@ -1,6 +1,12 @@
-"""One 20 s swing of a randomised robot - for synthetic datasets by the thousand."""
+"""A small synthetic dataset: ten robots, a 20 s swing each."""
 
-from scenarios import load, run
+from pathlib import Path
+
+from scenarios import load
+from scenarios.collection.collect import Plan, collect
+from scenarios.collection.engine import Workers
+from scenarios.collection.produce import recordings_and_truth
 
 if __name__ == "__main__":
-    run(load("swing20"), out="runs/swing20")
+    plan = Plan(load("swing20"), 10, Path("runs/swing20"), recordings_and_truth)
+    collect(plan, Workers(2), lambda at, share: print(f"{100 * share:3.0f} % {at}"))

@@ -1,0 +1,81 @@
+"""Throughput of `dataset`: two workers against one, real time, memory, size against what was told.
+
+BENCH_RUNS sets the number of runs (40); 1000 takes about twenty minutes on two cores.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+RUNS = int(os.environ.get("BENCH_RUNS", "40"))
+DURATION = 20.0  # [s] simulated in a run of swing20
+
+
+def memory_of(process: psutil.Process) -> int:
+    """Resident bytes of a process and its children."""
+    total = 0
+    for one in (process, *process.children(recursive=True)):
+        try:
+            total += one.memory_info().rss
+        except psutil.NoSuchProcess:
+            continue
+    return total
+
+
+def watched(out: Path, workers: int) -> tuple[float, np.ndarray, int]:
+    """Time from the first run to the last [s], memory [bytes] along the way, and bytes told before the start."""
+    code = "from scenarios.cli import main; main()"
+    arguments = ["dataset", "swing20", "-n", str(RUNS), "--workers", str(workers), "--out", str(out)]
+    process = subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE, text=True)
+    samples: list[int] = []
+
+    def sample() -> None:
+        while process.poll() is None:
+            samples.append(memory_of(psutil.Process(process.pid)))
+            time.sleep(1.0)
+
+    watcher = threading.Thread(target=sample)
+    watcher.start()
+    told = next(line for line in process.stderr if "in all" in line)
+    start = time.monotonic()
+    for _ in process.stderr:
+        pass
+    seconds = time.monotonic() - start
+    watcher.join()
+    size, unit = re.search(r"([\d.]+) (\w+) in all", told).groups()
+    return seconds, np.array(samples), int(float(size) * {"kB": 1e3, "MB": 1e6, "GB": 1e9}[unit])
+
+
+def test_throughput(tmp_path):
+    figures: dict[str, float] = {"runs": RUNS}
+    seconds = {}
+    for workers in (1, 2):
+        out = tmp_path / f"w{workers}"
+        seconds[workers], memory, told = watched(out, workers)
+        written = sum(p.stat().st_size for p in (out / "runs").rglob("*") if p.is_file() and p.name != "run.json")
+        half = memory[len(memory) // 3 :]
+        figures |= {
+            f"dataset_{workers}_workers_real_time_factor": (RUNS - 1) * DURATION / seconds[workers],
+            f"dataset_{workers}_workers_runs_per_hour": 3600.0 * (RUNS - 1) / seconds[workers],
+            f"dataset_{workers}_workers_memory_MB": float(memory.max()) / 1e6,
+            f"dataset_{workers}_workers_memory_growth": float(half[-len(half) // 4 :].max() / np.median(half)),
+            "dataset_bytes_over_told": written / told,
+            "dataset_MB_per_run": written / RUNS / 1e6,
+        }
+        shutil.rmtree(out)
+    figures["dataset_2_workers_over_1"] = seconds[1] / seconds[2]
+    Path("runs").mkdir(exist_ok=True)
+    Path("runs/bench_dataset.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    print()
+    for name, value in figures.items():
+        print(f"{name:45s} {value:10.3g}")
+    assert abs(figures["dataset_bytes_over_told"] - 1.0) < 0.1
