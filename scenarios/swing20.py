@@ -10,4 +10,4 @@ from scenarios.collection.produce import recordings_and_truth
 if __name__ == "__main__":
     plan = Plan(load("swing20"), 10, Path("runs/swing20"), recordings_and_truth)
     with console.progress() as progress:
-        collect(plan, Workers(2), progress)
+        collect(plan, Workers(2), lambda at, share: progress("dataset", at, share))
