@@ -22,7 +22,7 @@ def spatial_stiffness(wheels: Sequence[Wheel]) -> tuple[np.ndarray, np.ndarray]:
     """K and C (6, 6) of wheels that hold on the floor; infinite on the diagonal where nothing gives."""
     K, C = np.zeros((6, 6)), np.zeros((6, 6))
     for wheel in wheels:
-        A, k, c = _lever(wheel), *_springs(wheel)
+        A, k, c = lever(wheel), *springs(wheel)
         K += A.T @ np.diag(k) @ A
         C += A.T @ np.diag(c) @ A
     if any(w.bushing is None for w in wheels):
@@ -30,7 +30,7 @@ def spatial_stiffness(wheels: Sequence[Wheel]) -> tuple[np.ndarray, np.ndarray]:
     return K, C
 
 
-def _lever(wheel: Wheel) -> np.ndarray:
+def lever(wheel: Wheel) -> np.ndarray:
     """A (6, 6): displacement and rotation of the base at the wheel's point."""
     tilts = wheel.bushing is None or not np.any(wheel.bushing.torsion[:2])
     x, y, z = wheel.contact if tilts else wheel.centre
@@ -39,7 +39,7 @@ def _lever(wheel: Wheel) -> np.ndarray:
     return A
 
 
-def _springs(wheel: Wheel) -> tuple[np.ndarray, np.ndarray]:
+def springs(wheel: Wheel) -> tuple[np.ndarray, np.ndarray]:
     """Stiffnesses and dampings (6,) between base and floor."""
     k, c = np.zeros(6), np.zeros(6)
     if wheel.bushing is not None:

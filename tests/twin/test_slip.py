@@ -1,0 +1,62 @@
+import mujoco
+import numpy as np
+import pytest
+
+from tests.twin.test_load_test import standing
+from twin.load_test import bench
+from twin.slip import normal_forces, slip_loads
+from twin.stiffness import HELD, spatial_stiffness
+
+UNIT = np.eye(6)[list(HELD)]
+
+
+@pytest.fixture(scope="module")
+def stood(nominal):
+    twin, wheels = standing(nominal)
+    return twin, wheels, bench(twin)
+
+
+def displaced(b, loads, damped=True):
+    """Displacement (6,) after wrenches (6,) held for some seconds each, damped so that nothing overshoots."""
+    state = b.rest
+    for wrench, duration in loads:
+        state = b.run(b.model if damped else b.bare, state, wrench, duration)[-1]
+    return b.displacement(state[None])[0]
+
+
+def test_normal_forces_are_those_of_the_contacts(stood):
+    twin, wheels, b = stood
+    data = mujoco.MjData(b.bare)
+    mujoco.mj_setState(b.bare, data, b.rest, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    mujoco.mj_forward(b.bare, data)
+    found, force = {}, np.zeros(6)
+    for i in range(data.ncon):
+        mujoco.mj_contactForce(b.bare, data, i, force)
+        found |= {b.bare.geom(int(g)).name: force[0] for g in data.contact[i].geom}
+    np.testing.assert_allclose([found[w.contact_geom] for w in wheels], normal_forces(twin, wheels), rtol=5e-3)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_friction_holds_below_the_slip_load_and_leaves_a_set_beyond(stood, axis):
+    # settling leaves up to 6 % of a caster's friction in it: 0.85 and 1.15 of the load of a rest without
+    twin, wheels, b = stood
+    K, _ = spatial_stiffness(wheels)
+    load, i = slip_loads(twin, wheels)[axis], HELD[axis]
+    elastic = np.linalg.inv(K)[i, i] * load
+    held = displaced(b, [(0.85 * load * UNIT[axis], 1.5), (np.zeros(6), 1.5)])
+    slipped = displaced(b, [(1.15 * load * UNIT[axis], 1.5), (np.zeros(6), 1.5)])
+    stays = displaced(b, [(1.15 * load * UNIT[axis], 1.5), (np.zeros(6), 4.0)])
+    assert abs(held[i]) < 5e-4 * elastic
+    assert slipped[i] > 5e-3 * elastic
+    np.testing.assert_allclose(stays[i], slipped[i], atol=5e-4 * elastic)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", range(3))
+def test_half_the_slip_load_does_not_creep_in_a_minute(stood, axis):
+    twin, wheels, b = stood
+    wrench = 0.5 * slip_loads(twin, wheels)[axis] * UNIT[axis]
+    loaded = displaced(b, [(wrench, 1.5)])
+    later = displaced(b, [(wrench, 61.5)])
+    print("creep", 1e3 * np.abs(later - loaded), "mm, mrad")
+    assert (1e3 * np.abs(later - loaded) < 0.05).all()
