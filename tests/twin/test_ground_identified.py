@@ -22,11 +22,11 @@ SHARP = 0.02
 
 @pytest.mark.slow
 def test_the_suspension_stage_finds_the_springs_of_anchored_wheels(tmp_path):
-    """Default noise, markers where the drawing says, 2.5 kg swung five times for a minute.
+    """Default noise and mounting of markers, 2.5 kg swung five times for a minute.
 
-    The 2 % are held where the stage's own standard deviation is below: x, y, rx, ry, rz, x-y and rx-ry. Heave moves by less
-    than the markers' noise, and where the base's markers are on it (2 mm) is in the others: 1.4 % of sqrt(K_z K_pitch)
-    for each millimetre.
+    The 2 % are held where the stage's own standard deviation is below: x, y, rx, ry, rz, x-y and rx-ry. Heave moves by
+    less than the markers' noise, and where the base's markers are on it (2 mm) is in the others: 1.4 % of
+    sqrt(K_z K_pitch) for each millimetre.
     """
     record(load("humanoids2024", list(SETTINGS)).twin, 4, tmp_path)
     estimate = calibrate(load_dataset(tmp_path / "dataset"), ("clocks", "registration", "suspension"))
