@@ -41,6 +41,7 @@ from calibration.verdict import Verdict
 
 _COMMON = {"robot": 1.5e-4, "plate": 3e-4}  # what all trials share [s]: dry friction winds gears, the link is late
 _CUTOFF = 6.0  # robot [Hz]
+_LATE, _FAR = 2e-3, 5.0  # [s] and standard deviations by which a clock declared shared may be off unsaid
 _HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
 _MOVES = 8.0  # a joint whose range exceeds this many half gaps gets that play term
 _log = logging.getLogger(__name__)
@@ -81,8 +82,26 @@ def _robot_clock(
     chain: Chain, description: Description, trials: Sequence[Trial]
 ) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
     """The robot's clock, and the provisional robot the plate's is told with."""
-    if "robot" in description.mocap_clock:
-        return shared_clock("robot"), None, (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
+    if "robot" not in description.mocap_clock:
+        return _estimated_robot_clock(chain, description, trials)
+    said: tuple[Verdict, ...] = (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
+    try:
+        found = _estimated_robot_clock(chain, description, trials)[0]
+    except NotEnoughData:
+        return shared_clock("robot"), None, said
+    late = float(found.to_mocap(np.array([found.epoch]))[0]) - found.epoch
+    if abs(late) > max(_LATE, _FAR * found.sigma):
+        message = (
+            f"robot: declared on the motion capture's clock, but its stamps are {-1e3 * late:+.1f} ms late "
+            f"(+- {1e3 * found.sigma:.1f}); take robot out of mocap_clock, or mend the stamps"
+        )
+        said = (*said, Verdict("clocks", "warning", message))
+    return shared_clock("robot"), None, said
+
+
+def _estimated_robot_clock(
+    chain: Chain, description: Description, trials: Sequence[Trial]
+) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
     robot, verdicts = _clock("robot", _robot_motions(description, chain, trials), 1)
     try:
         model = provisional(chain, description, trials, robot)

@@ -9,6 +9,7 @@ import pinocchio as pin
 from pydantic import ValidationError
 
 from calibration.errors import InputError, NoSuchElement
+from calibration.labels import with_right_labels
 from calibration.means import PostureMeans, holds_means, read_means
 from calibration.recording import Trial, read_trial, sha256
 from calibration.schema import Description, Role, TrialEntry
@@ -33,14 +34,14 @@ class Dataset:
         return tuple(t for t in self.description.trials if t.role == role and (not kinds or t.kind in kinds))
 
     def read(self, entry: TrialEntry) -> Trial:
-        """Read one continuous trial and check it against dataset.json.
+        """Read one continuous trial and check it against dataset.json; exchanged marker labels are set right.
 
         Raises:
             InputError: The file is damaged, changed since it was listed, names other joints, or holds means only.
         """
         trial = read_trial(self._unchanged(entry), entry.id)
         self._check_joints(entry, trial.joint)
-        return trial
+        return with_right_labels(self.description.bodies, trial)[0]
 
     def read_means(self, entry: TrialEntry) -> PostureMeans:
         """Read one trial that holds posture means, and check it against dataset.json.

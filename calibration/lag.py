@@ -18,7 +18,7 @@ from scipy.signal import correlate, correlation_lags
 from calibration.errors import NotEnoughData
 from calibration.signals import RATE, Signal
 
-_MEMORY = 1.0  # [s] residuals farther apart count as independent
+MEMORY = 1.0  # [s] residuals farther apart count as independent
 _STEPS = 30
 _ENOUGH = 0.5  # share of the motion's variance a lag must explain to be believed [-]
 
@@ -113,13 +113,13 @@ def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> t
 
 
 def long_run_variance(psi: np.ndarray, rate: float) -> float:
-    """Variance of sum(psi), sampled at `rate` [Hz], allowing for autocorrelation up to `_MEMORY` (Bartlett weights)."""
+    """Variance of sum(psi), sampled at `rate` [Hz], allowing for autocorrelation up to `MEMORY` (Bartlett weights)."""
     return float(long_run_covariance(psi[:, None], rate)[0, 0])
 
 
 def long_run_covariance(psi: np.ndarray, rate: float) -> np.ndarray:
     """The same of the sums of psi (n, c): covariance (c, c)."""
     n, c = psi.shape
-    weight = np.clip(1.0 - np.abs(correlation_lags(n, n)) / (_MEMORY * rate), 0.0, None)
+    weight = np.clip(1.0 - np.abs(correlation_lags(n, n)) / (MEMORY * rate), 0.0, None)
     both = [[weight @ correlate(a, b, mode="full", method="fft") for b in psi.T] for a in psi.T]
     return np.array(both).reshape(c, c)

@@ -23,6 +23,7 @@ from calibration.means import PostureMeans
 from calibration.recording import Trial
 from calibration.schema import Body, Description
 from calibration.se3 import adjoint, inverse, to_vector
+from calibration.signals import GAP
 
 _MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
 BLOCKS = 4
@@ -113,10 +114,13 @@ def _passed(description: Description, trial: Trial, robot: Clock, spacing: float
 
 
 def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray) -> np.ndarray:
-    """Readings (m, n_joints) taken at `t_robot`, at mocap times t (n,) [s], linear; NaN outside the recording."""
+    """Readings (m, n_joints) taken at `t_robot`, at mocap times t (n,) [s], linear; NaN outside it and in holes."""
     s = robot.from_mocap(t)
     columns = (np.interp(s, trial.t_robot, q, left=np.nan, right=np.nan) for q in readings.T)
-    return np.stack(list(columns), axis=1)
+    found = np.stack(list(columns), axis=1)
+    after = np.clip(np.searchsorted(trial.t_robot, s), 1, len(trial.t_robot) - 1)
+    found[np.diff(trial.t_robot)[after - 1] > GAP] = np.nan
+    return found
 
 
 def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray, ...]]:

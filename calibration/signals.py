@@ -13,7 +13,7 @@ from calibration.errors import NotEnoughData
 from calibration.se3 import rotation_vector
 
 RATE = 100.0  # common grid [Hz]
-_GAP = 0.05  # [s] longer holes in a recording are not compared
+GAP = 0.05  # [s] longer holes in a recording are not compared
 _ORDER = 2  # of the Butterworth filter; run forth and back, so 4
 
 
@@ -44,7 +44,7 @@ def even(t: np.ndarray, x: np.ndarray) -> Signal:
         raise NotEnoughData("less than one second of samples; record the motion with a second of rest on both sides")
     grid = t[0] + np.arange(int((t[-1] - t[0]) * RATE) + 1) / RATE
     right = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
-    return Signal(grid, CubicSpline(t, x)(grid), np.diff(t)[right - 1] <= _GAP)
+    return Signal(grid, CubicSpline(t, x)(grid), np.diff(t)[right - 1] <= GAP)
 
 
 def low_passed(signal: Signal, cutoff: float) -> Signal:

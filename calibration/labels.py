@@ -1,0 +1,99 @@
+"""Labels of markers that a motion capture has exchanged: found by a cluster's residual, set right or masked.
+
+    e(P) = rms distance of the markers, labels permuted by P, from their rigid cluster where it fits them best
+
+A rigid cluster's residual is of the size of noise and drilling, whatever its pose. Where it exceeds a tenth of the
+cluster's shortest edge, something is labelled wrongly: the permutation that fits best is taken if it is within that
+limit and no other fits nearly as well; otherwise the body's markers are masked at that instant. A single foreign
+marker is masked alone where the others are rigid without it. A drawing that is off raises the limit to three times the
+trial's usual misfit.
+"""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations
+
+import numpy as np
+
+from calibration.bodies import body_poses
+from calibration.recording import Trial
+from calibration.schema import Body
+
+_LIMIT = 0.1  # of the shortest edge [-]
+_CLEAR = 3.0  # times better than the next permutation [-]
+_MOST = 6  # markers of a cluster whose permutations are tried: 720
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Relabelled:
+    """What was done to one body in one trial: frames set right, and frames masked."""
+
+    body: str
+    n_mended: int
+    n_masked: int
+
+
+def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tuple[Relabelled, ...]]:
+    """The trial with exchanged labels set right, and what was done; the trial itself where nothing was wrong."""
+    position, done = trial.marker_position, []
+    for body in bodies:
+        columns = _columns(body, trial)
+        xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
+        if len(columns) < 3 or not len(position):
+            continue
+        misfit = _misfit(xyz, position[:, columns])
+        rows = np.flatnonzero(misfit > max(_limit(xyz), _CLEAR * float(np.median(misfit))))
+        if not len(rows):
+            continue
+        mended = _mended(xyz, position[np.ix_(rows, columns)])
+        position = position.copy()
+        position[np.ix_(rows, columns)] = mended
+        n_masked = int(np.isnan(mended).all(axis=(1, 2)).sum())
+        done.append(Relabelled(body.name, len(rows) - n_masked, n_masked))
+        told = "%s: labels of body %r exchanged: %d frames set right, %d masked"
+        _log.warning(told, trial.id, body.name, len(rows) - n_masked, n_masked)
+    return (replace(trial, marker_position=position) if done else trial), tuple(done)
+
+
+def _columns(body: Body, trial: Trial) -> np.ndarray:
+    """Where the body's markers are in the trial, in the body's order."""
+    return np.array([trial.marker.index(m.name) for m in body.markers if m.name in trial.marker], dtype=int)
+
+
+def _limit(xyz: np.ndarray) -> float:
+    return _LIMIT * min(float(np.linalg.norm(a - b)) for a, b in combinations(xyz, 2))
+
+
+def _misfit(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """rms distance (n,) [m] of markers p (n, m, 3) from the rigid cluster; 0 where it has no pose."""
+    r = np.nan_to_num(body_poses(xyz, p).residual)
+    seen = np.maximum(np.isfinite(p).all(axis=2).sum(axis=1), 1)
+    return np.sqrt((r**2).sum(axis=(1, 2)) / seen)
+
+
+def _mended(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Markers (n, m, 3) in the order that fits, or NaN."""
+    m = p.shape[1]
+    orders = np.array(list(permutations(range(m)))) if m <= _MOST else np.arange(m)[None]
+    found = np.array([_misfit(xyz, p[:, order]) for order in orders])
+    found[:, np.isfinite(p).all(axis=2).sum(axis=1) < 4] = np.inf
+    rank = np.sort(found, axis=0)
+    second = rank[1] if len(rank) > 1 else np.full(len(p), np.inf)
+    clear = (rank[0] <= _limit(xyz)) & (second > _CLEAR * rank[0])
+    best = orders[np.argmin(found, axis=0)]
+    out = np.where(clear[:, None, None], np.take_along_axis(p, best[:, :, None], axis=1), np.nan)
+    return _without_one(xyz, p, out)
+
+
+def _without_one(xyz: np.ndarray, p: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """Where no order fits: the markers without the one that is not of the cluster, if four others agree."""
+    lost = np.isnan(out).all(axis=(1, 2))
+    for k in range(p.shape[1]):
+        rest = p.copy()
+        rest[:, k] = np.nan
+        enough = np.isfinite(rest).all(axis=2).sum(axis=1) >= 3
+        take = lost & enough & (_misfit(xyz, rest) <= 0.1 * _limit(xyz))
+        out[take], lost = rest[take], lost & ~take
+    return out
