@@ -4,7 +4,8 @@
     estimate.nc              covariances, one group a model
     nominal.urdf             what the placement twists are relative to
     calibrated.urdf          joint placements of the main model        } only if the result
-    master_calibration.yaml  zeros of the readings of the main model   } may be used
+    master_calibration.yaml  zeros of the readings of the main model   } may be used: see `estimate_tables`
+    parameters.csv           every parameter of every model            }
 
 The same estimate gives the same bytes. `load_estimate` also reads somebody else's estimate.json, or a bare URDF.
 """
@@ -22,11 +23,12 @@ from pydantic import ValidationError
 from calibration.errors import InputError
 from calibration.estimate import Estimate, Model
 from calibration.estimate_schema import EstimateFile, to_estimate, to_file
+from calibration.estimate_tables import parameters_text, zeros_text
 from calibration.robot import chain_of_frames
 from calibration.urdf_export import calibrated_urdf
 
 JSON, COVARIANCES, NOMINAL = "estimate.json", "estimate.nc", "nominal.urdf"
-CALIBRATED, ZEROS = "calibrated.urdf", "master_calibration.yaml"
+CALIBRATED, ZEROS, TABLE = "calibrated.urdf", "master_calibration.yaml", "parameters.csv"
 
 
 def save_estimate(estimate: Estimate, folder: Path | str) -> None:
@@ -37,7 +39,7 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
     _write_covariances(folder / COVARIANCES, estimate)
     if estimate.urdf is not None:
         _replace_text(folder / NOMINAL, estimate.urdf)
-    for name in (CALIBRATED, ZEROS):
+    for name in (CALIBRATED, ZEROS, TABLE):
         (folder / name).unlink(missing_ok=True)
     if estimate.calibrated and estimate.urdf is not None and estimate.robot is not None:
         chain = chain_of_frames(
@@ -45,7 +47,8 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
         )
         hand = estimate.model(estimate.main).hand(chain, np.zeros(12))
         _replace_text(folder / CALIBRATED, calibrated_urdf(estimate.urdf, hand.chain))
-        _replace_text(folder / ZEROS, _zeros(chain.joints, hand.offset))
+        _replace_text(folder / ZEROS, zeros_text(hand))
+        _replace_text(folder / TABLE, parameters_text(estimate.models))
 
 
 def load_estimate(path: Path | str) -> Estimate:
@@ -86,15 +89,6 @@ def _replace_text(path: Path, text: str) -> None:
     part = path.with_name(path.name + ".part")
     part.write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8", newline="\n")
     os.replace(part, path)
-
-
-def _zeros(joints: tuple[str, ...], offsets: np.ndarray) -> str:
-    lines = [
-        "# Zeros of the motor-side readings: angle = reading - offset [rad; m for prismatic joints].",
-        "# To be used with calibrated.urdf, whose joint positions are these angles.",
-        *(f"- joint: {name}\n  offset: {float(x)!r}" for name, x in zip(joints, offsets, strict=True)),
-    ]
-    return "\n".join(lines)
 
 
 def _write_covariances(path: Path, estimate: Estimate) -> None:

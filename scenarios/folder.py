@@ -36,7 +36,17 @@ RUN = Kind("run", "scenario.yaml", frozenset({"scenario.yaml", "dataset", "truth
 ESTIMATE = Kind(
     "estimate",
     "estimate.json",
-    frozenset({"estimate.json", "estimate.nc", "nominal.urdf", "calibrated.urdf", "master_calibration.yaml"}),
+    frozenset(
+        {
+            "estimate.json",
+            "estimate.nc",
+            "nominal.urdf",
+            "calibrated.urdf",
+            "master_calibration.yaml",
+            "parameters.csv",
+            "record_next.yaml",
+        }
+    ),
 )
 DATASET = Kind("dataset", "dataset.json", frozenset({"dataset.json", "nominal.urdf", "trials"}))
 

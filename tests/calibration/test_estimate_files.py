@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from ruamel.yaml import YAML
 
 import mjcf
 from calibration import Compensator, load_estimate, save_estimate
 from calibration.errors import InputError, NotCalibrated, ShapeError
+from calibration.estimate_tables import read_parameters, read_zeros, zeros_text
 from calibration.hand import nominal_hand
 from calibration.robot import chain_of
 from calibration.urdf_export import calibrated_urdf, roll_pitch_yaw
@@ -21,24 +21,54 @@ def all_bytes(folder: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in sorted(folder.iterdir())}
 
 
-def test_the_exported_urdf_is_the_estimate_to_1e_9_on_random_configurations(estimate, chain, tmp_path):
+def test_the_exported_urdf_is_the_estimate_to_1e_9_on_1000_configurations(estimate, chain, tmp_path):
     save_estimate(estimate, tmp_path)
     hand = estimate.model("model_2").hand(chain, np.zeros(12))
     exported = chain_of((tmp_path / "calibrated.urdf").read_text(), matched.described())
-    q = matched.random_angles(np.random.default_rng(0), 300)
+    q = matched.random_angles(np.random.default_rng(0), 1000)
     np.testing.assert_allclose(exported.poses(hand.angles(q)), hand.chain.poses(hand.angles(q)), atol=1e-9, rtol=0)
     assert np.abs(exported.poses(q) - chain.poses(q)).max() > 1e-3
 
 
 def test_zeros_read_back_from_master_calibration_close_the_loop(estimate, chain, tmp_path):
     save_estimate(estimate, tmp_path)
-    entries = YAML(typ="safe").load((tmp_path / "master_calibration.yaml").read_text())
-    assert [e["joint"] for e in entries] == list(chain.joints)
+    zeros = read_zeros(tmp_path / "master_calibration.yaml")
+    assert [z.joint for z in zeros] == list(chain.joints)
     exported = chain_of((tmp_path / "calibrated.urdf").read_text(), matched.described())
     readings = matched.random_angles(np.random.default_rng(0), 20)
-    angles = readings - np.array([e["offset"] for e in entries])  # the sign the file states
+    angles = readings - np.array([z.offset for z in zeros])  # the sign the file states
     hand = estimate.model("model_2").hand(chain, np.zeros(12))
     np.testing.assert_allclose(exported.poses(angles), hand.in_base_frame(readings) @ inverse_of_hand(hand), atol=1e-9)
+
+
+def test_zeros_of_an_elastic_robot_carry_its_compliance(chain, tmp_path):
+    elastic = replace(nominal_hand(chain, np.zeros(12)), offset=0.01 * np.arange(8.0), compliance=1e-4 * np.arange(8.0))
+    (tmp_path / "master_calibration.yaml").write_text(zeros_text(elastic))
+    zeros = read_zeros(tmp_path / "master_calibration.yaml")
+    q = matched.random_angles(np.random.default_rng(0), 5)
+    angles = q - [z.offset for z in zeros] - np.array([z.compliance for z in zeros]) * chain.gravity_torques(q)
+    np.testing.assert_allclose(angles, elastic.angles(q), atol=1e-15)
+
+
+@pytest.mark.parametrize("text", ["- joint: a\n  offset: none", "- [1, 2", "- joint: a\n  ofset: 1.0", "3"])
+def test_zeros_that_are_none_are_told(tmp_path, text):
+    (tmp_path / "zeros.yaml").write_text(text)
+    with pytest.raises(InputError):
+        read_zeros(tmp_path / "zeros.yaml")
+
+
+def test_the_table_of_parameters_reads_back_as_the_estimate(estimate, tmp_path):
+    save_estimate(estimate, tmp_path)
+    rows = read_parameters(tmp_path / "parameters.csv")
+    assert [(r.model, r.name, r.value, r.sigma, r.unit, r.status, r.nominal) for r in rows] == [
+        (m.name, p.name, p.value, p.sigma, p.unit, p.status, p.nominal) for m in estimate.models for p in m.parameters
+    ]
+    lines = (tmp_path / "parameters.csv").read_text().splitlines()
+    assert lines[0].startswith("name,value,sigma,unit,status")
+    lines[3] = lines[3].replace(",", ",x", 1)
+    (tmp_path / "broken.csv").write_text("\n".join(lines))
+    with pytest.raises(InputError, match="line 4, value"):
+        read_parameters(tmp_path / "broken.csv")
 
 
 def inverse_of_hand(hand):
