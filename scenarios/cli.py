@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios import command_dataset, command_exchange, command_picture, command_study
+from scenarios import command_dataset, command_exchange, command_look, command_picture, command_study
 from scenarios.errors import ScenarioError
 from scenarios.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
 
@@ -141,6 +141,7 @@ import_ = app.command("import")(command_exchange.import_)
 export = app.command()(command_exchange.export)
 dataset = app.command()(command_dataset.dataset)
 study = app.command()(command_study.study)
+look = app.command()(command_look.look)
 picture = app.command()(command_picture.picture)
 
 

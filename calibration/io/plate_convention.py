@@ -16,9 +16,9 @@ import numpy as np
 
 from calibration.errors import InputError
 from calibration.io.mapping import MOMENTS, PlateChannels
+from calibration.pressure import LOADED, centre_of_pressure
 from calibration.schema import Plate
 
-_LOADED = 20.0  # [N] below which a centre of pressure means nothing
 _AGREES = 1e-3  # [m]
 _MARGIN = 0.05  # [m] the centre of pressure may be outside the plate
 
@@ -57,7 +57,7 @@ def checked_against_cop(
         InputError: The file contradicts the mapping.
     """
     wrench = to_action(force, moment, channels, plate)
-    loaded = np.abs(wrench[:, 2]) > _LOADED
+    loaded = np.abs(wrench[:, 2]) > LOADED
     if not loaded.any():
         return f"plate {plate.name}: never loaded, so its convention could not be checked"
     _check_sign(place, wrench, loaded, channels, plate)
@@ -95,7 +95,7 @@ def _check_sign(place: str, wrench: np.ndarray, loaded: np.ndarray, channels: Pl
 
 def _check_inside(place: str, wrench: np.ndarray, loaded: np.ndarray, plate: Plate) -> None:
     axes = np.array(plate.axes)
-    local = (_cop(wrench[loaded], plate) - plate.centre) @ axes.T
+    local = (centre_of_pressure(wrench[loaded], np.array(plate.centre)) - plate.centre) @ axes.T
     beyond = float((np.abs(np.median(local, axis=0))[:2] - 0.5 * np.array(plate.size)).max())
     if beyond > _MARGIN:
         raise InputError(
@@ -105,16 +105,9 @@ def _check_inside(place: str, wrench: np.ndarray, loaded: np.ndarray, plate: Pla
         )
 
 
-def _cop(wrench: np.ndarray, plate: Plate) -> np.ndarray:
-    f, m = wrench[:, :3], wrench[:, 3:]
-    offset = np.stack([-m[:, 1] / f[:, 2], m[:, 0] / f[:, 2], np.zeros(len(f))], axis=1)
-    return offset + np.array(plate.centre)
-
-
 def _disagreement(wrench: np.ndarray, loaded: np.ndarray, cop: np.ndarray, plate: Plate) -> float:
     """Median distance in the plane between computed and written CoP [m]."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        d = (_cop(wrench[loaded], plate) - cop[loaded])[:, :2]
+    d = (centre_of_pressure(wrench[loaded], np.array(plate.centre)) - cop[loaded])[:, :2]
     return float(np.median(np.linalg.norm(d, axis=1)))
 
 
