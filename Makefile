@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help demo test check slow bench clean
+.PHONY: help demo test check slow bench bench-peer clean
 
 help:
 	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
@@ -13,6 +13,7 @@ help:
 	@echo "make check       format, lint, types"
 	@echo "make slow        the tests that take minutes"
 	@echo "make bench       the benchmarks"
+	@echo "make bench-peer  geometric calibration beside FIGAROH's, in an environment of its own"
 	@echo "make clean       remove .venv, caches and built files; runs/ stays"
 
 demo: $(READY)
@@ -30,7 +31,16 @@ slow: $(READY)
 	$(BIN)/python -m pytest -q -m slow -n 2 --dist loadfile
 
 bench: $(READY)
-	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench
+	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench --ignore=tests/bench/bench_peer.py
+
+bench-peer: $(READY) .venv-peer/ready
+	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_peer.py' tests/bench
+
+.venv-peer/ready:
+	@echo "Installing the peer, FIGAROH 1.0.2, into .venv-peer (once, about 1 GB)"
+	@$(PYTHON) -m venv .venv-peer
+	@.venv-peer/bin/python -m pip install -qq --disable-pip-version-check figaroh==1.0.2
+	@touch $@
 
 $(READY): requirements.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \
@@ -45,5 +55,5 @@ $(READY): requirements.txt pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf .venv dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peer dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

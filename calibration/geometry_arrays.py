@@ -12,13 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.errors import NotCalibrated, NotEnoughData, ShapeError
+from calibration.gear_average import with_gears_averaged
 from calibration.geometry_guards import joint_lengths, unusable_data, unusable_fit
 from calibration.hand import HandModel, nominal_hand
 from calibration.hand_fit import Errors, hand_problem
 from calibration.identifiability import Identifiability, identifiability
 from calibration.map_fit import Fit
 from calibration.marker_shape import Cluster, cluster, in_line
-from calibration.parameters import ParameterSet, parameter_names
+from calibration.parameters import COMPLIANCES, ZEROS, ParameterSet, parameter_names, placement_groups
 from calibration.postures import Postures
 from calibration.registration_start import Start, registration_start
 from calibration.robot import Chain, chain_of_frames
@@ -179,9 +180,10 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     known = identifiability(found.fit.J_white[: 6 * _SPREAD], parameters)
     if refused := list(unusable_fit(chain, parameters, found, known, len(postures))):
         raise NotCalibrated(refused)
+    fit = with_gears_averaged(found.fit, parameters)
     left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~found.kept].tolist()}))
     verdicts = _verdicts(left_out, len(q), known, parameters)
-    return GeometryFit(nominal.with_theta(found.fit.theta), parameters, found.fit, markers, left_out, verdicts, known)
+    return GeometryFit(nominal.with_theta(fit.theta), parameters, fit, markers, left_out, verdicts, known)
 
 
 def _verdicts(
@@ -226,5 +228,5 @@ def _parameters(chain: Chain, start: Start, widths: Widths, postures: Postures, 
         + tuple("m/N" if s else "rad/(N.m)" for s in slides),
         np.concatenate([start.frames, np.zeros(8 * k)]),
         np.concatenate([frames, placement * k, widths.offset * lengths, widths.deflection * lengths / torque]),
-        np.concatenate([np.full(12, -1), np.tile([0, 0, 0, 1, 1, 1], k), np.full(k, 2), np.full(k, 3)]),
+        np.concatenate([np.full(12, -1), placement_groups(k), np.full(k, ZEROS), np.full(k, COMPLIANCES)]),
     )

@@ -20,6 +20,7 @@ from calibration.schema import Body, Description
 from calibration.se3 import from_vector, to_vector
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
+TRANSLATIONS, ROTATIONS, ZEROS, COMPLIANCES = range(4)  # groups of parameters whose tolerances share a factor
 METRES_PER_RAD = 0.1  # a prismatic joint's tolerances are an angle's times this
 
 
@@ -100,8 +101,13 @@ def geometry_parameters(chain: Chain, description: Description) -> ParameterSet:
                 tol.encoder_offset * lengths,
             ]
         ),
-        np.concatenate([np.full(12, -1), np.tile([0, 0, 0, 1, 1, 1], k), np.full(k, 2)]),
+        np.concatenate([np.full(12, -1), placement_groups(k), np.full(k, ZEROS)]),
     )
+
+
+def placement_groups(k: int) -> np.ndarray:
+    """Groups of the placement twists of k joints, (6 k,)."""
+    return np.tile(np.repeat([TRANSLATIONS, ROTATIONS], 3), k)
 
 
 def nominal_frames(chain: Chain, description: Description) -> np.ndarray:

@@ -1,0 +1,54 @@
+"""Averaging over which of some parameters are needed at all.
+
+    w_m = p(m | data) ~ p(theta_m = 0 | data) / p(theta_m = 0)        m: a set of parameters that are zero
+    theta = sum_m w_m theta_m,     covariance = sum_m w_m (covariance_m + (theta_m - theta) (theta_m - theta)')
+
+theta_m and covariance_m are the Gaussian posterior of all parameters given those zeros. A parameter the data do not
+need costs nothing then, one they need stays, and where they cannot tell, both are averaged, by their evidence. All sets
+are equally likely beforehand.
+References: Dickey, Ann. Math. Stat. 1971 (density ratio); Hoeting et al., Statistical Science 1999 (averaging).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_MOST = 10  # parameters that are asked; of more, those farthest from zero are needed without asking
+
+
+@dataclass(frozen=True)
+class Average:
+    """Mean and covariance over all sets.
+
+    Attributes:
+        theta: (p,).
+        covariance: (p, p).
+        needed: (m,) probability that each parameter asked is needed.
+    """
+
+    theta: np.ndarray
+    covariance: np.ndarray
+    needed: np.ndarray
+
+
+def averaged(theta: np.ndarray, covariance: np.ndarray, asked: np.ndarray, width: np.ndarray) -> Average:
+    """Average the posterior N(theta (p,), covariance (p, p)) over which parameters `asked` (m,) are zero.
+
+    `width` (m,) is their prior standard deviation about zero.
+    """
+    x, S = theta[asked] / width, covariance[np.ix_(asked, asked)] / np.outer(width, width)
+    weak = np.sort(np.argsort(np.abs(x) / np.sqrt(np.diag(S)))[:_MOST])
+    mine, x, S, k = asked[weak], x[weak], S[np.ix_(weak, weak)], len(weak)
+    zero = (np.arange(2**k)[:, None] >> np.arange(k)) & 1
+    masked = zero[:, :, None] * zero[:, None] * S + np.eye(k) * (1 - zero)[:, None]
+    inverse = np.linalg.inv(masked) * zero[:, :, None] * zero[:, None]
+    log_w = -0.5 * (np.einsum("i,mij,j->m", x, inverse, x) + np.linalg.slogdet(masked)[1])
+    w = np.exp(log_w - log_w.max())
+    w = w / w.sum()
+    gain = covariance[:, mine] / width[weak]
+    off = inverse @ x  # theta_m = theta - gain off_m
+    mean = w @ off
+    spread = np.einsum("m,mi,mj->ij", w, off - mean, off - mean) - np.einsum("m,mij->ij", w, inverse)
+    needed = np.ones(len(asked))
+    needed[weak] = 1.0 - w @ zero
+    return Average(theta - gain @ mean, covariance + gain @ spread @ gain.T, needed)
