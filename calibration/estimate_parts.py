@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 from calibration.estimate import Model, Parameter
 from calibration.identifiability import Status
 from calibration.joint_model import JointModel, Quality, Terms
-from calibration.joint_projection import at_limit
+from calibration.joint_projection import limit_of
 from calibration.suspension import Source, Suspension
 from calibration.suspension_held_out import HeldOut
 
@@ -151,7 +151,7 @@ def joints_model(geometry: Model, models: tuple[JointModel, ...]) -> Model:
         covariance = model.covariance if model.powers else np.zeros((0, 0))
         sigma = np.sqrt(np.diag(covariance))
         added += [
-            Parameter(f"sigmoid.{model.joint}.{n}", u, 0.0, float(v), float(s), _status(n, float(v)))
+            Parameter(f"sigmoid.{model.joint}.{n}", u, 0.0, float(v), float(s), _status(n, model.rho))
             for n, u, v, s in zip(names, units, values, sigma, strict=False)
         ]
         blocks.append(covariance)
@@ -164,9 +164,10 @@ def joints_model(geometry: Model, models: tuple[JointModel, ...]) -> Model:
     )
 
 
-def _status(name: str, value: float) -> Status:
-    """A rho at a limit of its search is where the search ended, not what the data say."""
-    return "not_identifiable" if name == "rho" and at_limit(value) else "estimated"
+def _status(name: str, rho: float) -> Status:
+    """At a limit of its search rho is where the search ended, and at the lowest no flank is told apart."""
+    limit = limit_of(rho)
+    return "not_identifiable" if limit == "lowest" or (limit and name == "rho") else "estimated"
 
 
 def _rows(matrix: np.ndarray) -> Rows:

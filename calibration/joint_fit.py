@@ -6,28 +6,29 @@ Choices are judged by models that have not seen the trial they are judged on: wh
 joint's own discrepancy (`joint_selection`), which of them, if any, in the hand's error (`joint_hand`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel
+from calibration.joint_checks import wrong_links
 from calibration.joint_correction import JointModels
 from calibration.joint_hand import nearest_hand
 from calibration.joint_inputs import InputModel, input_model
-from calibration.joint_model import JointModel, Terms
-from calibration.joint_projection import RHO, at_limit
-from calibration.joint_samples import Samples, samples_of
+from calibration.joint_model import Terms
+from calibration.joint_samples import Samples, pooled, samples_of
 from calibration.joint_selection import candidates, worthwhile
 from calibration.joint_single import fit_joint, no_correction
+from calibration.joint_verdicts import STAGE, verdicts
 from calibration.joint_zero import link_zeros
 from calibration.recording import Trial
 from calibration.schema import Description
 from calibration.verdict import Verdict
 
-STAGE = "joints"
 TERMS: Terms = "total"
+_QUIET = 3.0  # rms of a discrepancy over the noise of a reading, below which there is nothing to model [-]
 
 
 def fit_joint_models(
@@ -49,8 +50,13 @@ def fit_joint_models(
     except NotEnoughData as error:
         unknown = np.full(len(inputs.measured), np.nan)
         return JointModels(inputs, unknown, ()), (Verdict(STAGE, "missing", str(error)),)
+    refused = tuple(wrong_links(inputs.measured, trials, zero))
+    if refused:
+        return JointModels(inputs, zero, ()), refused
     samples = _samples(trials, inputs, hand, zero)
-    options = {joint: worthwhile(candidates(of_joint, terms)) for joint, of_joint in samples.items()}
+    quiet = [joint for joint, of_joint in samples.items() if _rms(of_joint) < _QUIET * description.sigmas.encoder]
+    tried = {joint: candidates(of_joint, terms) for joint, of_joint in samples.items() if joint not in quiet}
+    options = {joint: worthwhile(found) for joint, found in tried.items()}
     chosen = nearest_hand(description, trials, robot, hand, samples, options)
     zeros = dict(zip(inputs.measured, map(float, zero), strict=True))
     models = [
@@ -61,7 +67,8 @@ def fit_joint_models(
     ]
     without = [joint for joint in hand.chain.joints if joint not in samples]
     worse = [joint for joint, found in options.items() if found and joint not in chosen]
-    return JointModels(inputs, zero, tuple(models)), tuple(_verdicts(models, worse, without))
+    unexcited = [joint for joint, found in tried.items() if len(found) == 1]
+    return JointModels(inputs, zero, tuple(models)), tuple(verdicts(models, worse, unexcited, quiet, without))
 
 
 def _samples(
@@ -74,27 +81,5 @@ def _samples(
     return {joint: of_joint for joint, of_joint in found.items() if of_joint}
 
 
-def _verdicts(models: Sequence[JointModel], worse: Sequence[str], without: Sequence[str]) -> Iterator[Verdict]:
-    if without:
-        yield Verdict(STAGE, "missing", f"no joint model without a link encoder: {', '.join(without)}")
-    used = [m for m in models if m.degree is not None]
-    if used:
-        yield Verdict(STAGE, "ok", f"{used[0].terms} terms; {'; '.join(_told(m) for m in used)}")
-    if worse:
-        yield Verdict(STAGE, "ok", f"not corrected, since the hand comes no nearer to its markers: {', '.join(worse)}")
-    none = [m.joint for m in models if m.degree is None and m.joint not in worse]
-    if none:
-        yield Verdict(STAGE, "ok", f"not corrected, since no degree predicts a trial left out: {', '.join(none)}")
-    for model in used:
-        if model.dropped:
-            names = ", ".join(f"A_{i}{j}, B_{i}{j}" for i, j in model.dropped)
-            yield Verdict(STAGE, "ok", f"{model.joint}: terms that are zero throughout are left out: {names}")
-
-
-def _told(model: JointModel) -> str:
-    q = model.quality
-    limit = f" at a limit of {RHO[0]:g} to {RHO[1]:g}" if at_limit(model.rho) else ""
-    return (
-        f"{model.joint} degree {model.degree}, rho {model.rho:.3g} s/rad{limit}, {1e3 * q.rms:.1f} -> "
-        f"{1e3 * q.residual:.1f} mrad, R2 {q.r2:.2f}, left out {q.r2_out:.2f}"
-    )
+def _rms(samples: Sequence[Samples]) -> float:
+    return float(np.sqrt((pooled(samples).y ** 2).mean()))

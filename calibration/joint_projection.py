@@ -10,11 +10,13 @@ References: Golub, Pereyra, SIAM J. Numer. Anal. 1973; Kaufman, BIT 1975.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import expit
 
+Limit = Literal["lowest", "highest"]
 RHO = (2.0, 1000.0)  # [s/rad] limits of the search
 _GRID = 8
 RANK = 1e-7  # smallest over largest singular value of the scaled design [-]
@@ -100,9 +102,13 @@ def rho_grid() -> np.ndarray:
     return np.geomspace(*RHO, _GRID)
 
 
-def at_limit(rho: float) -> bool:
-    """Whether the data did not find rho inside its limits."""
-    return rho < 1.01 * RHO[0] or rho > 0.99 * RHO[1]
+def limit_of(rho: float) -> Limit | None:
+    """The limit at which the search for rho ended, None where the data found it inside.
+
+    At the lowest a joint's speeds hardly choose a flank: rho (A - B) and A + B are told, A, B and rho are not. At the
+    highest the flanks change between two readings: A and B are told, rho is not.
+    """
+    return "lowest" if rho < 1.01 * RHO[0] else "highest" if rho > 0.99 * RHO[1] else None
 
 
 def clustered_covariance(J: np.ndarray, r: np.ndarray, groups: Sequence[slice]) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from calibration.joint_basis import basis_of, not_zero
 from calibration.joint_model import JointModel, Quality, Terms, exponents
-from calibration.joint_projection import RHO, Problem, Projection, at_limit, clustered_covariance, search
+from calibration.joint_projection import RHO, Problem, Projection, clustered_covariance, limit_of, search
 from calibration.joint_samples import Samples, box, pooled
 from calibration.joint_selection import HIGHEST, Candidate
 
@@ -49,7 +49,7 @@ def _covariance(problem: Problem, found: Projection, stops: np.ndarray) -> np.nd
     """
     groups = [slice(a, b) for a, b in pairwise(stops)]
     M = problem.design(found.rho)
-    if not at_limit(found.rho):
+    if limit_of(found.rho) is None:
         return clustered_covariance(np.column_stack([problem.design_slope(found.rho) @ found.x, M]), found.r, groups)
     C = np.zeros((1 + M.shape[1], 1 + M.shape[1]))
     C[0, 0] = (RHO[1] - RHO[0]) ** 2 / 12.0

@@ -137,6 +137,43 @@ def test_a_joint_that_never_moves_has_no_degree_to_try() -> None:
     assert worthwhile(candidates(samples, "total")) == ()  # type: ignore[arg-type]
 
 
+def test_joints_that_never_move_are_told_and_not_corrected() -> None:
+    data = []
+    for t in joint_data.made([joint_data.truth("arm_3_joint", "total", 1, 30.0, 1)]):
+        q, still = t.q_motor.copy(), t.q_link.copy()
+        q[:, ARM_3] = 0.3
+        still[:, ARM_3] = 0.3 - ZERO[ARM_3] - 1e-3 * np.sin(t.t_robot)
+        data.append(replace(t, q_motor=q, q_link=still))
+    models, verdicts = fitted(data)
+    assert models.model("arm_3_joint").degree is None
+    said = [v for v in verdicts if "no two trials excite" in v.message]
+    assert [v.verdict for v in said] == ["missing"] and said[0].message.split(":")[0].endswith("excite arm_3_joint")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        (lambda q, other: -q, "its sign is turned"),
+        (lambda q, other: np.degrees(q), "it is in degrees"),
+        (lambda q, other: 0.0 * q + 0.3, "it stands still"),
+        (lambda q, other: other, "it follows arm_3_joint"),
+        (lambda q, other: q + 2.0 * np.pi * (q > np.median(q)), "whole turns"),
+    ],
+    ids=["sign", "degrees", "stuck", "swapped", "turns"],
+)
+def test_link_readings_that_are_not_the_joint_s_are_refused_by_name(trials: list[Trial], wrong, why: str) -> None:
+    """A polynomial of the angle would explain them all the same."""
+    data = []
+    for t in trials:
+        link = t.q_link.copy()
+        link[:, ARM_6] = wrong(t.q_link[:, ARM_6], t.q_link[:, ARM_3])
+        data.append(replace(t, q_link=link))
+    models, verdicts = fitted(data)
+    assert models.models == ()
+    assert [v.verdict for v in verdicts] == ["refused"]
+    assert "arm_6_joint" in verdicts[0].message and why in verdicts[0].message
+
+
 def test_joints_without_a_link_encoder_are_told(trials: list[Trial]) -> None:
     without = []
     for trial in trials:

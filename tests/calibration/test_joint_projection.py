@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibration.joint_projection import RHO, Problem, at_limit, clustered_covariance, project, search
+from calibration.joint_projection import RHO, Problem, clustered_covariance, limit_of, project, search
 
 
 def problem(rng: np.random.Generator, n: int = 400, rho: float = 37.0, noise: float = 0.0) -> Problem:
@@ -40,12 +40,12 @@ def test_search_finds_rho_and_coefficients_of_noise_free_data(rho: float) -> Non
     found = search(made)
     assert found.rho == pytest.approx(rho, rel=1e-6)
     np.testing.assert_allclose(found.x, np.array([12.0, 2.0, -1.0, 0.5, -9.0, 1.0, 2.0, -0.3]) * 1e-3, atol=1e-9)
-    assert not at_limit(found.rho)
+    assert limit_of(found.rho) is None
 
 
 def test_rho_the_data_do_not_tell_stops_at_a_limit() -> None:
     made = problem(np.random.default_rng(1), rho=1e6)
-    assert at_limit(search(made).rho)
+    assert limit_of(search(made).rho) is not None
     assert RHO[0] <= search(problem(np.random.default_rng(1), rho=0.1)).rho < 1.1 * RHO[0]
 
 
