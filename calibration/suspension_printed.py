@@ -23,13 +23,17 @@ _CUTOFF = 2.5  # [Hz]
 _STRIDE = 10  # every so many samples count
 _ZERO = 1e-13  # eigenvalues of the scaled normal matrix below this share of the largest are none
 
+_BOUND = 0.01  # share of the residual that the bounds may cost [-]
+_ROUNDING = 1e-9  # of the squares to explain [-]
+
 
 @dataclass(frozen=True)
 class Normal:
-    """Normal equations of a trial: H p = g for p = (k, c)."""
+    """Normal equations of a trial: H p = g for p = (k, c), and the squares of what they explain."""
 
     H: np.ndarray
     g: np.ndarray
+    squares: float
 
 
 def normal_of(wheels: WheelModel, sway: Sway, sigmas: Sigmas) -> Normal:
@@ -43,18 +47,40 @@ def normal_of(wheels: WheelModel, sway: Sway, sigmas: Sigmas) -> Normal:
     sigma = np.array([sigmas.plate_force] * 3 + [sigmas.plate_moment] * 3)
     A = np.concatenate([wheels.regressor(x[rows]), wheels.regressor(rate[rows])], axis=2) / sigma[:, None]
     A = A.reshape(-1, 2 * len(wheels.names))
-    return Normal(A.T @ A, A.T @ (w[rows] / sigma).ravel())
+    b = (w[rows] / sigma).ravel()
+    return Normal(A.T @ A, A.T @ b, float(b @ b))
 
 
 def solve(wheels: WheelModel, normals: Sequence[Normal]) -> np.ndarray:
     """Stiffnesses and dampings (2 p,), none negative."""
+    A, b, scale = _reduced(normals)
+    return np.asarray(nnls(A, b, maxiter=100 * len(scale))[0] / scale)
+
+
+def bound(wheels: WheelModel, normals: Sequence[Normal], values: np.ndarray) -> str:
+    """The stiffness or damping (2 p,) that its bound keeps from a negative value, the worst; empty where none is.
+
+    A zero alone is no bound: of parameters that only combine, many are zero. The bound holds where, without it, the
+    residual would be smaller by a hundredth.
+    """
+    A, b, scale = _reduced(normals)
+    r = b - A @ (values * scale)
+    free = sum(n.squares for n in normals) - float(b @ b)
+    pull = A.T @ r
+    if float(r @ r) <= _BOUND * max(free, 0.0) + _ROUNDING * float(b @ b):
+        return ""
+    names = (*wheels.parameters("k").names, *wheels.parameters("c").names)
+    return names[int(np.argmin(np.where(values > 0.0, np.inf, pull)))]
+
+
+def _reduced(normals: Sequence[Normal]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A (r, 2 p), b (r,) with A'A = H, A'b = g in scaled parameters, and their scale (2 p,)."""
     H, g = np.sum([n.H for n in normals], axis=0), np.sum([n.g for n in normals], axis=0)
     scale = np.sqrt(np.maximum(np.diag(H), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
     kept = values > _ZERO * values[-1]
     root = np.sqrt(values[kept])
-    A = root[:, None] * vectors[:, kept].T
-    return np.asarray(nnls(A, (vectors[:, kept].T @ (g / scale)) / root, maxiter=100 * len(g))[0] / scale)
+    return root[:, None] * vectors[:, kept].T, (vectors[:, kept].T @ (g / scale)) / root, scale
 
 
 def matrices(wheels: WheelModel, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

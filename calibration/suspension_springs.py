@@ -11,7 +11,7 @@ from calibration.suspension_compliance import fit_compliance
 from calibration.suspension_held_out import HeldOut
 from calibration.suspension_modes import modes_of
 from calibration.suspension_parameters import frame_sigma, jackknife
-from calibration.suspension_printed import matrices, normal_of, solve
+from calibration.suspension_printed import bound, matrices, normal_of, solve
 from calibration.suspension_sway import Sway
 from calibration.suspension_wheels import WheelModel, wheel_model
 
@@ -32,6 +32,7 @@ class Springs:
         sigmas: Standard deviations of K and C.
         couples: (6, 6) elements that were fitted.
         wheels: The printed form, its values (2 p,) and those without each trial (n, 2 p); None for the compliance.
+        bound: Of the printed form: the stiffness or damping that would be negative without its bound.
     """
 
     K: np.ndarray
@@ -40,6 +41,7 @@ class Springs:
     sigmas: tuple[np.ndarray, np.ndarray]
     couples: np.ndarray
     wheels: tuple[WheelModel, np.ndarray, np.ndarray] | None = None
+    bound: str = ""
 
 
 def printed_springs(description: Description, wheels: WheelModel, sways: Sequence[Sway]) -> Springs:
@@ -51,7 +53,9 @@ def printed_springs(description: Description, wheels: WheelModel, sways: Sequenc
     K, C = matrices(wheels, values)
     sigmas = [np.sqrt(np.diag(jackknife(np.array([f[k].ravel() for f in folds])))).reshape(6, 6) for k in (0, 1)]
     placed = [np.hypot(s, frame_sigma(A, description.tolerances)) for s, A in zip(sigmas, (K, C), strict=True)]
-    return Springs(K, C, folds, (placed[0], placed[1]), wheels.couples, (wheels, values, others))
+    return Springs(
+        K, C, folds, (placed[0], placed[1]), wheels.couples, (wheels, values, others), bound(wheels, normals, values)
+    )
 
 
 def compliance_springs(description: Description, sways: Sequence[Sway], coupled: bool) -> Springs:
@@ -66,7 +70,9 @@ def compliance_springs(description: Description, sways: Sequence[Sway], coupled:
 
 
 def not_positive(springs: Springs) -> str:
-    """Why a fit, or one without a trial, cannot be run forward at all; empty where it can."""
+    """Why a fit, or one without a trial, is at its bounds or cannot be run forward at all; empty where it can."""
+    if springs.bound:
+        return f"at its bound, {springs.bound} would be negative"
     scale = np.outer(*[np.array([1.0] * 3 + [1.0 / _LEVER] * 3)] * 2)
     for where, K in (("", springs.K), *((" without one of the trials", K) for K, _ in springs.folds)):
         stiffness = np.linalg.eigvalsh(K * scale)

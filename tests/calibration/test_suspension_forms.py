@@ -8,12 +8,13 @@ from calibration.suspension_held_out import HeldOut, held_out, predicted
 from calibration.suspension_modes import modes_of
 from calibration.suspension_parameters import element_parameters, frame_sigma, wheel_parameters
 from calibration.suspension_printed import matrices, normal_of, solve
-from calibration.suspension_springs import Springs, not_positive, refusal
+from calibration.suspension_springs import Springs, not_positive, printed_springs, refusal
 from calibration.suspension_wheels import wheel_model
 from tests.calibration import matched
 from tests.calibration.swaying import WHEELS, smooth, sway, values
 
 SIGMAS = Sigmas(marker=1e-4, encoder=1e-5, plate_force=1.2, plate_moment=0.35)
+DESCRIPTION = matched.described(wheels=[w.model_dump() for w in WHEELS])
 NONE = np.zeros((6, 6))
 LOADS = np.array([5.0, 5.0, 20.0, 15.0, 15.0, 4.0])
 
@@ -123,6 +124,45 @@ def test_a_printed_fit_that_cannot_be_used_is_refused():
     slips, poor = judged([0.9] * 5 + [-20.0]), judged([0.9, 0.5] + [0.9] * 4)
     assert "worse than a base that stays along rz" in refusal(springs(K, C), slips, good)
     assert "worse than the compliance along y" in refusal(springs(K, C), poor, good)
+
+
+@pytest.mark.parametrize(("turning", "held"), [(1.0, ""), (0.5, "suspension.")], ids=["inside", "outside"])
+def test_a_printed_fit_at_its_bound_is_refused_by_name(turning, held):
+    """A yaw stiffness softer than wheels that are no softer along x and y can have: some spring would be negative."""
+    rng = np.random.default_rng(0)
+    wheels = wheel_model(WHEELS, "centre")
+    K, C = matrices(wheels, values(rng))
+    K[5, 5] *= turning
+    K[0, 0] *= 1.0 if turning == 1.0 else 0.6
+    assert np.linalg.eigvalsh(K)[0] > 0.0
+    noise = np.array([2e-6, 2e-6, 2e-6, 1e-5, 1e-5, 5e-6])
+    sways = []
+    for k in range(3):
+        w = smooth(rng, 18.0, LOADS, fastest=6.0)
+        sways.append(sway(str(k), w, modes_of(K, C, NONE).respond(w, 1.0 / RATE) + noise * rng.normal(size=w.shape)))
+    found = printed_springs(DESCRIPTION, wheels, sways)
+    assert (found.wheels[1] == 0.0).sum() > 20  # zeros alone are no bound
+    assert found.bound.startswith(held) and bool(found.bound) == bool(held)
+    assert not_positive(found) == (f"at its bound, {found.bound} would be negative" if held else "")
+
+
+@pytest.mark.parametrize("axis", [2, 4, 5])
+def test_an_axis_that_follows_its_load_the_wrong_way_round_is_no_spring_s(axis):
+    rng = np.random.default_rng(5)
+    wheels = wheel_model(WHEELS, "contact")
+    K, C = matrices(wheels, values(rng))
+    turned = np.where(np.arange(6) == axis, -1.0, 1.0)
+    sways = []
+    for k in range(2):
+        w = smooth(rng, 18.0, LOADS, fastest=6.0)
+        sways.append(sway(str(k), w, turned * modes_of(K, C, NONE).respond(w, 1.0 / RATE)))
+    found = fit_compliance(sways, wheels.couples)
+    tried = held_out(sways, found.without)
+    assert tried.moves.tolist() == [k != axis for k in range(6)]
+    known = element_parameters("K", found.K, found.sigmas()[0], wheels.couples, tried.slips)
+    status = {p.name[-2:]: p.status for p in known}
+    assert {k for k, s in status.items() if s == "not_identifiable"} >= {k for k in status if str(axis + 1) in k}
+    assert status["11"] == status["22"] == "estimated"
 
 
 def test_r2_compares_with_a_base_that_stays():
