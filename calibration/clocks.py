@@ -8,11 +8,12 @@ w from the nominal chain at the motor-side readings, J_j the axis of joint j. Th
 which lags the link behind the motor by 4 gap / (pi amplitude omega), from passing as a clock error; the last ones
 are the zeros of the readings, to first order.
 Then from whole poses, where static postures allow: see `clock_refinement`.
-Plate: its moments Mx, My against those of the nominal masses, moved as markers and encoders say: `inverse_dynamics`.
+Plate: its moments Mx, My, turned where they are mirrored (`plate_axes`), against those of the nominal masses, moved as
+markers and encoders say: `inverse_dynamics`.
 """
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +32,7 @@ from calibration.inverse_dynamics import (
 )
 from calibration.lag import Pair, coarse_lag, fit_lag
 from calibration.markers import base_body, hand_body
+from calibration.plate_axes import plate_axes
 from calibration.play import play
 from calibration.recording import Trial
 from calibration.robot import Chain, chain_of
@@ -120,13 +122,15 @@ def _plate_clock(
     if robot is None:
         return None, _missing("plate", "the plate's clock is told from encoder readings, and there are none")
     parts = carriers(floating_model(urdf, description), description, trials)
+    motions = list(_plate_motions(parts, description, trials, robot, model))
+    Q = plate_axes([m.pair for m in motions])
     try:
-        return _clock("plate", _plate_motions(parts, description, trials, robot, model), 2)
+        return _clock("plate", [replace(m, pair=m.pair.turned(Q)) for m in motions], 2)
     except NotEnoughData as error:
         return None, (Verdict("clocks", "missing", f"no plate clock: {error}"),)
 
 
-def _clock(instrument: str, motions: Iterator[Motion], passes: int) -> tuple[Clock, tuple[Verdict, ...]]:
+def _clock(instrument: str, motions: Iterable[Motion], passes: int) -> tuple[Clock, tuple[Verdict, ...]]:
     """The clock from lags of all motions; every pass after the first knows the drift within a trial."""
     kept, drift, lags = list(motions), 0.0, []
     starts = {m.trial_id: coarse_lag(m.pair.y, m.pair.x) for m in kept}

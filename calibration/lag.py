@@ -9,7 +9,7 @@ g, b and the nuisances a, c are eliminated; the lag by Gauss-Newton from a cross
 Reference: Newey, West, Econometrica 1987.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -53,6 +53,10 @@ class Pair:
     x: Signal
     z: np.ndarray
     u: np.ndarray
+
+    def turned(self, Q: np.ndarray) -> "Pair":
+        """The same with x on axes turned by Q (c, c)."""
+        return replace(self, x=replace(self.x, x=self.x.x @ Q.T))
 
 
 def coarse_lag(y: Signal, x: Signal) -> float:
