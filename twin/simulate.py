@@ -1,24 +1,20 @@
-"""Simulation of one trial: set-points in, dense states out, no Python between the steps.
+"""Simulation of one trial: set-points in, dense states out, one `mujoco.rollout`, no Python between the steps."""
 
-Set-points arrive at the robot's rate and the drives interpolate them; the simulation runs as one `mujoco.rollout`.
-"""
-
+import logging
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from mujoco import rollout
 
-from twin.build import PUSH, Twin
+from twin.build import Twin
 from twin.conventions import states_with_their_sensors, transform
-from twin.defects.gear import rotor_joint
-from twin.defects.rolling import DRIVES, roll_joint
-from twin.driving import differential_drive
-from twin.errors import Diverged, NotStanding
-from twin.motions import JOINTS, RATE, SETTLE, Motion
-from twin.root import anchored, base_poses, floor_wrench, put_down
+from twin.inputs import driven, prepare
+from twin.motions import JOINTS, Motion
+from twin.root import anchored, floor_wrench
+from twin.stability import check
 
-_MIN_UPRIGHT = 0.98  # [-] cosine of the base's tilt below which the robot has tipped
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -55,70 +51,17 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
         T_lab_base: Where it is put down, upright (4, 4).
 
     Raises:
-        Diverged: A state is not finite.
-        NotStanding: The robot tipped over.
+        Diverged: It is not stable.
+        NotStanding: The robot tipped over or left its plate.
     """
-    model, data = put_down(twin.model, T_lab_base)
-    command = _interpolated(motion.command, model.opt.timestep)
-    control = _controls(model, command)
-    if motion.push is not None:
-        control[:, [model.actuator(name).id for name in PUSH]] = _interpolated(motion.push, model.opt.timestep)
-    if motion.base is not None:
-        angles = _interpolated(motion.base.wheel_angles(*differential_drive()), model.opt.timestep)
-        control[:, [model.actuator(roll_joint(name)).id for name in DRIVES]] = angles
-    first = _initial_state(model, data, motion.command[0])
-    states, sensors = rollout.rollout(model, data, first[None], control[None])
-    states = states_with_their_sensors(first, states[0])
-    _check(model, motion, states)
-    skip = len(command) - round(motion.duration / model.opt.timestep) - 1
-    return _unpack(model, twin.links, states[skip:], sensors[0][skip:], command[skip:])
-
-
-def _interpolated(setpoints: np.ndarray, timestep: float) -> np.ndarray:
-    """Set-points at every step, from `SETTLE` seconds before the first."""
-    n_settle, n = round(SETTLE / timestep), round((len(setpoints) - 1) / RATE / timestep)
-    t = np.arange(-n_settle, n + 1) * timestep
-    grid = np.arange(len(setpoints)) / RATE
-    return np.stack([np.interp(t, grid, column) for column in setpoints.T], axis=1)
-
-
-def _driven(joint: str) -> str:
-    return joint if joint == JOINTS[0] else rotor_joint(joint)
-
-
-def _controls(model: mujoco.MjModel, command: np.ndarray) -> np.ndarray:
-    control = np.zeros((len(command), model.nu))
-    for column, joint in enumerate(JOINTS):
-        control[:, model.actuator(_driven(joint)).id] = command[:, column]
-    return control
-
-
-def _initial_state(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
-    for joint, value in zip(JOINTS, q, strict=True):
-        data.joint(joint).qpos = value
-        data.joint(_driven(joint)).qpos = value
-    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    state = np.empty(mujoco.mj_stateSize(model, kind))
-    mujoco.mj_getState(model, data, state, kind)
-    return state
-
-
-def _check(model: mujoco.MjModel, motion: Motion, states: np.ndarray) -> None:
-    bad = np.argwhere(~np.isfinite(states))
-    if len(bad):
-        step, column = bad[0]
-        raise Diverged(motion.id, step * model.opt.timestep - SETTLE, _owner(model, int(column)))
-    upright = base_poses(model, states[:, 1 : 1 + model.nq])[:, 2, 2]
-    if upright.min() < _MIN_UPRIGHT:
-        at = int(np.argmin(upright >= _MIN_UPRIGHT))
-        raise NotStanding(f"trial {motion.id!r}: the robot tips over at {at * model.opt.timestep - SETTLE:.2f} s")
-
-
-def _owner(model: mujoco.MjModel, column: int) -> str:
-    """Joint that owns a column of the state (time, qpos, qvel)."""
-    if 1 <= column <= model.nq:
-        return model.joint(int(np.searchsorted(model.jnt_qposadr, column - 1, side="right")) - 1).name
-    return model.joint(model.dof_jntid[min(max(column - 1 - model.nq, 0), model.nv - 1)]).name
+    inputs = prepare(twin, motion, T_lab_base)
+    model, first = inputs.model, inputs.first
+    mujoco.set_mju_user_warning(_log.debug)  # or it writes MUJOCO_LOG.TXT where the user stands
+    after, sensors = rollout.rollout(model, mujoco.MjData(model), first[None], inputs.control[None])
+    states = states_with_their_sensors(first, after[0])
+    check(inputs, motion, states)
+    skip = inputs.settling
+    return _unpack(model, twin.links, states[skip:], sensors[0][skip:], inputs.command[skip:])
 
 
 def _unpack(
@@ -126,9 +69,9 @@ def _unpack(
 ) -> States:
     qpos, qvel = states[:, 1 : 1 + model.nq], states[:, 1 + model.nq : 1 + model.nq + model.nv]
     link = np.stack([qpos[:, model.joint(j).qposadr[0]] for j in JOINTS], axis=1)
-    motor = np.stack([qpos[:, model.joint(_driven(j)).qposadr[0]] for j in JOINTS], axis=1)
-    velocity = np.stack([qvel[:, model.joint(_driven(j)).dofadr[0]] for j in JOINTS], axis=1)
-    servos = [model.actuator(_driven(j)).id for j in JOINTS]
+    motor = np.stack([qpos[:, model.joint(driven(j)).qposadr[0]] for j in JOINTS], axis=1)
+    velocity = np.stack([qvel[:, model.joint(driven(j)).dofadr[0]] for j in JOINTS], axis=1)
+    servos = [model.actuator(driven(j)).id for j in JOINTS]
     kp, kv = model.actuator_gainprm[servos, 0], -model.actuator_biasprm[servos, 2]
     return States(
         t=np.arange(len(states)) * model.opt.timestep,

@@ -14,7 +14,8 @@ from scenarios import load, run
 from twin import motions
 from twin.build import build
 from twin.campaign import laboratory, measure
-from twin.simulate import _controls, _initial_state, _interpolated, simulate
+from twin.inputs import prepare
+from twin.simulate import simulate
 
 
 def seconds(function, repeats: int = 3) -> float:
@@ -32,9 +33,8 @@ def test_speed_of_the_twin():
     lab = laboratory(scenario.twin, 0)
     path = motions.VALIDATION_SWINGS["xyz"]
     motion = motions.swing("xyz", "validation", "swing", path, 20.0, scenario.twin.campaign)
-    model = lab.twin.model
-    control = _controls(model, _interpolated(motion.command, model.opt.timestep))
-    first = _initial_state(model, mujoco.MjData(model), motion.command[0], lab.T_lab_base)
+    inputs = prepare(lab.twin, motion, lab.T_lab_base)
+    model, first, control = inputs.model, inputs.first, inputs.control
     states = simulate(lab.twin, motion, lab.T_lab_base)
     bare = seconds(lambda: rollout.rollout(model, mujoco.MjData(model), first[None], control[None]))
     whole = seconds(lambda: simulate(lab.twin, motion, lab.T_lab_base))

@@ -1,0 +1,71 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenarios import load
+from twin import motions, record
+from twin.campaign import laboratory
+from twin.conventions import exp6
+from twin.defects.gear import mesh_tendon
+from twin.errors import Diverged, NotStanding
+from twin.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def sweep(config):
+    return motions.swing("s", "calibration", "sweep", motions.sweep_path("arm_7_joint", 2.0), 2.0, config.campaign)
+
+
+def edited(twin, edit):
+    model = twin.model.__copy__()
+    edit(model)
+    return replace(twin, model=model)
+
+
+def lock_up(model):
+    """Damping beyond what a step can hold: not finite at once."""
+    model.actuator_biasprm[:, 2] = 1e7
+
+
+def harden(model):
+    """A mesh that the step cannot follow: MuJoCo resets it and goes on with finite numbers."""
+    model.tendon_solref_lim[model.tendon(mesh_tendon("arm_7_joint")).id] *= 1e4
+
+
+def feed(model):
+    """A drive that pushes the way it moves."""
+    model.actuator_biasprm[model.actuator("arm_4_joint.motor").id, 2] *= -1.0
+
+
+@pytest.mark.parametrize(("edit", "joint"), [(lock_up, r"[\w.]+"), (harden, "arm_7_joint"), (feed, "arm_4_joint.*")])
+def test_what_runs_away_is_named_with_trial_time_and_joint(lab, sweep, edit, joint, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(Diverged, match=rf"trial 's' diverged at -?\d+\.\d+ s in joint '{joint}'") as told:
+        simulate(edited(lab.twin, edit), sweep, lab.T_lab_base)
+    assert -2.0 <= told.value.time < sweep.duration
+    assert not list(tmp_path.iterdir())  # no log of MuJoCo's
+
+
+def test_a_campaign_that_runs_away_records_nothing(tmp_path):
+    config = load("humanoids2024", ["twin.arm.arm_7_joint.stiffness=5e4", "twin.campaign.only=[xyz]"]).quick().twin
+    with pytest.raises(Diverged, match="'arm_7_joint"):
+        record(config, 0, tmp_path)
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+
+
+def test_tipping_is_told(lab, sweep):
+    def soften(model):
+        for wheel in lab.robot.wheels:
+            model.jnt_stiffness[model.joint(f"{wheel.name}.z").id] = 200.0
+
+    with pytest.raises(NotStanding, match=r"'s': the robot tips over at -?\d+\.\d\d s"):
+        simulate(edited(lab.twin, soften), sweep, lab.T_lab_base)
+
+
+@pytest.mark.parametrize("ground", ["contact", "anchored"])
+def test_a_wheel_off_the_plate_is_told(sweep, ground):
+    lab = laboratory(load("humanoids2024", [f"twin.base.wheels={ground}"]).quick().twin, 0)
+    beyond = exp6(np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])) @ lab.T_lab_base
+    with pytest.raises(NotStanding, match=r"'s': (caster|wheel)_\w+ is off the plate at -2\.00 s"):
+        simulate(lab.twin, sweep, beyond)

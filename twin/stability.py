@@ -1,0 +1,65 @@
+"""What makes a simulated trial unusable: numbers that run away, a robot that tips over or leaves its plate.
+
+MuJoCo resets a simulation that runs away to the model's first posture, with finite numbers; its clock tells.
+"""
+
+import mujoco
+import numpy as np
+
+from twin.errors import Diverged, NotStanding
+from twin.inputs import Inputs
+from twin.motions import SETTLE, Motion
+from twin.root import ROOT, base_poses
+
+_FAST = 100.0  # [m/s, rad/s] nothing of this robot moves like that
+_MIN_UPRIGHT = 0.98  # [-] cosine of the base's tilt below which the robot has tipped
+_WHEEL = "_contact"  # ends the name of a wheel's contact geom
+
+
+def check(inputs: Inputs, motion: Motion, states: np.ndarray) -> None:
+    """Refuse a trial; states (n, ns) before each step.
+
+    Raises:
+        Diverged: A state is not finite, or faster than anything the robot does.
+        NotStanding: The robot tipped over, or a wheel left the plate in a trial whose base stays.
+    """
+    model, step = inputs.model, inputs.model.opt.timestep
+    speed = np.abs(states[:, 1 + model.nq : 1 + model.nq + model.nv])
+    late = np.abs(states[:, 0] - np.arange(len(states)) * step) > 0.5 * step
+    with np.errstate(invalid="ignore"):
+        bad = late | ~np.isfinite(states).all(axis=1) | ~(speed < _FAST).all(axis=1)
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise Diverged(motion.id, k * step - SETTLE, _fastest(model, speed[max(k - 1, 0) : k + 1], late[k]))
+    T = base_poses(model, states[:, 1 : 1 + model.nq])
+    _refuse(T[:, 2, 2] < _MIN_UPRIGHT, "the robot tips over", motion, step)
+    if motion.base is None:
+        _on_plate(inputs, motion, T)
+
+
+def _fastest(model: mujoco.MjModel, speed: np.ndarray, reset: bool) -> str:
+    """Joint that moves fastest in the last row, or in the one before it where that has been reset."""
+    row = np.nan_to_num(speed[0 if reset else -1], nan=np.inf)
+    return str(model.joint(model.dof_jntid[int(np.argmax(row))]).name)
+
+
+def _on_plate(inputs: Inputs, motion: Motion, T_lab_base: np.ndarray) -> None:
+    model = inputs.model
+    data = mujoco.MjData(model)
+    data.qpos[:] = inputs.first[1 : 1 + model.nq]
+    mujoco.mj_kinematics(model, data)
+    base, plate = data.body(ROOT), data.geom("plate")
+    half = model.geom("plate").size[:2]
+    for i in range(model.ngeom):
+        name = model.geom(i).name
+        if name.endswith(_WHEEL):
+            p_base = base.xmat.reshape(3, 3).T @ (data.geom_xpos[i] - base.xpos)
+            p_plate = T_lab_base[:, :2, :3] @ p_base + T_lab_base[:, :2, 3] - plate.xpos[:2]
+            left = (np.abs(p_plate) > half).any(axis=1)
+            _refuse(left, f"{name.removesuffix(_WHEEL)} is off the plate", motion, model.opt.timestep)
+
+
+def _refuse(found: np.ndarray, what: str, motion: Motion, step: float) -> None:
+    """Say when it first happens."""
+    if found.any():
+        raise NotStanding(f"trial {motion.id!r}: {what} at {int(np.argmax(found)) * step - SETTLE:.2f} s")
