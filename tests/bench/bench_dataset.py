@@ -3,7 +3,6 @@
 BENCH_RUNS sets the number of runs (40); 1000 takes about twenty minutes on two cores.
 """
 
-import json
 import os
 import re
 import shutil
@@ -55,7 +54,7 @@ def watched(out: Path, workers: int) -> tuple[float, np.ndarray, int]:
     return seconds, np.array(samples), int(float(size) * {"kB": 1e3, "MB": 1e6, "GB": 1e9}[unit])
 
 
-def test_throughput(tmp_path):
+def test_throughput(tmp_path, keep):
     figures: dict[str, float] = {"runs": RUNS}
     seconds = {}
     for workers in (1, 2):
@@ -73,9 +72,5 @@ def test_throughput(tmp_path):
         }
         shutil.rmtree(out)
     figures["dataset_2_workers_over_1"] = seconds[1] / seconds[2]
-    Path("runs").mkdir(exist_ok=True)
-    Path("runs/bench_dataset.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
-    print()
-    for name, value in figures.items():
-        print(f"{name:45s} {value:10.3g}")
+    keep(figures)
     assert abs(figures["dataset_bytes_over_told"] - 1.0) < 0.1

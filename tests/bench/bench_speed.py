@@ -1,14 +1,14 @@
 """Speed, as ratios measured in one run: `make bench` prints them and writes runs/bench.json."""
 
-import json
 import time
-from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 from mujoco import rollout
 
 import mjcf
+import twin
 from calibration import Compensator
 from scenarios import load, run
 from twin import motions
@@ -28,8 +28,9 @@ def seconds(function, repeats: int = 3) -> float:
     return min(times)
 
 
-def test_speed_of_the_twin():
-    scenario = load("humanoids2024")
+@pytest.mark.parametrize("name", ["humanoids2024", "unmodelled"])
+def test_speed_of_the_twin(name, keep):
+    scenario = load(name)
     lab = laboratory(scenario.twin, 0)
     path = motions.VALIDATION_SWINGS["xyz"]
     motion = motions.swing("xyz", "validation", "swing", path, 20.0, scenario.twin.campaign)
@@ -38,24 +39,30 @@ def test_speed_of_the_twin():
     states = simulate(lab.twin, motion, lab.T_lab_base)
     bare = seconds(lambda: rollout.rollout(model, mujoco.MjData(model), first[None], control[None]))
     whole = seconds(lambda: simulate(lab.twin, motion, lab.T_lab_base))
+    build_s = seconds(lambda: build(mjcf.spec(), lab.robot.defects, lab.twin.links))
+    measure_s = seconds(lambda: measure(lab, motion, states, 100.0))
     figures = {
         "simulated_seconds_per_second_one_core": len(control) * model.opt.timestep / whole,
         "simulate_over_bare_rollout_speed": bare / whole,
         "steps_per_second": len(control) / bare,
-        "model_build_ms": 1e3 * seconds(lambda: build(mjcf.spec(), lab.robot.defects, lab.twin.links)),
-        "instruments_seconds_per_simulated_minute": seconds(lambda: measure(lab, motion, states, 100.0))
-        * 60.0
-        / motion.duration,
+        "model_build_ms": 1e3 * build_s,
+        "instruments_seconds_per_simulated_minute": measure_s * 60.0 / motion.duration,
     }
-    Path("runs").mkdir(exist_ok=True)
-    Path("runs/bench.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
-    print()
-    for name, value in figures.items():
-        print(f"{name:45s} {value:10.3g}")
-    assert all(np.isfinite(v) and v > 0.0 for v in figures.values())
+    keep({f"{what}[{name}]": value for what, value in figures.items()})
 
 
-def test_speed_of_the_compensator(tmp_path):
+def test_two_threads_against_one(tmp_path, keep):
+    scenario = load("humanoids2024")
+
+    def wall(threads: int) -> float:
+        start = time.monotonic()
+        twin.record(scenario.twin, scenario.seed, tmp_path / str(threads), threads=threads)
+        return time.monotonic() - start
+
+    keep({"record_two_threads_over_one": wall(1) / wall(2)})
+
+
+def test_speed_of_the_compensator(tmp_path, keep):
     """One sample, joint models and suspension included: a robot's control loop has 10 ms, a mocap's 5."""
     result = run(load("humanoids2024"), tmp_path / "quick", quick=True)
     compensator = Compensator.load(result.folder / "estimate")
@@ -75,7 +82,5 @@ def test_speed_of_the_compensator(tmp_path):
         / 500,
         "compensator_predict_us_per_sample": 1e6 * seconds(lambda: compensator.predict(t, q, w, T, v)) / 2000,
     }
-    print()
-    for name, value in figures.items():
-        print(f"{name:45s} {value:10.3g}")
+    keep(figures)
     assert figures["compensator_step_ms"] < 2.0
