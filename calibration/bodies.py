@@ -82,7 +82,8 @@ def still_poses(n: int) -> BodyPoses:
 
 def _covariances(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit covariance (n, 6, 6) and whether the visible markers fix a pose (n,), once per visibility pattern."""
-    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    _, first, which = np.unique(np.packbits(seen, axis=1), axis=0, return_index=True, return_inverse=True)
+    patterns, which = seen[first], which.reshape(len(seen))
     covariance = np.full((len(patterns), 6, 6), np.nan)
     for k, pattern in enumerate(patterns):
         x = xyz[pattern]
@@ -90,5 +91,4 @@ def _covariances(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndar
         if spread[1] > _FLAT * max(spread[0], np.finfo(float).tiny):
             A = np.concatenate([np.broadcast_to(np.eye(3), (len(x), 3, 3)), -skew(x)], axis=2)
             covariance[k] = np.linalg.inv(np.einsum("mij,mik->jk", A, A))
-    which = which.reshape(len(seen))
     return covariance[which], np.isfinite(covariance[:, 0, 0])[which]

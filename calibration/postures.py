@@ -11,7 +11,7 @@ correlated in time, and motion that has not died out.
 
 import logging
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -106,10 +106,11 @@ def read_passing(description: Description, trials: Iterable[Trial], robot: Clock
 def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
     start, stop = trial.t_mocap[0] + _REST, trial.t_mocap[-1]
     rows = np.unique(np.searchsorted(trial.t_mocap, np.arange(start, stop, spacing)))
-    base, hand = (poses_of(body(description), trial) for body in (base_body, hand_body))
-    T = inverse(base.T[rows]) @ hand.T[rows]
+    passed = replace(trial, t_mocap=trial.t_mocap[rows], marker_position=trial.marker_position[rows])
+    base, hand = (poses_of(body(description), passed) for body in (base_body, hand_body))
+    T = inverse(base.T) @ hand.T
     Ad = adjoint(inverse(T))
-    S = hand.covariance[rows] + Ad @ base.covariance[rows] @ np.swapaxes(Ad, 1, 2)
+    S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
     return T, readings_at(trial, robot, trial.t_mocap[rows], trial.q_motor), S, np.zeros(len(rows))
 
 

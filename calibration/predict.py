@@ -102,13 +102,14 @@ class Predictor:
 
     def __call__(self, entry: TrialEntry, trial: Trial) -> Iterator[Prediction]:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
+        measured = self._measured_base(entry, trial)
         for name, hand, encoder, bases in self._rows():
             q = self.positions(name, encoder, trial)
             known = np.isfinite(q).all(axis=1)
             T_B_H = np.full((len(q), 4, 4), np.nan)
             T_B_H[known] = hand.poses(q[known])
             for base in bases:
-                T_lab_B = self._base(base, hand, entry, trial)
+                T_lab_B = self._base(base, hand, entry, trial, measured)
                 if T_lab_B is not None:
                     yield Prediction(name, base, encoder, entry.id, entry.kind, trial.t_mocap, T_lab_B @ T_B_H)
 
@@ -140,22 +141,31 @@ class Predictor:
             return readings_at(trial, self.robot, trial.t_mocap, corrected)
         return readings_at(trial, self.robot, trial.t_mocap, trial.q_motor)
 
-    def _base(self, base: Base, hand: HandModel, entry: TrialEntry, trial: Trial) -> np.ndarray | None:
-        """T_lab_B (n, 4, 4), or None where that source is not there."""
+    def _measured_base(self, entry: TrialEntry, trial: Trial) -> np.ndarray:
+        """T_lab_B (n, 4, 4), seen where the trial starts."""
         T_lab_B = poses_of(base_body(self.description), trial).T
-        start = T_lab_B[trial.t_mocap <= trial.t_mocap[0] + REFERENCE]
-        if not np.isfinite(start).any():
+        if not np.isfinite(_start(T_lab_B, trial)).any():
             body = base_body(self.description).name
             raise NotEnoughData(f"{entry.id}: body {body!r} is not seen in the first second of the trial")
+        return T_lab_B
+
+    def _base(
+        self, base: Base, hand: HandModel, entry: TrialEntry, trial: Trial, measured: np.ndarray
+    ) -> np.ndarray | None:
+        """T_lab_B (n, 4, 4), or None where that source is not there."""
         if base == "measured":
-            return T_lab_B
+            return measured
         if base == "fixed":
-            return np.broadcast_to(mean(start), T_lab_B.shape)
+            return np.broadcast_to(mean(_start(measured, trial)), measured.shape)
         if self.suspension is None or (base == "plate" and (self.plate is None or len(trial.t_plate) == 0)):
             return None
         description = self.description.loaded(entry)
         lab = laboratory(self.urdf, description, self.robot, self.plate, from_vector(hand.base))
         return base_poses(self.suspension, lab, trial, base)
+
+
+def _start(T_lab_B: np.ndarray, trial: Trial) -> np.ndarray:
+    return T_lab_B[trial.t_mocap <= trial.t_mocap[0] + REFERENCE]
 
 
 def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
