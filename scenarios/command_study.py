@@ -21,6 +21,9 @@ def study(  # noqa: PLR0913  an option each
     vary: Annotated[
         str | None, typer.Option(metavar="PATH=V1,V2,...", help="power: a value of the scenario and what it is set to.")
     ] = None,
+    matched: Annotated[
+        bool, typer.Option("--matched", help="Robots that are what the geometric model says, without physics.")
+    ] = False,
     workers: Workers = 0,
     scheduler: Scheduler = None,
     seed: Seed = None,
@@ -31,10 +34,12 @@ def study(  # noqa: PLR0913  an option each
     from scenarios.collection import engine, study
     from scenarios.collection.collect import Plan, collect
     from scenarios.collection.judge import judged
+    from scenarios.collection.matched import matched as without_physics
 
     if workers and scheduler:
         raise ScenarioError("--workers and --scheduler: name one of them")
     path, values = _varied(kind, vary)
+    produce = without_physics if matched else judged
     levels, found = [], []
     with console.progress() as progress:
         for k, value in enumerate(values):
@@ -43,7 +48,7 @@ def study(  # noqa: PLR0913  an option each
             folder = out / f"level_{k}" if path else out
             at = f"{path}={value} " if path else ""
             who = engine.Workers(workers, scheduler)
-            rows = collect(Plan(loaded, n, folder, judged), who, partial(_tell, progress, at))
+            rows = collect(Plan(loaded, n, folder, produce), who, partial(_tell, progress, at))
             levels.append(study.level(value, rows))
             found = list(study.parameters(folder, rows))
     study.save(out / "study.json", levels, found if kind == "coverage" else [])

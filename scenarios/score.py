@@ -8,10 +8,10 @@ through the same measurements: T_lab_B measured, all that follows it true.
 """
 
 import json
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -48,8 +48,8 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Score:
-    """An estimate judged.
+class ParameterScore:
+    """A model's parameters judged.
 
     Attributes:
         parameters: Every parameter of the truth.
@@ -59,8 +59,6 @@ class Score:
         n_judged: Of how many.
         nees: Normalised estimation error squared of all of them together [-].
         dof: Its degrees of freedom.
-        rows: The ladder against the truth, floor included.
-        skill: Of each row: (registration - row) / (registration - floor) in position RMSE per component [-].
     """
 
     parameters: tuple[Judged, ...]
@@ -70,12 +68,14 @@ class Score:
     n_judged: int
     nees: float
     dof: int
-    rows: tuple[Row, ...]
-    skill: tuple[float | None, ...]
 
     def save(self, folder: Path) -> None:
         """Write score.json."""
-        content = {
+        text = json.dumps(self._content(), indent=1, allow_nan=False)
+        (folder / "score.json").write_text(text + "\n", encoding="utf-8")
+
+    def _content(self) -> dict[str, object]:
+        return {
             "schema": 1,
             "parameters": [_entry(p) for p in self.parameters],
             "combinations": [_entry(p) for p in self.combinations],
@@ -84,9 +84,24 @@ class Score:
             "n_judged": self.n_judged,
             "nees": self.nees,
             "dof": self.dof,
-            "rows": [row_entry(r) | {"skill": s} for r, s in zip(self.rows, self.skill, strict=True)],
         }
-        (folder / "score.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Score(ParameterScore):
+    """An estimate judged.
+
+    Attributes:
+        rows: The ladder against the truth, floor included.
+        skill: Of each row: (registration - row) / (registration - floor) in position RMSE per component [-].
+    """
+
+    rows: tuple[Row, ...]
+    skill: tuple[float | None, ...]
+
+    def _content(self) -> dict[str, object]:
+        rows = [row_entry(r) | {"skill": s} for r, s in zip(self.rows, self.skill, strict=True)]
+        return super()._content() | {"rows": rows}
 
 
 def score(estimate: Estimate, dataset: Dataset, truth_folder: Path, evaluation: Evaluation) -> Score:
@@ -96,25 +111,20 @@ def score(estimate: Estimate, dataset: Dataset, truth_folder: Path, evaluation: 
         ScenarioError: The truth is missing or of other trials.
         NotCalibrated: The estimate must not be used.
     """
-    true = _read_parameters(truth_folder / "truth.json")
-    model = estimate.model(estimate.main)
+    judged = judge_parameters(estimate.model(estimate.main), _read_parameters(truth_folder / "truth.json"))
+    rows = tuple(ladder(list(_traces(estimate, dataset, truth_folder)), "truth"))
+    parts: dict[str, Any] = {f.name: getattr(judged, f.name) for f in fields(judged)}
+    return Score(**parts, rows=rows, skill=tuple(_skill(row, rows) for row in rows))
+
+
+def judge_parameters(model: Model, true: Iterable[Parameter]) -> ParameterScore:
+    """Judge a model's parameters by the true ones."""
+    true = tuple(true)
     parameters = tuple(_parameter(name, unit, value, model) for name, unit, value in true)
-    values = {name: value for name, _, value in true}
-    matrix, errors, combinations = _identified(model, values)
+    matrix, errors, combinations = _identified(model, {name: value for name, _, value in true})
     covered = np.abs(errors / np.sqrt(np.diag(matrix))) <= _SPAN_95
     nees, dof = _nees(errors, matrix)
-    rows = tuple(ladder(list(_traces(estimate, dataset, truth_folder)), "truth"))
-    return Score(
-        parameters,
-        combinations,
-        float(covered.mean()),
-        int(covered.sum()),
-        len(covered),
-        nees,
-        dof,
-        rows,
-        tuple(_skill(row, rows) for row in rows),
-    )
+    return ParameterScore(parameters, combinations, float(covered.mean()), int(covered.sum()), len(covered), nees, dof)
 
 
 def _entry(judged: Judged) -> dict[str, object]:

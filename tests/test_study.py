@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from scenarios import load
 from scenarios.cli import app
 from scenarios.collection import study
+from scenarios.collection.matched import matched
 from scenarios.collection.order import Magnitude, run_name
 from scenarios.collection.row import Row
 from scenarios.errors import ScenarioError
@@ -81,3 +83,30 @@ def test_more_postures_show_the_gain_more_clearly(tmp_path):
     assert many["calibrated"]["value"] == 1.0
     assert many["detected"]["value"] >= 0.75
     assert json.loads((tmp_path / "s/level_1/runs/000000/score.json").read_text())["rows"]
+
+
+def test_a_matched_robot_is_a_function_of_its_seed_and_its_intervals_hold(tmp_path):
+    scenario = load("short", ["twin.campaign.calibration_postures=40"])
+    found = []
+    for seed in (0, 0, *range(1, 12)):
+        folder = tmp_path / str(len(found))
+        folder.mkdir()
+        found.append(matched(scenario.model_copy(update={"seed": seed}), folder))
+    assert found[0] == found[1] != found[2]
+    figures = [{m.name: m.value for m in one} for one in found[1:]]
+    n = sum(f["n_judged"] for f in figures)
+    held = sum(f["coverage_95"] * f["n_judged"] for f in figures)
+    assert n == 12 * 36
+    assert 0.91 < held / n < 0.98
+    assert all(f["model_2_mm"] < 0.3 * f["registration_mm"] and f["detected"] == 1.0 for f in figures)
+    assert len(json.loads((tmp_path / "0" / "score.json").read_text())["combinations"]) > 10
+
+
+def test_a_study_of_matched_robots_needs_no_simulation(tmp_path):
+    out = tmp_path / "study"
+    result = CliRunner().invoke(app, ["study", "coverage", "short", "-n", "3", "--matched", "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    content = json.loads((out / "study.json").read_text())
+    assert content["levels"][0]["n"] == 3
+    assert {p["name"] for p in content["parameters"]} >= {"geometry.arm_3_joint.z", "encoder.arm_4_joint.motor.offset"}
+    assert not list((out / "runs").rglob("*.nc"))
