@@ -3,7 +3,7 @@
 A recording holds what instruments said, never what was true: it has no field for truth.
 Each instrument keeps its own clock; t_mocap = t_i (1 + drift_i) + offset_i is estimated later.
 
-    t_robot (n,)    q_motor, q_link, v_motor, effort, q_command (n, joint)
+    t_robot (n,)    q_motor, q_link, v_motor, effort, q_command (n, joint), wrist_wrench (n, 6)
     t_mocap (m,)    marker_position (m, marker, 3) [m, lab], NaN where occluded
     t_plate (p,)    plate_wrench (p, plate, 6) [N, N.m] action of the robot on the plate, lab axes, about plate_centre
 """
@@ -29,6 +29,12 @@ _LAYOUT: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "v_motor": (("t_robot", "joint"), "rad/s", "motor-side velocity at the joint", "joint axis"),
     "effort": (("t_robot", "joint"), "A", "motor current", "joint axis"),
     "q_command": (("t_robot", "joint"), "rad", "commanded joint position", "joint axis"),
+    "wrist_wrench": (
+        ("t_robot", "wrench"),
+        "N, N.m",
+        "action of the hand on the wrist's force-torque sensor, NaN without one",
+        "wrist sensor",
+    ),
     "t_mocap": (("t_mocap",), "s", "motion-capture clock", "none"),
     "marker_position": (("t_mocap", "marker", "axis"), "m", "marker positions, NaN where occluded", "lab"),
     "t_plate": (("t_plate",), "s", "force-plate clock", "none"),
@@ -62,6 +68,7 @@ def _clock(name: str, dims: tuple[str, ...]) -> str:
 
 VARIABLES = tuple(Variable(n, d, u, m, f, _clock(n, d)) for n, (d, u, m, f) in _LAYOUT.items())
 _LABELS = ("joint", "marker", "marker_body", "plate")
+_OPTIONAL = "wrist_wrench"  # left out of a file that would hold NaN only
 _EXACT = ("t_robot", "t_mocap", "t_plate", "dwell_start", "dwell_stop", "plate_centre")
 
 
@@ -93,6 +100,8 @@ class Trial:
         dwell_start: (n_postures,) [s, mocap clock].
         dwell_stop: (n_postures,) [s, mocap clock].
         approach: (n_postures, n_joints), -1, 0 or 1.
+        wrist_wrench: (n, 6) [N, N.m], action of the hand on the wrist's sensor, its axes, about its origin; NaN without
+            one.
     """
 
     id: str
@@ -114,10 +123,13 @@ class Trial:
     dwell_start: np.ndarray = field(default_factory=lambda: _empty(0))
     dwell_stop: np.ndarray = field(default_factory=lambda: _empty(0))
     approach: np.ndarray = field(default_factory=lambda: _empty(0, 0))
+    wrist_wrench: np.ndarray = field(default_factory=lambda: _empty(0, 6))
 
     def __post_init__(self) -> None:
         if self.approach.size == 0:
             object.__setattr__(self, "approach", np.zeros((len(self.dwell_start), len(self.joint)), dtype=np.int8))
+        if not np.isfinite(self.wrist_wrench).any():
+            object.__setattr__(self, "wrist_wrench", np.full((len(self.t_robot), 6), np.nan))
         sizes = {"axis": 3, "wrench": 6, "joint": len(self.joint), "marker": len(self.marker), "plate": len(self.plate)}
         sizes |= {clock: len(getattr(self, clock)) for clock in _CLOCKS} | {"posture": len(self.dwell_start)}
         for name, (dims, *_) in _LAYOUT.items():
@@ -147,6 +159,8 @@ def write_trial(path: Path, trial: Trial) -> str:
             file.dimensions[label] = len(getattr(trial, label))
         write_labels(file, {label: getattr(trial, label) for label in _LABELS})
         for v in VARIABLES:
+            if v.name == _OPTIONAL and not np.isfinite(trial.wrist_wrench).any():
+                continue
             kind = "i1" if v.name == "approach" else "f8" if v.name in _EXACT else "f4"
             attributes = {"units": v.units, "long_name": v.meaning, "frame": v.frame, "clock": v.clock}
             write_variable(file, v.name, getattr(trial, v.name), v.dims, kind, attributes)

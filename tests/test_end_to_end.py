@@ -173,6 +173,7 @@ def swing(result, compensator):
     same = replace(
         trial, t_mocap=t, marker_position=trial.marker_position[ok], t_robot=t, q_motor=q, q_link=nothing,
         v_motor=nothing, effort=nothing, q_command=nothing, t_plate=t, plate_wrench=w[:, None],
+        wrist_wrench=np.zeros((0, 6)),
     )  # fmt: skip
     rows = {
         (p.model, p.base): p.T_lab_hand

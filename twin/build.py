@@ -8,10 +8,12 @@ import numpy as np
 
 from twin.defects.base import Defect, Parameter, body
 
-# What the instruments need of the simulation: poses of links, wrench of the plate.
+# What the instruments need of the simulation: poses of links, wrenches of the plate and at the wrist.
 _POSES = (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMEQUAT)
 _WRENCH = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
 HAND = "gripper_grasping_frame"
+FLANGE = "wrist_ft_tool_link"
+"""What hangs on the wrist's force-torque sensor, whose link is its parent."""
 PUSH = ("push.x", "push.y", "push.z")
 _HELD = ("wheel", "caster", "head", "gripper")
 
@@ -100,5 +102,16 @@ def _sense(spec: mujoco.MjSpec, links: Sequence[str]) -> None:
     for link in links:
         for kind in _POSES:
             spec.add_sensor(name=f"{link}.{kind.name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_XBODY, objname=link)
-    for kind in _WRENCH:
-        spec.add_sensor(name=f"plate.{kind.name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="plate")
+    for site in ("plate", *_wrist_sites(spec)):
+        for kind in _WRENCH:
+            spec.add_sensor(name=f"{site}.{kind.name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
+
+
+def _wrist_sites(spec: mujoco.MjSpec) -> tuple[str, ...]:
+    """A site on what hangs on the wrist's sensor, in the sensor's frame; none on a bench without one."""
+    flange = spec.body(FLANGE)
+    if flange is None:
+        return ()
+    quat, back = np.asarray(flange.quat) * [1.0, -1.0, -1.0, -1.0], np.zeros(3)
+    mujoco.mju_rotVecQuat(back, -np.asarray(flange.pos), quat)
+    return (flange.add_site(name="wrist", pos=back, quat=quat).name,)

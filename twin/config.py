@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
 from twin.config_departures import Departures
 from twin.config_driving import Driving
-from twin.config_instruments import LogErrors, MocapErrors, PlateErrors
+from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, WristSensor
 from twin.config_session import Session
 from twin.config_values import (
     STRICT,
@@ -177,6 +177,7 @@ class Instruments:
         mocap: What is wrong with the motion capture.
         plate: With the plate.
         log: With the robot's log.
+        wrist: The force-torque sensor of the wrist; null: none.
     """
 
     bodies: dict[Literal["base", "shoulder", "gripper"], MarkerBody]
@@ -194,6 +195,7 @@ class Instruments:
     mocap: MocapErrors = field(default_factory=MocapErrors)
     plate: PlateErrors = field(default_factory=PlateErrors)
     log: LogErrors = field(default_factory=LogErrors)
+    wrist: WristSensor | None = field(default_factory=WristSensor)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -60,6 +60,27 @@ class PlateErrors:
 
 
 @dataclass(frozen=True, config=STRICT)
+class WristSensor:
+    """The force-torque sensor between wrist and hand, read with the encoders; widths are of what is drawn for one.
+
+    Attributes:
+        force_noise: Per axis and sample [N].
+        moment_noise: Per axis and sample [N.m].
+        force_resolution: Step [N].
+        moment_resolution: Step [N.m].
+        force_offset: Standard deviation of the zero [N].
+        moment_offset: Standard deviation of the zero [N.m].
+    """
+
+    force_noise: NonNegative = 0.1
+    moment_noise: NonNegative = 0.003
+    force_resolution: FixedNonNegative = 0.0625
+    moment_resolution: FixedNonNegative = 0.002
+    force_offset: NonNegative = 0.0
+    moment_offset: NonNegative = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
 class LogErrors:
     """Of the robot's log.
 

@@ -36,6 +36,7 @@ def carried(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
         command=q,
         poses=dict(zip(twin.links, poses, strict=True)),
         wrench=np.zeros((len(q), 6)),
+        wrist=np.zeros((len(q), 6)),
     )
 
 
@@ -62,7 +63,9 @@ def arm_frame(twin: Twin, joint: str) -> tuple[Parameter, ...]:
 
 
 def without_plate(trial: Trial) -> Trial:
-    """The recording of a robot that no plate feels."""
+    """The recording of a robot that no plate feels, nor its wrist."""
+    none = np.zeros((0, 1, 6))
     return replace(
-        trial, plate=(), t_plate=np.zeros(0), plate_wrench=np.zeros((0, 0, 6)), plate_centre=np.zeros((0, 3))
-    )
+        trial, plate=(), t_plate=np.zeros(0), plate_wrench=none[:, :0], plate_centre=none[:, 0, :3],
+        wrist_wrench=none[:, 0],
+    )  # fmt: skip

@@ -16,7 +16,7 @@ from calibration.recording import Trial
 from twin.config import TwinConfig
 from twin.defects.base import Defect
 from twin.draw import BASE, Robot
-from twin.instruments import mocap, optics, plate, robot_log
+from twin.instruments import mocap, optics, plate, robot_log, wrist
 from twin.instruments.clock import Clock, Latency
 from twin.instruments.sampling import averaged, interpolate, interpolate_poses
 from twin.kinematic import without_plate
@@ -44,7 +44,8 @@ def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tu
     t_plate, true_plate = force.ticks(start, stop, i.plate_rate)
     t_mocap, _ = Clock("mocap").ticks(start + late, stop + late, i.mocap_rate)
     true = _true(lab, states, t_mocap, start)
-    log = robot_log.measured(true_robot - start, states, lab.robot.encoders, lab.config)
+    wrench = _wrist(lab, motion, states, true_robot - start)
+    log = robot_log.measured(true_robot - start, states, lab.robot.encoders, lab.config, wrench)
     rng = generator(lab.seed, motion.id, "robot")
     t_robot, log = robot_log.kept(robot_log.stamped(t_robot, i.robot_rate, i.log, rng), log, i.log, rng)
     trial = Trial(
@@ -79,13 +80,23 @@ def clocks(config: TwinConfig) -> tuple[Clock, Clock]:
     return Clock("robot", robot.offset - i.log.latency, robot.drift), Clock("plate", force.offset, force.drift)
 
 
+def _wrist(lab: Laboratory, motion: Motion, states: States, t: np.ndarray) -> np.ndarray | None:
+    """What the wrist's sensor reads (n, 6) at t (n,) [s from the first set-point], if there is one."""
+    sensor, rate = lab.config.instruments.wrist, lab.config.instruments.robot_rate
+    if sensor is None:
+        return None
+    worn = wrist.draw(sensor, generator(lab.seed, "wrist"))
+    return wrist.measured(t, rate, states.t, states.wrist, worn, generator(lab.seed, motion.id, "wrist"))
+
+
 def instrument_errors(lab: Laboratory) -> tuple[Defect | Clock | Latency, ...]:
     """Every constant of the instruments; the clocks against the motion capture's, latencies included."""
     i, (robot, force), worn = lab.config.instruments, clocks(lab.config), _plate(lab)
     late = i.mocap.latency
     robot, force = replace(robot, offset=robot.offset + late), replace(force, offset=force.offset + late - worn.delay)
     latencies = (Latency("mocap", late), Latency("robot", i.log.latency), Latency("plate", worn.delay))
-    return robot, force, *(x for x in latencies if x.value), worn, _volume(lab)
+    held = () if i.wrist is None else (wrist.draw(i.wrist, generator(lab.seed, "wrist")),)
+    return robot, force, *(x for x in latencies if x.value), worn, _volume(lab), *held
 
 
 def plate_centre(model: mujoco.MjModel) -> np.ndarray:

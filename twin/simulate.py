@@ -30,6 +30,7 @@ class States:
         command: Interpolated set-points (n, 8) [m, rad].
         poses: T_lab_link (n, 4, 4) by link.
         wrench: Action of the robot on the plate, lab axes, about the plate's centre (n, 6) [N, N.m].
+        wrist: Action of the hand on the wrist's sensor, its axes, about its origin (n, 6) [N, N.m].
     """
 
     t: np.ndarray
@@ -40,6 +41,7 @@ class States:
     command: np.ndarray
     poses: dict[str, np.ndarray]
     wrench: np.ndarray
+    wrist: np.ndarray
 
 
 def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
@@ -82,6 +84,7 @@ def _unpack(
         command=command,
         poses={name: _pose(model, sensors, name) for name in links},
         wrench=_floor_wrench(model, qpos, qvel) if anchored(model) else _wrench(model, sensors),
+        wrist=_wrist(model, sensors),
     )
 
 
@@ -103,9 +106,20 @@ def _floor_wrench(model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> 
 
 def _wrench(model: mujoco.MjModel, sensors: np.ndarray) -> np.ndarray:
     """Action on the plate: the site's sensors give what holds the plate up, less its own weight."""
-    kinds = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
-    support = np.concatenate([_sensed(model, sensors, f"plate.{k.name}") for k in kinds], axis=1)
+    support = _held_up(model, sensors, "plate")
     plate = model.body(model.site("plate").bodyid[0])
     weight = plate.mass[0] * model.opt.gravity
     lever = plate.ipos - model.site("plate").pos
     return -support - np.concatenate([weight, np.cross(lever, weight)])
+
+
+def _wrist(model: mujoco.MjModel, sensors: np.ndarray) -> np.ndarray:
+    """Action on the wrist's sensor; NaN on a bench without one."""
+    there = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "wrist") >= 0
+    return -_held_up(model, sensors, "wrist") if there else np.full((len(sensors), 6), np.nan)
+
+
+def _held_up(model: mujoco.MjModel, sensors: np.ndarray, site: str) -> np.ndarray:
+    """Wrench (n, 6) with which a site's body is held by its parent, the site's axes, about the site."""
+    kinds = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
+    return np.concatenate([_sensed(model, sensors, f"{site}.{k.name}") for k in kinds], axis=1)

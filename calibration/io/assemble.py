@@ -160,7 +160,8 @@ def _joint_fields(recorded: Recorded, joints: Joints, names: Sequence[str]) -> d
             recorded.file, f"joints: {missing} of the setup are not mapped, {unknown} are not in the setup"
         )
     order = [joints.names.index(name) for name in names]
-    return {"t_robot": joints.t} | {
+    wrist = np.zeros((0, 6)) if joints.wrist_wrench is None else joints.wrist_wrench
+    return {"t_robot": joints.t, "wrist_wrench": wrist} | {
         field: getattr(joints, field)[:, order] for field in ("q_motor", "q_link", "v_motor", "effort", "q_command")
     }
 

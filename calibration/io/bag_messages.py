@@ -9,7 +9,8 @@ if TYPE_CHECKING:
 
 MOTOR, ABSOLUTE, COMMAND = "/joint_states", "/joint_states_absolute", "/joint_states_command"
 NAMES, VALUES = "/introspection_data/names", "/introspection_data/values"
-JOINT_STATE = "sensor_msgs/msg/JointState"
+WRIST = "/wrist_ft"
+JOINT_STATE, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 STATISTICS_NAMES, STATISTICS_VALUES = (
     "pal_statistics_msgs/msg/StatisticsNames",
     "pal_statistics_msgs/msg/StatisticsValues",

@@ -5,6 +5,7 @@ without any joint of the mapping are others' and passed over; one with some of t
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.io.assemble import Reader
 from calibration.io.bag_messages import PREFIX, SUFFIXES, typestore
-from calibration.io.mapping import BagLayout
+from calibration.io.layouts import BagLayout
 from calibration.io.recorded import Joints, Recorded
 
 _FIELDS = tuple(SUFFIXES)
@@ -30,6 +31,8 @@ def read_bag(files: Sequence[Path], layout: BagLayout) -> Recorded:
     path = files[0]
     messages = _messages(path, layout.topics)
     joints = _states(path, layout, messages) if layout.source == "joint_states" else _values(path, layout, messages)
+    if layout.wrist is not None:
+        joints = replace(joints, wrist_wrench=_wrist(path, layout.wrist, layout, messages, joints.t))
     return Recorded(str(path), joints=joints)
 
 
@@ -124,6 +127,16 @@ def _row(values: Any, place: dict[str, int], layout: BagLayout) -> Iterator[list
     for field in _FIELDS:
         columns = [place.get(name + SUFFIXES[field]) for name in layout.joints.values()]
         yield _picked(values, columns)
+
+
+def _wrist(path: Path, topic: str, layout: BagLayout, messages: dict[str, list[Any]], t: np.ndarray) -> np.ndarray:
+    """ACTION on the wrist's sensor (n, 6) at the readings' times t (n,), linear, NaN outside."""
+    s = np.array([_seconds(m) for m in messages[topic]])
+    _check_increasing(path, topic, s)
+    both = ([m.wrench.force, m.wrench.torque] for m in messages[topic])
+    w = np.array([[getattr(part, axis) for part in two for axis in "xyz"] for two in both])
+    sign = 1.0 if layout.wrist_convention == "action" else -1.0
+    return sign * np.stack([np.interp(t, s, column, left=np.nan, right=np.nan) for column in w.T], axis=1)
 
 
 def _seconds(message: Any) -> float:

@@ -3,6 +3,7 @@
     /joint_states            position, velocity: motor side; effort: motor current [A]
     /joint_states_absolute   position: link encoders        /joint_states_command   position: set-points
     /introspection_data/{names,values}                      the same as PAL's robots log it
+    /wrist_ft                wrench: ACTION of the hand on the wrist's sensor, its axes
 
 JointState has no field for a second encoder, hence its second topic. Times are the robot's clock, in header.stamp.
 """
@@ -24,6 +25,8 @@ from calibration.io.bag_messages import (
     STATISTICS_VALUES,
     SUFFIXES,
     VALUES,
+    WRENCH,
+    WRIST,
     typestore,
 )
 from calibration.recording import Trial
@@ -74,6 +77,10 @@ def _topics(trial: Trial, store: Any, stamps: list[int], ros: int) -> list[tuple
     if np.isfinite(trial.q_command).all():
         rows_ = zip(stamps, trial.q_command, strict=True)
         found.append((COMMAND, JOINT_STATE, [(s, _state(store, s, ros, names, q)) for s, q in rows_]))
+    known = np.flatnonzero(np.isfinite(trial.wrist_wrench).all(axis=1))
+    if len(known):
+        wrenches = [(stamps[k], trial.wrist_wrench[k].tolist()) for k in known]
+        found.append((WRIST, WRENCH, [(s, _wrench(store, s, ros, w)) for s, w in wrenches]))
     return found + _introspection(trial, store, stamps, ros)
 
 
@@ -103,6 +110,12 @@ def _state(
     known = [x if np.isfinite(x).all() else _NONE for x in (v, effort)]
     q, v, effort = map(np.ascontiguousarray, (q, *known))
     return State(header=_header(store, stamp, ros), name=names, position=q, velocity=v, effort=effort)
+
+
+def _wrench(store: Any, stamp: int, ros: int, wrench: list[float]) -> Any:
+    vector, both = store.types["geometry_msgs/msg/Vector3"], store.types["geometry_msgs/msg/Wrench"]
+    force, torque = (vector(**dict(zip("xyz", wrench[k : k + 3], strict=True))) for k in (0, 3))
+    return store.types[WRENCH](header=_header(store, stamp, ros), wrench=both(force=force, torque=torque))
 
 
 def _header(store: Any, stamp: int, ros: int) -> Any:

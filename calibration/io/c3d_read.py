@@ -13,7 +13,7 @@ from calibration.errors import InputError
 from calibration.io.assemble import Reader
 from calibration.io.c3d_file import CLOCK, C3dFile
 from calibration.io.c3d_read_plates import read_plates
-from calibration.io.mapping import LENGTHS, C3dLayout
+from calibration.io.layouts import LENGTHS, C3dLayout
 from calibration.io.recorded import Markers, Recorded
 from calibration.schema import Setup
 

@@ -8,7 +8,7 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.io.c3d_file import CLOCK, C3dFile
 from calibration.io.c3d_plate import C3dPlate, lab_wrench, moved_to, negated_origin
-from calibration.io.mapping import MOMENT_NAMES, MOMENTS, C3dLayout, C3dPlateMap
+from calibration.io.layouts import MOMENT_NAMES, MOMENTS, C3dLayout, C3dPlateMap
 from calibration.io.recorded import Plates
 from calibration.schema import Plate, Setup
 

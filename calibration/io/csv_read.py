@@ -9,7 +9,7 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.io.assemble import Reader
 from calibration.io.csv_text import CsvText, read_text
-from calibration.io.mapping import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels
+from calibration.io.layouts import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels
 from calibration.io.plate_convention import checked_against_cop, to_action
 from calibration.io.recorded import Joints, Markers, Means, Plates, Recorded
 from calibration.schema import Plate, Setup
@@ -88,7 +88,12 @@ def _joints(text: CsvText, table: CsvTable, t: np.ndarray) -> Joints:
             columns.append(np.asarray(known))
         return np.stack(columns, axis=1)
 
-    return Joints(t, tuple(table.joints), of("motor"), of("link"), of("velocity"), of("effort"), of("command"))
+    wrist = None
+    if (w := table.wrist) is not None:
+        sign = 1.0 if w.convention == "action" else -1.0
+        wrist = sign * text.numbers((*w.force, *w.moment), gaps=True)
+    names = tuple(table.joints)
+    return Joints(t, names, of("motor"), of("link"), of("velocity"), of("effort"), of("command"), wrist)
 
 
 def _plates(text: CsvText, table: CsvTable, setup: Setup, t: np.ndarray) -> tuple[Plates | None, tuple[str, ...]]:
@@ -118,6 +123,7 @@ def _unused(text: CsvText, table: CsvTable) -> tuple[str, ...]:
     used = {c for columns in table.markers.values() for c in columns}
     used |= {c for j in table.joints.values() for c in (j.motor, j.link, j.velocity, j.effort, j.command) if c}
     used |= {c for p in table.plates.values() for c in (*p.force, *p.moment, *(p.cop or ()))}
+    used |= {*table.wrist.force, *table.wrist.moment} if table.wrist else set()
     used |= {table.time.column} if table.time else set()
     left = [name for name in text.header if name not in used]
     return (f"{text.path.name}: columns not used: {', '.join(left)}",) if left else ()

@@ -1,6 +1,7 @@
 """A trial as CSV: one file an instrument, each on its own clock, or one row a static posture.
 
     <trial>.mocap.csv     t, <marker>_{x,y,z} [m]              <trial>.robot.csv   t, <joint>_{motor,link,...} [rad]
+                                                               wrist_{Fx..Mz} [N, N.m] ACTION of the hand on the sensor
     <trial>.plate.csv     t, <plate>_{Fx..Mz} [N, N.m] ACTION, lab axes, about the surface centre
     <trial>.postures.csv  the means
 
@@ -11,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.io.mapping import PlateChannels
+from calibration.io.layouts import PlateChannels, WristChannels
 from calibration.means import PostureMeans
 from calibration.recording import Trial
 
 FIELDS = {"motor": "q_motor", "link": "q_link", "velocity": "v_motor", "effort": "effort", "command": "q_command"}
 _COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+WRIST = tuple(f"wrist_{c}" for c in _COMPONENTS)
 
 
 def write_csv(folder: Path, trial: Trial) -> None:
@@ -27,7 +29,10 @@ def write_csv(folder: Path, trial: Trial) -> None:
     if len(trial.t_robot):
         names = [f"{joint}_{field}" for joint in trial.joint for field in FIELDS]
         readings = np.stack([getattr(trial, name) for name in FIELDS.values()], axis=2)
-        _write(folder / f"{trial.id}.robot.csv", names, trial.t_robot, readings.reshape(len(readings), -1))
+        table = readings.reshape(len(readings), -1)
+        if np.isfinite(trial.wrist_wrench).any():
+            names, table = [*names, *WRIST], np.concatenate([table, trial.wrist_wrench], axis=1)
+        _write(folder / f"{trial.id}.robot.csv", names, trial.t_robot, table)
     if len(trial.t_plate):
         names = [f"{plate}_{c}" for plate in trial.plate for c in _COMPONENTS]
         wrench = trial.plate_wrench.reshape(len(trial.t_plate), -1)
@@ -48,6 +53,12 @@ def plate_columns(plate: str) -> PlateChannels:
         force=(fx, fy, fz), moment=(mx, my, mz), convention="action", axes="lab", about="centre",
         force_unit="N", moment_unit="N.m",
     )  # fmt: skip
+
+
+def wrist_columns() -> WristChannels:
+    """How the mapping file describes the columns of the wrist's sensor."""
+    fx, fy, fz, mx, my, mz = WRIST
+    return WristChannels(force=(fx, fy, fz), moment=(mx, my, mz), convention="action")
 
 
 def _marker_columns(markers: tuple[str, ...]) -> list[str]:

@@ -2,20 +2,13 @@
 
 from collections.abc import Sequence
 
-from calibration.io.bag_messages import ABSOLUTE, COMMAND, MOTOR
+import numpy as np
+
+from calibration.io.bag_messages import ABSOLUTE, COMMAND, MOTOR, WRIST
 from calibration.io.c3d_write import DWELL_EVENTS
-from calibration.io.csv_write import FIELDS, plate_columns
-from calibration.io.mapping import (
-    BagLayout,
-    C3dLayout,
-    C3dPlateMap,
-    CsvTable,
-    CsvTime,
-    JointChannels,
-    MappedBody,
-    MappedTrial,
-    Mapping,
-)
+from calibration.io.csv_write import FIELDS, plate_columns, wrist_columns
+from calibration.io.layouts import BagLayout, C3dLayout, C3dPlateMap, CsvTable, CsvTime, JointChannels
+from calibration.io.mapping import MappedBody, MappedTrial, Mapping
 from calibration.means import PostureMeans
 from calibration.recording import Trial
 from calibration.robot import Chain
@@ -31,6 +24,7 @@ def mapping_of(
     setup = Setup.model_validate({name: getattr(description, name) for name in Setup.model_fields})
     names = [m.name for b in description.bodies for m in b.markers]
     plates = {p.name: C3dPlateMap(number=k + 1, convention="reaction") for k, p in enumerate(description.plates)}
+    wrist = any(isinstance(trial, Trial) and np.isfinite(trial.wrist_wrench).any() for _, trial in trials)
     static = any(isinstance(trial, Trial) and len(trial.dwell_start) for _, trial in trials)
     return Mapping(
         urdf="nominal.urdf",
@@ -39,13 +33,14 @@ def mapping_of(
             MappedBody(name=b.name, link=b.link, markers=b.markers, placement=b.placement) for b in description.bodies
         ),
         trials=tuple(_trial(entry, trial) for entry, trial in trials),
-        csv=_tables(description, chain, trials),
+        csv=_tables(description, chain, trials, wrist),
         c3d=C3dLayout(
             markers={n: n for n in names}, plates=plates, dwell_events=DWELL_EVENTS if static else None
         ),
         bag=BagLayout(
             source="joint_states", motor=MOTOR, link=ABSOLUTE, command=COMMAND,
             joints={j: j for j in description.joint_names},
+            wrist=WRIST if wrist else None, wrist_convention="action" if wrist else None,
         ),
     )  # fmt: skip
 
@@ -60,7 +55,10 @@ def _trial(entry: TrialEntry, trial: Trial | PostureMeans) -> MappedTrial:
 
 
 def _tables(
-    description: Description, chain: Chain, trials: Sequence[tuple[TrialEntry, Trial | PostureMeans]]
+    description: Description,
+    chain: Chain,
+    trials: Sequence[tuple[TrialEntry, Trial | PostureMeans]],
+    wrist: bool,
 ) -> tuple[CsvTable, ...]:
     names = [m.name for b in description.bodies for m in b.markers]
     markers = {n: (f"{n}_x", f"{n}_y", f"{n}_z") for n in names}
@@ -74,7 +72,10 @@ def _tables(
     tables += [
         CsvTable(suffix=".mocap.csv", time=_T, markers=markers),
         CsvTable(
-            suffix=".robot.csv", time=_T, joints={j: JointChannels.model_validate(c) for j, c in channels.items()}
+            suffix=".robot.csv",
+            time=_T,
+            joints={j: JointChannels.model_validate(c) for j, c in channels.items()},
+            wrist=wrist_columns() if wrist else None,
         ),
     ]
     if description.plates:

@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 
 from calibration.errors import InputError
-from calibration.io.mapping import MOMENTS, PlateChannels
+from calibration.io.layouts import MOMENTS, PlateChannels
 from calibration.pressure import LOADED, centre_of_pressure
 from calibration.schema import Plate
 

@@ -20,7 +20,10 @@ class Markers:
 
 @dataclass(frozen=True)
 class Joints:
-    """Joint readings at t (n,) [s], each (n, k) in the order of `names`; NaN for what was not recorded."""
+    """Joint readings at t (n,) [s], each (n, k) in the order of `names`; NaN for what was not recorded.
+
+    `wrist_wrench` (n, 6) [N, N.m] is the ACTION of the hand on the wrist's sensor; None where it was not recorded.
+    """
 
     t: np.ndarray
     names: tuple[str, ...]
@@ -29,6 +32,7 @@ class Joints:
     v_motor: np.ndarray
     effort: np.ndarray
     q_command: np.ndarray
+    wrist_wrench: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ class Recorded:
         groups = {}
         for name, t in self.timed():
             keep, group = (t - first >= start) & (t - first < stop), getattr(self, name)
-            arrays = {k: v[keep] for k, v in vars(group).items() if k not in ("names", "centre")}
+            arrays = {k: v[keep] for k, v in vars(group).items() if k not in ("names", "centre") and v is not None}
             groups[name] = replace(group, **arrays)
         dwells = self.dwells
         if dwells is not None:

@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from twin import motions
 from twin.campaign import laboratory
-from twin.config_instruments import LogErrors, MocapErrors, PlateErrors
+from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, WristSensor
+from twin.draw import TOOL
 from twin.instruments import optics, plate
 from twin.measure import EPOCH, instrument_errors, measure
 from twin.simulate import simulate
@@ -191,3 +193,41 @@ def test_the_filter_s_delay_is_in_the_plate_s_clock(lab):
     found = truth_of(lab, plate=errors)
     assert found["latency.plate"] == pytest.approx(2.25e-3, rel=0.01)
     assert found["clock.plate.offset"] == pytest.approx(truth_of(lab)["clock.plate.offset"] - found["latency.plate"])
+
+
+def test_the_wrist_bears_the_weight_of_the_hand_in_its_own_axes(lab, states):
+    model, data = lab.twin.model, mujoco.MjData(lab.twin.model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    sensor, held, grasp = data.body("wrist_ft_link"), model.body("wrist_ft_tool_link").id, data.body(TOOL)
+    R_sensor_grasp = sensor.xmat.reshape(3, 3).T @ grasp.xmat.reshape(3, 3)
+    lever = sensor.xmat.reshape(3, 3).T @ (data.subtree_com[held] - sensor.xpos)
+    down = R_sensor_grasp @ states.poses[TOOL][0, :3, :3].T @ [0.0, 0.0, -1.0]
+    weight = 9.81 * model.body_subtreemass[held] * down
+    expected = np.concatenate([weight, np.cross(lever, weight)])
+    np.testing.assert_allclose(states.wrist[0], expected, atol=1e-2)
+    assert np.abs(expected[:3]).min() > 1.0 and np.abs(expected[3:]).max() > 0.5
+
+
+def test_the_wrist_s_readings_have_its_noise_zero_and_steps(lab, recorded, states):
+    rough = WristSensor(0.2, 0.01, 0.5, 0.02, force_offset=5.0, moment_offset=0.3)
+    trial, _ = recorded(wrist=rough)
+    found = truth_of(lab, wrist=rough)
+    zero = np.array([found[f"wrist.zero_{k + 1}"] for k in range(6)])
+    step = np.repeat([0.5, 0.02], 3)
+    w = trial.wrist_wrench
+    np.testing.assert_allclose(w / step, np.round(w / step), atol=1e-9)
+    rest = w[:100] - zero - states.wrist[:1000].mean(axis=0)
+    expected = np.hypot(np.repeat([0.2, 0.01], 3), step / np.sqrt(12.0))
+    np.testing.assert_allclose(rest.mean(axis=0), 0.0, atol=4.0 * expected.max() / 10.0)
+    assert (0.6 < rest.std(axis=0) / expected).all() and (rest.std(axis=0) / expected < 1.4).all()
+    assert np.isnan(recorded(wrist=None)[0].wrist_wrench).all()
+
+
+def test_current_is_in_whole_steps_of_what_the_drives_push_with(lab, plain, states):
+    i, trial = lab.config.instruments, plain[0]
+    np.testing.assert_allclose(trial.effort / i.current_quantum, np.round(trial.effort / i.current_quantum), atol=1e-9)
+    per_ampere = np.array([lab.config.torso.force_per_ampere, *(j.torque_per_ampere for j in lab.config.arm.values())])
+    rest = states.torque[:500].mean(axis=0) / per_ampere
+    np.testing.assert_allclose(trial.effort[:40].mean(axis=0), rest, atol=i.current_quantum)
+    assert np.abs(rest).max() > 5.0 * i.current_quantum

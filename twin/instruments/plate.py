@@ -99,5 +99,10 @@ def measured(
     samples = samples + at.sigma * rng.normal(size=samples.shape)
     if defect.drift.any():
         samples += defect.drift * (at.t - at.since)[:, None]
-    step = np.where(defect.resolution > 0.0, defect.resolution, 1.0)
-    return np.where(defect.resolution > 0.0, np.round(samples / step) * step, samples)
+    return rounded(samples, defect.resolution)
+
+
+def rounded(samples: np.ndarray, resolution: np.ndarray) -> np.ndarray:
+    """Samples (n, 6) in whole steps (6,); 0: as they are."""
+    step = np.where(resolution > 0.0, resolution, 1.0)
+    return np.where(resolution > 0.0, np.round(samples / step) * step, samples)

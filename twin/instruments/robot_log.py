@@ -1,4 +1,4 @@
-"""The robot's own log: encoders on both sides, velocity, motor current, set-points.
+"""The robot's own log: encoders on both sides, velocity, motor current, set-points, the wrist's wrench.
 
 Stamps jitter about the ticks of the robot's clock, messages are lost, velocity passes a first-order low-pass.
 """
@@ -21,17 +21,20 @@ _MOST = 0.45  # of the interval between ticks that a stamp may be off [-]
 
 @dataclass(frozen=True)
 class RobotLog:
-    """Samples (n, 8) of every joint; see `calibration.recording.Trial` for the fields."""
+    """Samples (n, 8) of every joint and (n, 6) of the wrist; see `calibration.recording.Trial` for the fields."""
 
     q_motor: np.ndarray
     q_link: np.ndarray
     v_motor: np.ndarray
     effort: np.ndarray
     q_command: np.ndarray
+    wrist_wrench: np.ndarray
 
 
-def measured(t: np.ndarray, states: States, encoders: tuple[Encoder, ...], config: TwinConfig) -> RobotLog:
-    """The log at true times t (n,) [s from the first set-point]."""
+def measured(
+    t: np.ndarray, states: States, encoders: tuple[Encoder, ...], config: TwinConfig, wrench: np.ndarray | None = None
+) -> RobotLog:
+    """The log at true times t (n,) [s from the first set-point]; `wrench` (n, 6) is what the wrist's sensor reads."""
 
     def sampled(values: np.ndarray) -> np.ndarray:
         return interpolate(t, states.t, values)
@@ -44,6 +47,7 @@ def measured(t: np.ndarray, states: States, encoders: tuple[Encoder, ...], confi
         v_motor=sampled(_slowed(states, config.instruments.log.velocity_cutoff)),
         effort=np.round(sampled(states.torque) / per_ampere / quantum) * quantum,
         q_command=sampled(states.command),
+        wrist_wrench=np.full((len(t), 6), np.nan) if wrench is None else wrench,
     )
 
 

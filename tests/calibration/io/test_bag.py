@@ -10,14 +10,15 @@ from calibration.errors import InputError
 from calibration.io.bag_messages import JOINT_STATE, MOTOR, STATISTICS_NAMES, STATISTICS_VALUES, VALUES, typestore
 from calibration.io.bag_read import read_bag
 from calibration.io.bag_write import write_bag
-from calibration.io.mapping import BagLayout
+from calibration.io.layouts import BagLayout
 from calibration.recording import Trial
 from tests.calibration import matched
 from tests.calibration.io.c3d_data import trial as empty_trial
 from tests.calibration.io.test_csv import mapping as described_robot
 
-FIELDS = ("q_motor", "q_link", "v_motor", "effort", "q_command")
+FIELDS = ("q_motor", "q_link", "v_motor", "effort", "q_command", "wrist_wrench")
 EXACT = {"source": "joint_states", "link": "/joint_states_absolute", "command": "/joint_states_command"}
+WRIST = {"wrist": "/wrist_ft", "wrist_convention": "action"}
 LAYOUT = BagLayout.model_validate(EXACT | {"joints": {j: j for j in matched.JOINTS}})
 
 
@@ -28,7 +29,10 @@ def trial(n: int = 50) -> Trial:
     link = q + 1e-3
     link[:, 0] = np.nan
     noise = [rng.normal(size=q.shape) for _ in range(3)]
-    return replace(empty_trial(0.5), t_robot=t, q_motor=q, q_link=link, v_motor=noise[0], effort=noise[1], q_command=q)
+    return replace(
+        empty_trial(0.5), t_robot=t, q_motor=q, q_link=link, v_motor=noise[0], effort=noise[1], q_command=q,
+        wrist_wrench=rng.normal(size=(n, 6)),
+    )  # fmt: skip
 
 
 def layout(**changes):
@@ -59,7 +63,7 @@ def write_messages(path, rows, topic=MOTOR, kind=JOINT_STATE):
 def test_readings_come_back_bit_for_bit(tmp_path, ros, source):
     path, true = tmp_path / ("log.bag" if ros == 1 else "log"), trial()
     write_bag(path, true, ros)
-    found = read_bag([path], layout(source=source)).joints
+    found = read_bag([path], layout(source=source, **WRIST)).joints
     assert found is not None and found.names == matched.JOINTS
     np.testing.assert_array_equal(found.t, true.t_robot)
     for name in FIELDS:
@@ -113,6 +117,17 @@ def test_link_readings_on_their_own_stamps_are_interpolated_and_nan_outside(tmp_
     found = read_bag([path], layout(command=None)).joints
     np.testing.assert_allclose(found.q_link[1:], found.q_motor[1:], atol=1e-12)
     assert np.isnan(found.q_link[0]).all()
+
+
+def test_the_wrist_s_reaction_is_turned_into_its_action_and_must_be_told(tmp_path):
+    true = trial()
+    true.wrist_wrench[:3] = np.nan  # the sensor's driver started late
+    write_bag(tmp_path / "log.bag", true)
+    found = read_bag([tmp_path / "log.bag"], layout(wrist="/wrist_ft", wrist_convention="reaction")).joints
+    np.testing.assert_array_equal(found.wrist_wrench, -true.wrist_wrench)
+    assert read_bag([tmp_path / "log.bag"], LAYOUT).joints.wrist_wrench is None
+    with pytest.raises(ValueError, match="no bag says whose wrench it holds"):
+        BagLayout.model_validate(EXACT | {"joints": {}, "wrist": "/wrist_ft"})
 
 
 def test_a_bag_becomes_a_dataset(lab):

@@ -268,3 +268,26 @@ def test_a_mapping_that_does_not_fit_is_told(lab, capsys, change, words):
     described = static_mapping()
     change(described)
     assert words in lab.refused(capsys, described, write_csv(lab.folder / "postures.csv", postures()))
+
+
+def robot_mapping(convention="reaction"):
+    wrist = {"force": ["Wx", "Wy", "Wz"], "moment": ["Tx", "Ty", "Tz"], "convention": convention}
+    table = {"time": {"column": "t", "unit": "s"}, "joints": JOINTS, "wrist": wrist}
+    return mapping(trials=[{"id": "log", "role": "calibration", "kind": "swing"}], csv=[table])
+
+
+def test_the_wrist_s_reaction_is_read_as_its_action(lab):
+    rng, columns = np.random.default_rng(0), {"t": np.arange(50) / 100.0}
+    columns |= {name: np.full(50, q) for name, q in zip(matched.JOINTS, matched.CENTRE, strict=True)}
+    w = {c: rng.normal(size=50) for c in ("Wx", "Wy", "Wz", "Tx", "Ty", "Tz")}
+    notes = lab.run(robot_mapping(), write_csv(lab.folder / "log.csv", columns | w))
+    ((_, trial),) = load(lab.out).trials("calibration")
+    np.testing.assert_allclose(trial.wrist_wrench, -np.stack(list(w.values()), axis=1), rtol=1e-6)
+    assert not any("not used" in note for note in notes)
+
+
+def test_a_wrist_without_joints_beside_it_is_told(lab, capsys):
+    described = robot_mapping()
+    described["csv"][0]["joints"] = {}
+    said = lab.refused(capsys, described, write_csv(lab.folder / "log.csv", series()))
+    assert "`wrist` is sampled with the joints" in said

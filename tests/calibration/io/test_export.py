@@ -14,7 +14,8 @@ from tests.calibration import matched
 from tests.calibration.test_means import dataset as means_dataset
 from tests.calibration.test_means import means
 
-SIGNALS = ("t_robot", "q_motor", "q_link", "v_motor", "effort", "q_command", "t_mocap", "marker_position", "t_plate")
+READINGS = ("t_robot", "q_motor", "q_link", "v_motor", "effort", "q_command", "wrist_wrench")
+SIGNALS = (*READINGS, "t_mocap", "marker_position", "t_plate")
 PLACES = ("plate_wrench", "plate_centre", "dwell_start", "dwell_stop", "approach")
 
 
@@ -44,7 +45,8 @@ def finished(trial: Trial) -> Trial:
                for t in [getattr(trial, f"t_{i}")]}  # fmt: skip
     link = trial.q_motor + 1e-3
     link[:, 0] = np.nan
-    return replace(trial, marker_position=position, approach=approach, q_link=link, **on_grid)
+    wrist = np.random.default_rng(1).normal(size=(len(link), 6)) * [20.0, 20.0, 20.0, 2.0, 2.0, 2.0]
+    return replace(trial, marker_position=position, approach=approach, q_link=link, wrist_wrench=wrist, **on_grid)
 
 
 def run(*arguments: object) -> None:
