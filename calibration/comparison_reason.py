@@ -22,21 +22,13 @@ def base_reason(errors: Mapping[str, np.ndarray], finding: str) -> str:
     fixed, measured, predicted = (errors[name] for name in ("fixed", "measured", "predicted"))
     moved, missed = _rms(fixed - measured), _rms(predicted - measured)
     stays, left = _rms(fixed), _rms(measured)
-    told = f"the base moved the hand by {moved:.2f} mm per component"
+    told = f"the base moved the hand by {moved:.2f} mm rms per component"
+    even = f"the base measured would leave {left:.2f} mm of {stays:.2f}"
     if finding == "worse" and left >= stays:
-        return (
-            f"{told} against the nominal hand's own errors, which are larger and stay: even with the base measured "
-            f"{left:.2f} mm are left of {stays:.2f}"
-        )
+        return f"{told}, against the larger errors of the nominal hand itself: even {even}"
     if finding == "worse":
-        return (
-            f"{told} and the prediction of it misses by {missed:.2f}; measured, it would leave {left:.2f} mm of "
-            f"{stays:.2f}"
-        )
-    return (
-        f"{told}, predicted within {missed:.2f}; measured, it would leave {left:.2f} mm of {stays:.2f}, the nominal "
-        "hand's own errors"
-    )
+        return f"{told}, its prediction misses that by {missed:.2f} mm; {even}"
+    return f"{told}, predicted to {missed:.2f} mm; {even}, the rest are the nominal hand's own errors"
 
 
 def _rms(e: np.ndarray) -> float:

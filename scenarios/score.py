@@ -22,6 +22,7 @@ from calibration.evaluate import Row, Trace, ladder, row_entry, scored_errors
 from calibration.markers import base_body
 from calibration.metrics import pose_errors
 from scenarios.errors import ScenarioError
+from scenarios.score_base import BaseScore, base_scores
 from twin import truth
 from twin.defects.base import Parameter
 from twin.truth import TruthTrial
@@ -94,14 +95,16 @@ class Score(ParameterScore):
     Attributes:
         rows: The ladder against the truth, floor included.
         skill: Of each row: (registration - row) / (registration - floor) in position RMSE per component [-].
+        base: The base's roll and pitch by source of the wrench.
     """
 
     rows: tuple[Row, ...]
     skill: tuple[float | None, ...]
+    base: tuple[BaseScore, ...] = ()
 
     def _content(self) -> dict[str, object]:
         rows = [row_entry(r) | {"skill": s} for r, s in zip(self.rows, self.skill, strict=True)]
-        return super()._content() | {"rows": rows}
+        return super()._content() | {"rows": rows, "base": [asdict(b) for b in self.base]}
 
 
 def score(estimate: Estimate, dataset: Dataset, truth_folder: Path, evaluation: Evaluation) -> Score:
@@ -114,7 +117,8 @@ def score(estimate: Estimate, dataset: Dataset, truth_folder: Path, evaluation: 
     judged = judge_parameters(estimate.model(estimate.main), _read_parameters(truth_folder / "truth.json"))
     rows = tuple(ladder(list(_traces(estimate, dataset, truth_folder)), "truth"))
     parts: dict[str, Any] = {f.name: getattr(judged, f.name) for f in fields(judged)}
-    return Score(**parts, rows=rows, skill=tuple(_skill(row, rows) for row in rows))
+    base = base_scores(estimate, dataset, truth_folder)
+    return Score(**parts, rows=rows, skill=tuple(_skill(row, rows) for row in rows), base=base)
 
 
 def judge_parameters(model: Model, true: Iterable[Parameter]) -> ParameterScore:

@@ -35,7 +35,7 @@ JOINT, PLAIN = "arm_2_joint", "arm_3_joint"
 REFUSED = "printed form refused: it drifts"
 REGIMES = [
     {"joint": j, "regime": r, "discrepancy_before_mrad": 2.0, "discrepancy_after_mrad": 2.0 * (1 - c / 100)}
-    | {"cut_percent": c, "r2": 0.5, "n": 10}
+    | {"cut_percent": c, "r2": 0.5, "n": 10, "outside_percent": 3.2}
     for j, r, c in (
         (JOINT, "repetition", 85.0),
         (JOINT, "unseen_motion", 40.0),
@@ -169,9 +169,31 @@ def test_the_true_springs_predict_the_axes_that_are_moved(whole):
     assert p.r2[3:5].min() > 0.98
     np.testing.assert_allclose(p.r2[~MOVES], 0.0, atol=1e-9)
     roll = row_of(whole, "The same trial in figures", "roll [mrad]")
-    assert roll[2:4] == [fixed(p.r2[3], 2), fixed(p.r2_middle[3], 2)]
-    assert row_of(whole, "The same trial in figures", "yaw [mrad]")[2] == "left still"
+    assert roll[2] == fixed(np.nanstd(found.measured[found.t <= 1.0, 3]), 2), "noise, by the first second"
+    assert roll[3:5] == [fixed(p.r2[3], 2), fixed(p.r2_middle[3], 2)]
+    assert row_of(whole, "The same trial in figures", "yaw [mrad]")[3] == "left still"
     assert row_of(whole, "The same trial in figures", "yaw [mrad]")[0] == fixed(np.ptp(found.measured[rows, 5]), 2)
+
+
+def test_the_base_is_judged_by_the_truth_where_there_is_one(run):
+    rows = json.loads((run / "evaluation.json").read_text())["rows"]
+    base = [
+        {"source": s, "n": 900, "roll_r2": r, "pitch_r2": 0.9821} for s, r in (("plate", 0.9996), ("dynamics", 0.9))
+    ]
+    (run / "score.json").write_text(json.dumps({"schema": 1, "rows": rows, "base": base}))
+    write(run)
+    said = "noise: from plate R2 of roll 1.000, of pitch 0.982; from dynamics R2 of roll 0.900, of pitch 0.982."
+    assert said in text_of(run)
+
+
+@pytest.mark.parametrize(("rho", "told"), [(50.0, "50.0"), (2.0, "≤ 2.00"), (1000.0, "≥ 1000")])
+def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, told):
+    model, none = known_joint()
+    shutil.rmtree(run / "estimate")
+    save_estimate(known_estimate(joint_models=(replace(model, rho=rho), none)), run / "estimate")
+    write(run)
+    assert row_of(run, "The printed joint model", JOINT)[1].replace("\u202f", "") == told
+    assert row_of(run, "The printed joint model", PLAIN)[1] == "–"
 
 
 def test_yaw_is_told_with_what_stays(whole):
@@ -192,9 +214,19 @@ def test_stiffness_stands_beside_the_truth(whole):
         "estimated",
     ]
     assert row_of(whole, "Stiffness K", "yaw, yaw")[-1] == "not identifiable"
-    found = {e.axes: e for e in stiffness.elements(read(whole))}
+    assert row_of(whole, "Stiffness K", "yaw, yaw")[-2] == "–", "how far off a number is that is of no spring"
+    found = {e.axes: e for e in stiffness.elements(read(whole), "K")}
     assert found["z, z"].unit == "N/m"
     assert "x, z" not in found, "zero in both"
+
+
+def test_damping_stands_beside_the_truth_even_where_nothing_gives(run):
+    true = [[None if i == j == 2 else float(v) for j, v in enumerate(row)] for i, row in enumerate(0.5 * C)]
+    (run / "truth/truth.json").write_text(json.dumps({"derived": {"K": true, "C": true}, "parameters": []}))
+    write(run)
+    table = "Damping C of the base, identified and true"
+    assert row_of(run, table, "roll, roll")[:4] == ["N.m.s/rad", fixed(C[3, 3], 0), "–", fixed(0.5 * C[3, 3], 0)]
+    assert row_of(run, table, "z, z")[3] == "–"
 
 
 def test_wheels_are_told_as_combinations_with_the_rank_of_one_wrench(whole):
@@ -227,8 +259,8 @@ def test_loops_hold_what_the_encoders_said_and_the_model_says(whole, recording):
 
 
 def test_regimes_are_told_joint_by_joint_and_in_sentences(whole):
-    assert row_of(whole, "regime by regime", JOINT) == ["2.00", "0.30", "85", "0.50", "10"]
-    assert row_of(whole, "regime by regime", PLAIN) == ["2.00", "0.18", "91", "0.50", "10"]
+    assert row_of(whole, "regime by regime", JOINT) == ["2.00", "0.30", "85", "0.50", "10", "3"]
+    assert row_of(whole, "regime by regime", PLAIN) == ["2.00", "0.18", "91", "0.50", "10", "3"]
     text = text_of(whole)
     assert "other repetitions: the rms falls by 10 % or more in 2 of 2 joints (by 85 to 91 %)." in text
     assert "Other motions, held out: the rms falls by 10 % or more in 1 of 1 joints (by 40 %)." in text

@@ -88,6 +88,7 @@ class Regime(Entry):
     cut_percent: float
     r2: float
     n: int
+    outside_percent: float = 0.0
 
 
 class TrialErrors(Entry):
@@ -112,10 +113,20 @@ class Evaluation(Entry):
     comparisons: tuple[Compared, ...] = ()
 
 
+class BaseScore(Entry):
+    """R2 of the base's roll and pitch against the truth; see `scenarios.score_base`."""
+
+    source: str
+    n: int
+    roll_r2: float
+    pitch_r2: float
+
+
 class Score(Entry):
     """The whole of score.json."""
 
     rows: tuple[Row, ...]
+    base: tuple[BaseScore, ...] = ()
     parameters: tuple[Scored, ...] = ()
     combinations: tuple[Scored, ...] = ()
     nees: float | None = None
@@ -123,9 +134,10 @@ class Score(Entry):
 
 
 class Derived(Entry):
-    """What follows from the true parameters; K (6, 6), see `calibration.suspension`."""
+    """What follows from the true parameters; K and C (6, 6), see `calibration.suspension`, None where nothing gives."""
 
-    K: tuple[tuple[float, ...], ...] | None = None
+    K: tuple[tuple[float | None, ...], ...] | None = None
+    C: tuple[tuple[float | None, ...], ...] | None = None
 
 
 class Truth(Entry):

@@ -45,7 +45,9 @@ def section(results: Results, steps: Sequence[Step]) -> Section:
         "held_out_yaw": paper.held_out_yaw(results),
         "suspension_form": suspension.form if suspension else "",
         "suspension_said": stiffness.said(results),
-        "elements": stiffness.elements(results),
+        "elements": stiffness.elements(results, "K"),
+        "damping": stiffness.elements(results, "C"),
+        "base_scores": results.score.base if results.score else (),
         "structures": stiffness.structures(results.description),
         "wheel_combinations": stiffness.combinations(results),
         "loops": looped,
@@ -62,8 +64,28 @@ def section(results: Results, steps: Sequence[Step]) -> Section:
         "joint": _diagram(joint_chain, *JOINT_CHAIN),
         "loops": loops.drawn(looped),
     }
-    names = ("protocols", "comparisons", "loads", "sway", "stiffness", "held_out", "wheels", "joints", "regimes")
-    contents = ("protocols", "comparisons", "load_rows", "sway_axes", "elements", "axis_lines", "wheel_combinations")
+    names = (
+        "protocols",
+        "comparisons",
+        "loads",
+        "sway",
+        "stiffness",
+        "damping",
+        "held_out",
+        "wheels",
+        "joints",
+        "regimes",
+    )
+    contents = (
+        "protocols",
+        "comparisons",
+        "load_rows",
+        "sway_axes",
+        "elements",
+        "damping",
+        "axis_lines",
+        "wheel_combinations",
+    )
     tables = zip(names, (values[c] for c in (*contents, "joint_lines", "regimes")), strict=True)
     return Section(values, figures, tuple(tables))
 

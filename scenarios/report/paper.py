@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from scenarios.report import figures
+from calibration.joint_model import JointModel
+from calibration.joint_projection import limit_of
+from scenarios.report import figures, numbers
 from scenarios.report.ladder import Step
 from scenarios.report.results import Results
 
@@ -22,11 +24,14 @@ _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 @dataclass(frozen=True)
 class JointLine:
-    """What the joint model of one joint is: degree (none: no correction), rho [s/rad], R2, discrepancy rms [mrad]."""
+    """What the joint model of one joint is: degree (none: no correction), rho [s/rad], R2, discrepancy rms [mrad].
+
+    `rho` says so where the search for it ended at a limit.
+    """
 
     joint: str
     degree: str
-    rho: float
+    rho: str
     rms: float
     r2: float
     r2_out: float
@@ -79,13 +84,20 @@ def joint_lines(results: Results) -> tuple[JointLine, ...]:
         JointLine(
             m.joint,
             "none" if m.degree is None else str(m.degree),
-            m.rho,
+            _rho(m),
             1e3 * m.quality.rms,
             m.quality.r2,
             m.quality.r2_out,
         )
         for m in models
     )
+
+
+def _rho(model: JointModel) -> str:
+    if model.degree is None:
+        return numbers.fixed(None, 0)
+    at = {"lowest": "≤ ", "highest": "≥ ", None: ""}[limit_of(model.rho)]
+    return at + numbers.significant(model.rho)
 
 
 def suspension_sources(results: Results) -> tuple[str, ...]:

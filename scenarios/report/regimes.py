@@ -35,12 +35,17 @@ def by_regime(regimes: Sequence[Regime]) -> tuple[RegimeRows, ...]:
 
 def _sentence(meaning: str, rows: Sequence[Regime]) -> str:
     cuts = [r.cut_percent for r in rows if r.cut_percent >= _HELPS]
-    harmed, as_it_was = (
+    harmed, as_it_was, hardly = (
         ", ".join(r.joint.removesuffix("_joint") for r in rows if chosen(r))
-        for chosen in (lambda r: r.cut_percent < 0.0, lambda r: r.cut_percent == 0.0)
+        for chosen in (
+            lambda r: r.cut_percent < 0.0,
+            lambda r: r.cut_percent == 0.0,
+            lambda r: 0.0 < r.cut_percent < _HELPS,
+        )
     )
     text = f"{meaning}: the rms falls by 10 % or more in {len(cuts)} of {len(rows)} joints"
     if cuts:
         text += f" (by {min(cuts):.0f} to {max(cuts):.0f} %)" if len(cuts) > 1 else f" (by {cuts[0]:.0f} %)"
+    text += f", by less in {hardly}" if hardly else ""
     text += f", grows in {harmed}" if harmed else ""
     return text + (f", is left as it is in {as_it_was}." if as_it_was else ".")

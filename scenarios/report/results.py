@@ -14,7 +14,7 @@ from ruamel.yaml.error import YAMLError
 import calibration
 from calibration.schema import Description
 from scenarios.errors import ScenarioError
-from scenarios.report.entries import Evaluation, ScenarioNote, Score, Truth
+from scenarios.report.entries import Derived, Evaluation, ScenarioNote, Score, Truth
 from scenarios.report.recordings import Recorded, recorded
 from scenarios.report.traces import Trace, read_traces
 
@@ -30,7 +30,8 @@ class Results:
         traces: Errors of each row in each trial, in the order of the file.
         score: Errors against the truth, where it is known.
         estimate: What the calibration found.
-        stiffness: The true K of the base on its wheels, where it is known.
+        stiffness: The true K of the base on its wheels, where it is known; NaN where nothing gives.
+        damping: The true C.
         scenario: Name, seed and versions.
         dataset: The recordings.
         recorded: The trials, in the order of dataset.json.
@@ -43,6 +44,7 @@ class Results:
     score: Score | None
     estimate: calibration.Estimate | None
     stiffness: np.ndarray | None
+    damping: np.ndarray | None
     scenario: ScenarioNote
     dataset: calibration.Dataset | None
     recorded: tuple[Recorded, ...]
@@ -68,13 +70,16 @@ def read(run: Path) -> Results:
     estimate, dataset, picture = run / "estimate", run / "dataset", run / "figures" / "twin.png"
     loaded = calibration.load(dataset) if (dataset / "dataset.json").is_file() else None
     trials = loaded.description.trials if loaded else ()
+    truth = run / "truth" / "truth.json"
+    derived = _json(truth, Truth).derived if truth.is_file() else Derived()
     return Results(
         evaluation=_json(evaluation, Evaluation),
         traces=read_traces(run / "evaluation.nc"),
         score=_json(run / "score.json", Score) if (run / "score.json").is_file() else None,
         estimate=calibration.load_estimate(estimate) if (estimate / "estimate.json").is_file() else None,
         scenario=_scenario(run / "scenario.yaml"),
-        stiffness=_stiffness(run / "truth" / "truth.json"),
+        stiffness=_matrix(derived.K),
+        damping=_matrix(derived.C),
         dataset=loaded,
         recorded=tuple(recorded(dataset / t.file, t) for t in trials),
         sha256=hashlib.sha256((dataset / "dataset.json").read_bytes()).hexdigest() if loaded else None,
@@ -82,9 +87,8 @@ def read(run: Path) -> Results:
     )
 
 
-def _stiffness(path: Path) -> np.ndarray | None:
-    K = _json(path, Truth).derived.K if path.is_file() else None
-    return None if K is None else np.array(K)
+def _matrix(rows: tuple[tuple[float | None, ...], ...] | None) -> np.ndarray | None:
+    return None if rows is None else np.array(rows, dtype=float)
 
 
 def _json(path: Path, model: type[M]) -> M:

@@ -1,7 +1,8 @@
-"""The base's stiffness: each element of K identified beside the true one, and what one wrench tells of the wheels."""
+"""The base's springs: elements of K and C, identified beside true, and what one wrench tells of the wheels."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -12,16 +13,17 @@ from calibration.suspension_wheels import Point, wheel_model
 from scenarios.report.results import Results
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+_UNITS = {"K": ("N/m", "N", "N.m/rad"), "C": ("N.s/m", "N.s", "N.m.s/rad")}
 _TINY = 1e-9  # of the geometric mean of the diagonal pair: an element that is none [-]
 
 
 @dataclass(frozen=True)
 class Element:
-    """One element of K, with its transpose.
+    """One element of K or C, with its transpose.
 
     Attributes:
         axes: Of force or moment, and of displacement or rotation.
-        unit: `N/m`, `N` (per radian) or `N.m/rad`.
+        unit: `N/m`, `N` (per radian) or `N.m/rad`; of C times seconds.
         value: Identified.
         sigma: Its standard deviation, None where not known.
         status: `estimated`, or why not.
@@ -37,8 +39,8 @@ class Element:
 
     @property
     def departure(self) -> float | None:
-        """Identified over true, minus one [%]; None where there is no truth or it is zero."""
-        return None if not self.truth else 100.0 * (self.value / self.truth - 1.0)
+        """Identified over true, minus one [%]; None where not identified, or the truth is zero or not known."""
+        return None if not self.truth or self.status != "estimated" else 100.0 * (self.value / self.truth - 1.0)
 
 
 @dataclass(frozen=True)
@@ -60,10 +62,14 @@ class WheelCombination:
     sigma: float
 
 
-def elements(results: Results) -> tuple[Element, ...]:
-    """The upper triangle of K as far as it is not zero in both; none without a suspension."""
+def elements(results: Results, letter: Literal["K", "C"]) -> tuple[Element, ...]:
+    """The upper triangle of K or C as far as it is not zero in both; none without a suspension."""
     suspension = results.estimate.suspension if results.estimate else None
-    return () if suspension is None else tuple(_elements(suspension.K, _model(results), results.stiffness))
+    if suspension is None:
+        return ()
+    truth = results.stiffness if letter == "K" else results.damping
+    found = suspension.K if letter == "K" else suspension.C
+    return tuple(_elements(letter, found, _model(results), truth))
 
 
 def _model(results: Results) -> Model:
@@ -72,16 +78,16 @@ def _model(results: Results) -> Model:
     return next((m for m in models if m.name == "model_1"), Model("model_1", ()))
 
 
-def _elements(K: np.ndarray, model: Model, truth: np.ndarray | None) -> Iterator[Element]:
+def _elements(letter: str, matrix: np.ndarray, model: Model, truth: np.ndarray | None) -> Iterator[Element]:
     known = {p.name: p for p in model.parameters}
-    root = np.sqrt(np.abs(np.diag(K)))
+    root = np.sqrt(np.abs(np.diag(matrix)))
     for i in range(6):
         for j in range(i, 6):
-            p, true = known.get(f"suspension.K.{i + 1}{j + 1}"), None if truth is None else float(truth[i, j])
-            if p is not None or true or abs(K[i, j]) > _TINY * root[i] * root[j]:
-                unit = ("N/m", "N", "N.m/rad")[(i >= 3) + (j >= 3)]
+            p, true = known.get(f"suspension.{letter}.{i + 1}{j + 1}"), None if truth is None else float(truth[i, j])
+            if p is not None or true or abs(matrix[i, j]) > _TINY * root[i] * root[j]:
+                unit = _UNITS[letter][(i >= 3) + (j >= 3)]
                 status = str(p.status).replace("_", " ") if p else "zero by the wheels' geometry"
-                yield Element(f"{AXES[i]}, {AXES[j]}", unit, float(K[i, j]), p.sigma if p else None, status, true)
+                yield Element(f"{AXES[i]}, {AXES[j]}", unit, float(matrix[i, j]), p.sigma if p else None, status, true)
 
 
 def structures(description: Description | None) -> tuple[Structure, ...]:

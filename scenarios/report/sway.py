@@ -88,6 +88,11 @@ class Sway:
         """Where the base stands in the last second (6,) [mm, mrad]; it began at zero."""
         return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - REFERENCE], axis=0))
 
+    @property
+    def noise(self) -> np.ndarray:
+        """Rms (6,) [mm, mrad] of the markers' noise, by the first second at rest."""
+        return np.asarray(np.nanstd(self.measured[self.t <= REFERENCE], axis=0))
+
     def left(self, predicted: Predicted) -> np.ndarray:
         """Rms (6,) [mm, mrad] that a prediction leaves."""
         return np.sqrt(((self.measured - predicted.x)[self.scored] ** 2).mean(axis=0))
@@ -102,6 +107,7 @@ class AxisSway:
         unit: Of what follows.
         spread: Peak to peak of what was measured.
         shifted: Where it stands in the end, measured.
+        noise: Rms of the markers' noise.
         found: By source of the wrench: R2 and that of the middle half, None where the axis is left still, and the rms
             that is left.
     """
@@ -110,6 +116,7 @@ class AxisSway:
     unit: str
     spread: float
     shifted: float
+    noise: float
     found: tuple[tuple[float | None, float | None, float], ...]
 
 
@@ -150,13 +157,14 @@ def _of_trial(prepared: Predictor, suspension: Suspension, entry: TrialEntry, tr
 
 def lines(found: Sway) -> tuple[AxisSway, ...]:
     """The axes in order."""
-    spread, left = found.spread, {p.source: found.left(p) for p in found.predicted}
+    spread, noise, left = found.spread, found.noise, {p.source: found.left(p) for p in found.predicted}
     return tuple(
         AxisSway(
             AXES[k],
             UNITS[k],
             float(spread[k]),
             float(found.shifted[k]),
+            float(noise[k]),
             tuple((*_moved(p, k), float(left[p.source][k])) for p in found.predicted),
         )
         for k in range(6)

@@ -40,9 +40,9 @@ def test_what_is_not_there_is_not_compared(common):
 @pytest.mark.parametrize(
     ("share", "against", "finding", "said"),
     [
-        (1.0, 1.0, "better", "moved the hand by 1.00 mm per component, predicted within 0.00"),
-        (1.0, -1.0, "worse", "even with the base measured 10.00 mm are left of 9.00"),
-        (-2.0, 1.0, "worse", "the prediction of it misses by 3.00; measured, it would leave 10.00 mm of 11.00"),
+        (1.0, 1.0, "better", "moved the hand by 1.00 mm rms per component, predicted to 0.00 mm"),
+        (1.0, -1.0, "worse", "even the base measured would leave 10.00 mm of 9.00"),
+        (-2.0, 1.0, "worse", "its prediction misses that by 3.00 mm; the base measured would leave 10.00 mm of 11.00"),
     ],
 )
 def test_why_moving_the_base_helps_or_does_not_is_said_in_figures(share, against, finding, said):
