@@ -127,7 +127,10 @@ def test_other_programs_open_every_file(result):
 
 def test_roll_and_pitch_of_the_base_are_predicted_from_the_plate(result, base_r2):
     """Without its markers beyond the first second, on swings no stage has seen; inverse dynamics: test_seeds.py."""
-    assert base_r2(result.folder, result.estimate, "plate").min() >= 0.95
+    r2 = base_r2(result.folder, result.estimate, "plate")
+    assert r2.min() >= 0.95
+    told = {b["source"]: b for b in json.loads((result.folder / "score.json").read_text())["base"]}
+    assert [told["plate"]["roll_r2"], told["plate"]["pitch_r2"]] == pytest.approx(r2, rel=1e-9)
 
 
 def test_the_papers_models_keep_their_order(rows):
@@ -147,6 +150,8 @@ def test_one_estimate_is_scored_under_both_protocols(result):
     ]
     told = {(x["joint"], x["regime"]): x for x in found["regimes"]}
     assert {(f"arm_{k}_joint", r) for k in range(1, 8) for r in ("unseen_motion", "static")} <= told.keys()
+    excited = [x for (_, regime), x in told.items() if regime == "repetition"]
+    assert excited and all(x["cut_percent"] >= 60.0 and x["r2"] >= 0.85 for x in excited)
     assert all(x["n"] > 0 and x["discrepancy_before_mrad"] > 0.0 for x in told.values())
     better = {tuple(c["b"]): c["finding"] for c in found["comparisons"]}
     assert better["model_2", "plate"] == "better"
