@@ -20,6 +20,7 @@ from calibration.comparison import comparisons
 from calibration.dataset import Dataset
 from calibration.errors import NotEnoughData
 from calibration.estimate import Estimate
+from calibration.evaluation_checks import moved_in_trials
 from calibration.joint_regimes import Explained, on_repetitions, on_validation
 from calibration.markers import hand_body
 from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics
@@ -29,6 +30,7 @@ from calibration.protocols import protocol_rows
 from calibration.recording import Trial
 from calibration.reregistration import registration_trials, reregistered
 from calibration.schema import Role, TrialEntry
+from calibration.verdict import Verdict
 
 Trials = Literal["dynamic", "static", "all"]
 
@@ -75,12 +77,14 @@ class Evaluation:
     """The ladder, the errors it is made of, and what the joint models explain of each joint's discrepancy.
 
     `confirmation` is the ladder of another session, its marker bodies registered anew; empty where there is none.
+    `verdicts` name trials whose errors are not the model's.
     """
 
     rows: tuple[Row, ...]
     traces: tuple[Trace, ...]
     regimes: tuple[Explained, ...] = ()
     confirmation: tuple[Row, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
 
     def row(self, model: str, trials: Trials = "dynamic", base: str = "fixed", encoder: str = "motor") -> Row:
         """One line.
@@ -106,6 +110,7 @@ class Evaluation:
             "trials": [trial_entry(t) for t in self.traces],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
             "regimes": [x.entry() for x in self.regimes],
+            "verdicts": [asdict(v) for v in self.verdicts],
             "comparisons": [asdict(c) for c in comparisons(self.traces)],
         }
         part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
@@ -138,7 +143,8 @@ def evaluate(
     if progress is not None:
         progress("joint models", 1.0)
     rows, confirmation = tuple(ladder(traces, "mocap")), tuple(ladder(confirmed, "mocap"))
-    return Evaluation(rows, tuple(traces), regimes(predict, dataset, role), confirmation)
+    moved = tuple(moved_in_trials(dataset.description, dataset.trials(role)))
+    return Evaluation(rows, tuple(traces), regimes(predict, dataset, role), confirmation, moved)
 
 
 def _traces(

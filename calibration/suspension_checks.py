@@ -79,11 +79,15 @@ def moved_bases(sways: Sequence[Sway]) -> dict[str, str]:
     """Trials after which the base stands elsewhere, and by how much."""
     found = {}
     for sway in sways:
-        after = sway.x[-int(0.5 * REST * RATE) :].mean(axis=0)
-        shift, turn = float(np.linalg.norm(after[:3])), float(np.linalg.norm(after[3:]))
-        if shift > _SHIFTED or turn > _TWISTED:
-            found[sway.trial_id] = f"{1e3 * shift:.1f} mm, {1e3 * turn:.0f} mrad"
+        if how := moved_by(sway.x[-int(0.5 * REST * RATE) :].mean(axis=0)):
+            found[sway.trial_id] = how
     return found
+
+
+def moved_by(after: np.ndarray) -> str:
+    """By how much a base moved that stands at (6,) [m, rad] from where it rested before; empty if slip explains it."""
+    shift, turn = float(np.linalg.norm(after[:3])), float(np.linalg.norm(after[3:]))
+    return f"{1e3 * shift:.1f} mm, {1e3 * turn:.0f} mrad" if shift > _SHIFTED or turn > _TWISTED else ""
 
 
 def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> tuple[np.ndarray, np.ndarray]:

@@ -64,7 +64,7 @@ def run(
         console.show(console.verdicts([v for v in result.estimate.verdicts if v.stage in ("base_frame", "arm_tool")]))
         console.show(table)
     console.show(console.ladder(out))
-    for line in console.reasons(out):
+    for line in console.remarks(out):
         typer.echo(line)
     console.show(console.confirmation(out))
     typer.echo(f"\nReport: {out / 'report.html'}")
@@ -122,7 +122,7 @@ def evaluate(
     with console.progress() as progress:
         steps.evaluate(estimate, dataset, out, truth, progress)
     console.show(console.ladder(out))
-    for line in console.reasons(out):
+    for line in console.remarks(out):
         typer.echo(line)
     console.show(console.confirmation(out))
 

@@ -141,10 +141,11 @@ def frames(results: Path) -> Table | None:
     return table
 
 
-def reasons(results: Path) -> list[str]:
-    """Return one line for each row that is told to be worse than the one it builds on, and why."""
-    found = json.loads((results / "evaluation.json").read_text(encoding="utf-8")).get("comparisons", [])
-    return [
+def remarks(results: Path) -> list[str]:
+    """Return what to know of the figures: trials that are not the model's, rows worse than those they build on."""
+    evaluation = json.loads((results / "evaluation.json").read_text(encoding="utf-8"))
+    found = evaluation.get("comparisons", [])
+    return [v["message"] for v in evaluation.get("verdicts", [])] + [
         f"{c['b'][0]} ({c['b'][1]}) is worse than {c['a'][0]} by {c['difference_mm']:.2f} mm"
         + (f": {c['reason']}" if c.get("reason") else "")
         for c in found

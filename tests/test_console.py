@@ -96,6 +96,9 @@ def test_a_row_that_is_worse_is_told_with_its_reason(tmp_path):
     ]
     (tmp_path / "evaluation.json").write_text(json.dumps({"rows": [], "comparisons": rows}))
     told = "model_1 (plate) is worse than nominal by 0.12 mm"
-    assert console.reasons(tmp_path) == [f"{told}: the base moved the hand by 0.40 mm", told]
+    assert console.remarks(tmp_path) == [f"{told}: the base moved the hand by 0.40 mm", told]
+    moved = [{"stage": "evaluation", "verdict": "warning", "message": "base moved during xyz"}]
+    (tmp_path / "evaluation.json").write_text(json.dumps({"rows": [], "verdicts": moved}))
+    assert console.remarks(tmp_path) == ["base moved during xyz"]
     (tmp_path / "evaluation.json").write_text(json.dumps({"rows": []}))
-    assert console.reasons(tmp_path) == []
+    assert console.remarks(tmp_path) == []

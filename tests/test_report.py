@@ -346,6 +346,14 @@ def test_intervals_that_are_too_narrow_are_told(run, plain):
     assert "Warning, uncertainty: the 95 % intervals are too narrow" in Page(run / "report.html").text
 
 
+def test_what_the_evaluation_says_of_its_trials_comes_first(run, plain):
+    content = json.loads((run / "evaluation.json").read_text())
+    content["verdicts"] = [{"stage": "evaluation", "verdict": "warning", "message": "base moved during xyz"}]
+    (run / "evaluation.json").write_text(json.dumps(content))
+    write(run)
+    assert "Warning, evaluation: base moved during xyz" in Page(run / "report.html").text
+
+
 def test_static_trials_alone_are_enough(run, plain):
     found = [t for t in traces() if t.kind == "static"]
     Evaluation(tuple(ladder(found, "mocap")), tuple(found)).save(run)

@@ -91,6 +91,14 @@ class Regime(Entry):
     outside_percent: float = 0.0
 
 
+class Said(Entry):
+    """What the evaluation has to say of its trials; see `calibration.verdict`."""
+
+    stage: str
+    verdict: str
+    message: str
+
+
 class TrialErrors(Entry):
     """A row of the ladder in one trial."""
 
@@ -111,6 +119,7 @@ class Evaluation(Entry):
     regimes: tuple[Regime, ...] = ()
     protocols: tuple[Protocol, ...] = ()
     comparisons: tuple[Compared, ...] = ()
+    verdicts: tuple[Said, ...] = ()
 
 
 class BaseScore(Entry):

@@ -14,6 +14,7 @@ from scenarios.report.results import Results
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 _UNITS = {"K": ("N/m", "N", "N.m/rad"), "C": ("N.s/m", "N.s", "N.m.s/rad")}
+_NOISE = 0.5  # sigma over the truth above which a departure is noise [-]
 _TINY = 1e-9  # of the geometric mean of the diagonal pair: an element that is none [-]
 
 
@@ -39,8 +40,10 @@ class Element:
 
     @property
     def departure(self) -> float | None:
-        """Identified over true, minus one [%]; None where not identified, or the truth is zero or not known."""
-        return None if not self.truth or self.status != "estimated" else 100.0 * (self.value / self.truth - 1.0)
+        """Identified over true, minus one [%]; None where it would say nothing: not identified, no truth, or noise."""
+        if not self.truth or self.status != "estimated" or (self.sigma or 0.0) > _NOISE * abs(self.truth):
+            return None
+        return 100.0 * (self.value / self.truth - 1.0)
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def notices(results: Results, steps: Sequence[Step], covered: tuple[int, int]) -
         steps: Its ladder.
         covered: How many 95 % intervals hold the truth, and of how many; (0, 0) where no truth is known.
     """
-    found = results.estimate.verdicts if results.estimate else ()
+    found = (*(results.estimate.verdicts if results.estimate else ()), *results.evaluation.verdicts)
     said = [Notice(v.verdict, v.stage, v.message) for v in found if v.verdict != "ok"]
     said += [*_no_gain(steps, headline_model(results, steps)), *_too_narrow(*covered)]
     return tuple(sorted(said, key=lambda notice: ("refused", "missing", "warning").index(notice.level)))

@@ -160,3 +160,17 @@ def test_recordings_survive_their_files(dataset, tmp_path):
     again = read_trial(tmp_path / "again.nc", trial.id)
     np.testing.assert_array_equal(again.t_robot, trial.t_robot)
     np.testing.assert_array_equal(again.marker_position, trial.marker_position)
+
+
+def test_a_held_out_trial_in_which_the_base_was_moved_is_named(estimate, evaluation, folder, tmp_path):
+    def push(trial):
+        p = trial.marker_position.copy()
+        p[trial.t_mocap > trial.t_mocap.mean()] += [0.02, 0.0, 0.0]
+        return replace(trial, marker_position=p)
+
+    found = evaluate(estimate, load(rewritten(folder, tmp_path / "copy", {"xyz": push})))
+    found.save(tmp_path)
+    told = json.loads((tmp_path / "evaluation.json").read_text())["verdicts"]
+    assert [(v["stage"], v["verdict"]) for v in told] == [("evaluation", "warning")]
+    assert "base moved during xyz by 20.0 mm, 0 mrad" in told[0]["message"] and "others" not in told[0]["message"]
+    assert evaluation.verdicts == ()
