@@ -150,8 +150,6 @@ def test_one_estimate_is_scored_under_both_protocols(result):
     ]
     told = {(x["joint"], x["regime"]): x for x in found["regimes"]}
     assert {(f"arm_{k}_joint", r) for k in range(1, 8) for r in ("unseen_motion", "static")} <= told.keys()
-    excited = [x for (_, regime), x in told.items() if regime == "repetition"]
-    assert excited and all(x["cut_percent"] >= 60.0 and x["r2"] >= 0.85 for x in excited)
     assert all(x["n"] > 0 and x["discrepancy_before_mrad"] > 0.0 for x in told.values())
     better = {tuple(c["b"]): c["finding"] for c in found["comparisons"]}
     assert better["model_2", "plate"] == "better"
