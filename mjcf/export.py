@@ -1,4 +1,4 @@
-"""URDF text of a compiled robot: kinematics, inertias and limits, to the last digit.
+"""URDF text of a compiled robot: kinematics, inertias, limits and shapes, to the last digit.
 
 A body becomes a link, its placement in its parent the origin of a joint of the same frame. Inertias, kept by MuJoCo in
 principal axes, are turned back into the link's:
@@ -18,6 +18,7 @@ import numpy as np
 
 from .nominal import ROOT, spec
 from .rotations import rpy_from_matrix
+from .shapes import collisions
 
 
 class NotAUrdfTree(ValueError):
@@ -60,18 +61,24 @@ def _subtree(model: mujoco.MjModel, root_id: int) -> list[int]:
 
 
 def _link(model: mujoco.MjModel, body_id: int) -> ET.Element:
-    """Return the link of a body: its inertia about the centre of mass, in link axes."""
+    """Return the link of a body: its inertia about the centre of mass, in link axes, and its shapes."""
     link = ET.Element("link", name=model.body(body_id).name)
-    if model.body_mass[body_id] == 0.0:
-        return link
+    if model.body_mass[body_id] > 0.0:
+        link.append(_inertial(model, body_id))
+    link.extend(collisions(model, body_id, _text))
+    return link
+
+
+def _inertial(model: mujoco.MjModel, body_id: int) -> ET.Element:
+    """Return mass, centre of mass and inertia about it."""
+    inertial = ET.Element("inertial")
     R = _matrix(model.body_iquat[body_id])
     inertia = R @ np.diag(model.body_inertia[body_id]) @ R.T
-    inertial = ET.SubElement(link, "inertial")
     ET.SubElement(inertial, "origin", xyz=_text(model.body_ipos[body_id]), rpy="0 0 0")
     ET.SubElement(inertial, "mass", value=_text([model.body_mass[body_id]]))
     upper = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
     ET.SubElement(inertial, "inertia", {name: _text([inertia[ij]]) for name, ij in upper.items()})
-    return link
+    return inertial
 
 
 def _joint(model: mujoco.MjModel, body_id: int) -> ET.Element:
