@@ -21,7 +21,7 @@ from calibration.information import Prospect
 Criterion = Literal["D", "E", "G"]
 _POWER = 8
 _WORST = 5  # directions the largest eigenvalue is sought in
-_SWEEPS = 4
+_SWEEPS = 3
 _BETTER = 1e-4  # relative change of the criterion that is worth an exchange [-]
 
 

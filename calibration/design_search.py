@@ -15,8 +15,8 @@ from calibration.information import Prospect
 
 _POOL = 500
 _WIDTHS = (0.12, 0.05)  # of a joint's range, of the neighbours of the second and third choice [-]
-_NEIGHBOURS = 500
-_AT = 150  # postures the hand is predicted at
+_NEIGHBOURS = 400
+_AT = 120  # postures the hand is predicted at
 
 
 @dataclass(frozen=True)

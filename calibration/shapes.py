@@ -1,8 +1,8 @@
 """Where a robot would touch itself or the floor: the collision shapes of its URDF.
 
 Shapes of one joint's links, or of two joints next to each other, are never checked, nor are pairs that touch in four
-of five postures asked about: they are joined. Markers count as small spheres on their links. Meshes are left out, since a URDF
-read from a recording comes without its files. Distances below a clearance count as contact.
+of five postures asked about: they are joined. Markers count as small spheres on their links. Meshes are left out, since
+a URDF read from a recording comes without its files. Distances below a clearance count as contact.
 """
 
 import xml.etree.ElementTree as ET

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios import command_dataset, command_exchange, command_look, command_picture, command_study
+from scenarios import command_dataset, command_design, command_exchange, command_look, command_picture, command_study
 from scenarios.errors import ScenarioError
 from scenarios.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
 
@@ -140,6 +140,7 @@ def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
 import_ = app.command("import")(command_exchange.import_)
 export = app.command()(command_exchange.export)
 dataset = app.command()(command_dataset.dataset)
+design = app.command()(command_design.design)
 study = app.command()(command_study.study)
 look = app.command()(command_look.look)
 picture = app.command()(command_picture.picture)

@@ -1,0 +1,114 @@
+"""Postures to record: chosen for what they tell, with the side each joint comes from, in an order to drive them."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from calibration.design import Criterion
+from calibration.design_pool import Room, room_of
+from calibration.design_search import Design, search
+from calibration.design_sides import Sides, sides
+from calibration.design_tour import Tour, tour
+from calibration.hand import HandModel, nominal_hand
+from calibration.information import prospect
+from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
+from calibration.remedy import Posture, Remedy, Sigma
+from calibration.robot import chain_of
+from calibration.schema import Description
+from calibration.shapes import shapes_of
+
+_RANDOM = 100  # sets of random postures the design is compared with
+_FRESH = 300  # postures the comparison predicts the hand at
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be found, of which robot.
+
+    Attributes:
+        room: Where postures may be.
+        model: The robot as far as it is known.
+        parameters: To be found, with tolerances.
+        play: (k,) random error of each joint's reading [rad, m].
+    """
+
+    room: Room
+    model: HandModel
+    parameters: ParameterSet
+    play: np.ndarray
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Worst-case predicted error of the hand over postures nothing was chosen by [m].
+
+    Attributes:
+        designed: After the design.
+        random: (m,) after as many random postures of the same room.
+    """
+
+    designed: float
+    random: np.ndarray
+
+    @property
+    def gain(self) -> float:
+        """1 - designed / median of random [-]."""
+        return float(1.0 - self.designed / np.median(self.random))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A design with what to know about it."""
+
+    task: Task
+    design: Design
+    sides: Sides
+    tour: Tour
+
+    @property
+    def postures(self) -> tuple[Posture, ...]:
+        """In the order to record them."""
+        chain, q = self.task.model.chain, self.design.q
+        approach = np.zeros(q.shape, dtype=int)
+        approach[:, chain.columns] = self.sides.approach
+        rows = zip(q[self.tour.order], approach[self.tour.order], strict=True)
+        return tuple(Posture(tuple(map(float, a)), tuple(int(s) for s in b)) for a, b in rows)  # type: ignore[misc]
+
+    def remedy(self, stage: str, why: str, names: tuple[str, ...] | None = None) -> Remedy:
+        """The postures with the standard deviations of these parameters (all, where none is named)."""
+        p, prospect_ = self.task.parameters, self.design.prospect
+        rows = zip(p.names, p.units, prospect_.sigma(prospect_.C), prospect_.sigma(self.design.C), strict=True)
+        told = tuple(Sigma(n, u, float(a), float(b)) for n, u, a, b in rows if names is None or n in names)
+        return Remedy(stage, why, self.postures, sigma=told)
+
+
+def nominal_task(urdf: str, description: Description, rng: np.random.Generator) -> Task:
+    """The geometry of a robot of which only the datasheet is known."""
+    chain = chain_of(urdf, description)
+    parameters = geometry_parameters(chain, description)
+    play = np.maximum(play_start(chain, description), play_floor(chain, description))
+    room = room_of(shapes_of(urdf, chain, description), description, rng)
+    return Task(room, nominal_hand(chain, parameters.nominal[:12]), parameters, play)
+
+
+def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> Plan:
+    """Choose n postures.
+
+    Raises:
+        NotEnoughData: The robot has hardly any posture clear of itself and in sight.
+    """
+    at = partial(prospect, task.model, task.parameters, task.room.description, task.play)
+    found = search(task.room, at, n, criterion, rng)
+    return Plan(task, found, sides(found.prospect, found.chosen, task.play, rng), tour(found.q, task.room.shapes))
+
+
+def compared(found: Plan, rng: np.random.Generator) -> Comparison:
+    """The design against random postures of its room, the hand predicted at postures new to both."""
+    task, n = found.task, len(found.design.chosen)
+    drawn = task.room.pool(_FRESH + 4 * n, rng)
+    q = np.concatenate([drawn[_FRESH:], found.design.q])
+    p = prospect(task.model, task.parameters, task.room.description, task.play, q, drawn[:_FRESH])
+    sets = [rng.choice(4 * n, n, replace=False) for _ in range(_RANDOM)]
+    random = np.array([p.hand(p.after(rows)).max() for rows in sets])
+    return Comparison(float(p.hand(p.after(4 * n + np.arange(n))).max()), random)

@@ -1,0 +1,44 @@
+"""The command `design`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from scenarios.errors import ScenarioError
+from scenarios.options import Overrides, ScenarioName, Seed, overriding
+
+
+def design(
+    scenario: ScenarioName,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The YAML file to write.")],
+    n: Annotated[int, typer.Option("-n", min=5, max=500, metavar="N", help="How many postures.")] = 30,
+    criterion: Annotated[
+        Literal["D", "E", "G"],
+        typer.Option(help="D: least volume; E: least worst direction; G: least worst-case error of the hand."),
+    ] = "G",
+    seed: Seed = None,
+    overrides: Overrides = None,
+) -> None:
+    """Choose the postures that calibrate best, and the side each joint comes from."""
+    from scenarios import console, steps
+    from scenarios.design import design as designed
+
+    if out.is_dir():
+        raise ScenarioError(f"{out}: is a folder; name a file")
+    with console.progress() as progress:
+        progress("design", "", 0.0)
+        found = designed(steps.load(scenario, overriding(overrides, seed)), n, criterion, out)
+    plan, against = found.plan, found.comparison
+    typer.echo(
+        f"{n} postures, {plan.design.prospect.B.shape[2]} identifiable combinations; predicted error of the hand at "
+        f"worst {1e3 * against.designed:.2f} mm, {100.0 * against.gain:.0f} % below the median of "
+        f"{len(against.random)} random sets"
+    )
+    typer.echo(
+        f"Sides: the joints' play would move it by {1e3 * plan.sides.one_sided.max():.2f} mm if every joint always "
+        f"came from below, by {1e3 * plan.sides.bias.max():.2f} mm as told in the file"
+    )
+    if plan.tour.contact:
+        typer.echo(f"Not reached by a straight move clear of the robot: postures {list(plan.tour.contact)} (from 0)")
+    typer.echo(f"Postures: {out}")
