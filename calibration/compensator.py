@@ -11,7 +11,7 @@ flank and of left-out trials; v what the suspension left of trials it had not se
 The geometry is that of the estimate's main model, as in calibrated.urdf.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from calibration.joint_correction import JointModels, correct
 from calibration.joint_inputs import input_model, velocities
 from calibration.loaded_base import BaseState, LoadedBase, loaded_base
 from calibration.parameters import AXES, parameter_names
+from calibration.predicted_points import Predicted, Session, Spread, predicted_points
 from calibration.robot import Chain, chain_of_frames
 from calibration.schema import Description
 from calibration.se3 import from_vector
@@ -56,6 +57,7 @@ class Compensator:
         hand: The calibrated robot.
         covariance: (p, p) of its first p parameters, in the order of `HandModel.theta`; the others are known.
         play: (k,) random reading error of each joint [rad, m].
+        hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
         joints: Joint models, None where the estimate has none.
         suspension: None where the estimate has none.
         laboratory: Where it was found, None where the estimate does not say.
@@ -64,6 +66,7 @@ class Compensator:
     hand: HandModel
     covariance: np.ndarray
     play: np.ndarray
+    hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
     joints: JointModels | None = None
     suspension: Suspension | None = None
     laboratory: Description | None = None
@@ -97,7 +100,7 @@ class Compensator:
         if estimate.joint_models and laboratory is not None:
             inputs = input_model(estimate.urdf, laboratory.carrying(payload), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
-        return cls(hand, _covariance(chain, model), play, joints, estimate.suspension, laboratory)
+        return cls(hand, _covariance(chain, model), play, model.hand_error, joints, estimate.suspension, laboratory)
 
     def predict(
         self,
@@ -127,6 +130,17 @@ class Compensator:
         moved = None if wrench is None else _needed(base).moved(t, np.asarray(wrench, dtype=float))
         found = self._hand(t, q, velocity if velocity is not None else _velocities(t, q))
         return _in_lab(found, base, moved, T_lab_base_start)
+
+    def points(self, markers: np.ndarray, q_motor: np.ndarray, session: Session | None = None) -> Predicted:
+        """Markers (m, 3) [m] of the hand's body, as the base's marker body sees them, with their band.
+
+        Args:
+            markers: As `bodies` of dataset.json has them.
+            q_motor: (n, n_joints) readings at rest [rad, m].
+            session: Another day: base and marker body are not quite where they were; `Session()` for what is usual.
+        """
+        spread = Spread(self.covariance, self.play, self.hand_error)
+        return predicted_points(self.hand, spread, np.asarray(markers, dtype=float), q_motor, session)
 
     def step(
         self,
@@ -172,6 +186,7 @@ class Compensator:
         T_base_hand = from_vector(self.hand.base) @ found.T
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
+        covariance += np.diag(np.repeat(self.hand_error if len(self.hand_error) else np.zeros(2), 3) ** 2)
         return HandPose(T_base_hand, covariance)
 
 

@@ -57,6 +57,7 @@ class Model:
         play: (k,) random reading error of each joint, standard deviation [rad, m]; empty where not estimated.
         rank: Number of identifiable combinations; 0 where not known.
         condition: Condition number of the scaled whitened Jacobian [-]; 0 where not known.
+        hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Model:
     play: np.ndarray = field(default_factory=lambda: np.zeros(0))
     rank: int = 0
     condition: float = 0.0
+    hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def value(self, name: str, default: float) -> float:
         """Estimate of a parameter, `default` where the model has none of that name."""

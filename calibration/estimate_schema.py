@@ -63,6 +63,7 @@ class ModelEntry(Entry):
     reading_error: tuple[PlayEntry, ...] = ()
     rank: int = 0
     condition: float = 0.0
+    hand_error: tuple[float, ...] = ()
 
 
 class VerdictEntry(Entry):
@@ -189,6 +190,7 @@ def _model_entry(model: Model) -> ModelEntry:
         ),
         rank=model.rank,
         condition=model.condition,
+        hand_error=tuple(map(float, model.hand_error)),
     )
 
 
@@ -207,4 +209,5 @@ def _model(name: str, entry: ModelEntry, covariance: np.ndarray | None) -> Model
         np.array([p.sigma for p in entry.reading_error]),
         entry.rank,
         entry.condition,
+        np.array(entry.hand_error),
     )

@@ -24,6 +24,7 @@ from calibration.evaluation_checks import moved_in_trials
 from calibration.joint_regimes import Explained, on_repetitions, on_validation
 from calibration.markers import hand_body
 from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics
+from calibration.point_rows import PointRow, point_rows
 from calibration.postures import dwell_windows
 from calibration.predict import REFERENCE, Prediction, Predictor, predictor
 from calibration.protocols import protocol_rows
@@ -78,6 +79,7 @@ class Evaluation:
 
     `confirmation` is the ladder of another session, its marker bodies registered anew; empty where there is none.
     `verdicts` name trials whose errors are not the model's.
+    `points` are single markers of trials that hold posture means.
     """
 
     rows: tuple[Row, ...]
@@ -85,6 +87,7 @@ class Evaluation:
     regimes: tuple[Explained, ...] = ()
     confirmation: tuple[Row, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
+    points: tuple[PointRow, ...] = ()
 
     def row(self, model: str, trials: Trials = "dynamic", base: str = "fixed", encoder: str = "motor") -> Row:
         """One line.
@@ -107,6 +110,7 @@ class Evaluation:
             "schema": 1,
             "rows": [row_entry(r) for r in self.rows],
             "confirmation": [row_entry(r) | {"role": "confirmation"} for r in self.confirmation],
+            "points": [asdict(p) for p in self.points],
             "trials": [trial_entry(t) for t in self.traces],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
             "regimes": [x.entry() for x in self.regimes],
@@ -144,7 +148,8 @@ def evaluate(
         progress("joint models", 1.0)
     rows, confirmation = tuple(ladder(traces, "mocap")), tuple(ladder(confirmed, "mocap"))
     moved = tuple(moved_in_trials(dataset.description, dataset.trials(role)))
-    return Evaluation(rows, tuple(traces), regimes(predict, dataset, role), confirmation, moved)
+    points = point_rows(estimate, dataset, role)
+    return Evaluation(rows, tuple(traces), regimes(predict, dataset, role), confirmation, moved, points)
 
 
 def _traces(

@@ -2,7 +2,11 @@
 
 See `map_fit` for the cost and `hand` for the model. With 6D markers on base and hand a chain of R revolute and P
 prismatic joints has 4 R + 2 P + 6 identifiable combinations: 36 for a torso and seven arm joints, 34 with the torso
-still. What the data do not separate stays at what the tolerances make most likely.
+still. What the data do not separate stays at what the tolerances make most likely. Postures that contradict all others
+are left out and named.
+
+Where only posture means were recorded there will be no joint model, and what a gear under load gives is asked for
+here: row `full`, see `gears`.
 """
 
 from collections.abc import Iterator
@@ -10,15 +14,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from calibration.estimate import Model
-from calibration.geometry_guards import distinct, joint_lengths
+from calibration.geometry_guards import MANY_ODD, joint_lengths, unusable_data
 from calibration.hand import nominal_hand
-from calibration.hand_fit import fit
+from calibration.hand_fit import Errors, hand_problem
 from calibration.identifiability import Identifiability, identifiability
 from calibration.map_fit import Fit
 from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
 from calibration.postures import Postures
+from calibration.registration_start import registration_start
 from calibration.result import model_of
 from calibration.robot import Chain
+from calibration.robust import RobustFit, robust_fit
 from calibration.schema import Description
 from calibration.verdict import Verdict
 
@@ -33,37 +39,52 @@ _CHI2 = 3.0  # largest believable squared whitened residual per degree of freedo
 def calibrate_geometry(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
     """The geometric model; a verdict `refused` says that it must not be used."""
     parameters = geometry_parameters(chain, description)
-    start = play_start(chain, description)
-    found = fit(
-        nominal_hand(chain, parameters.nominal[:12]), parameters, postures, start, play_floor(chain, description)
-    )
+    start, floor = play_start(chain, description), play_floor(chain, description)
+    robust = fit_robustly(chain, parameters, postures, Errors(np.maximum(start, floor), floor, np.zeros(0)))
+    found = robust.fit
     known = identifiability(found.J_white, parameters)
-    refused = [
-        *_too_little(chain, postures, known),
-        *_implausible(parameters, found, start, chain),
-    ]
+    frames = registration_start(chain.poses(postures.q), postures.T_base_hand, True)
+    refused = [*unusable_data(chain, postures.q, frames, 6)]
+    refused = refused or [*_too_little(known), *_implausible(parameters, found, start, chain)]
     verdicts = [Verdict(STAGE, "refused", message) for message in refused]
+    verdicts += left_out(postures, robust)
     still = [name for name, span in zip(chain.joints, _spans(chain, postures), strict=True) if span < _APART]
     if still:
         verdicts.append(
             Verdict(STAGE, "warning", f"joints that never moved are calibrated at their position only: {still}")
         )
     if not refused:
-        message = f"{known.rank} combinations of {len(parameters)} parameters from {len(postures)} postures"
+        used = int(robust.kept.sum())
+        message = f"{known.rank} combinations of {len(parameters)} parameters from {used} postures"
         verdicts.append(Verdict(STAGE, "ok", f"{message}, condition {known.condition:.0f}"))
     return model_of("model_2", chain, parameters, found), tuple(verdicts)
+
+
+def fit_robustly(chain: Chain, parameters: ParameterSet, postures: Postures, errors: Errors) -> RobustFit:
+    """The fit of the postures that agree, from nominal values."""
+    nominal = nominal_hand(chain, parameters.nominal[:12])
+    return robust_fit(
+        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors), len(postures), parameters.nominal
+    )
+
+
+def left_out(postures: Postures, found: RobustFit) -> Iterator[Verdict]:
+    """The postures that were not used, by name."""
+    odd = np.flatnonzero(~found.kept)
+    if len(odd):
+        names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
+        said = (
+            f"{len(odd)} of {len(postures)} postures contradict the others and were left out, counted from 0: {names}"
+        )
+        yield Verdict(STAGE, "refused" if len(odd) > MANY_ODD * len(postures) else "warning", said)
 
 
 def _spans(chain: Chain, postures: Postures) -> np.ndarray:
     return np.ptp(postures.q[:, chain.columns], axis=0) / joint_lengths(chain)
 
 
-def _too_little(chain: Chain, postures: Postures, known: Identifiability) -> Iterator[str]:
+def _too_little(known: Identifiability) -> Iterator[str]:
     """Why the postures cannot carry the model."""
-    needed = int(np.ceil(2 * (6 + 4 * len(chain.joints)) / 6))
-    n = distinct(postures.q[:, chain.columns], _APART * joint_lengths(chain))
-    if n < needed:
-        yield f"{n} distinct postures among {len(postures)}; at least {needed} are needed, spread over all joints"
     if not known.clear or known.condition > _CONDITION:
         yield (
             f"the postures do not excite the model (rank {known.rank}, gap {known.gap:.0f}, condition "

@@ -19,17 +19,25 @@ from calibration.hand_fit import Errors, hand_problem
 from calibration.identifiability import Identifiability, identifiability
 from calibration.map_fit import Fit
 from calibration.marker_shape import Cluster, cluster, in_line
-from calibration.parameters import COMPLIANCES, ZEROS, ParameterSet, parameter_names, placement_groups
+from calibration.parameters import (
+    COMPLIANCES,
+    DEFLECTION,
+    ZEROS,
+    ParameterSet,
+    gear_tolerances,
+    parameter_names,
+    placement_groups,
+)
 from calibration.postures import Postures
+from calibration.predicted_points import Predicted, Session, Spread, predicted_points
 from calibration.registration_start import Start, registration_start
 from calibration.robot import Chain, chain_of_frames
 from calibration.robust import robust_fit
-from calibration.se3 import adjoint, compose, inverse, skew
+from calibration.se3 import compose
 from calibration.verdict import Verdict
 
 _STAGE = "geometry"
 _LEAST = 1e-6  # [m, rad] smallest noise of a measured pose
-_TORQUE = 0.5  # [N.m, N] a joint that gravity loads less has no own range of torque
 _FIXED = 1e-6  # [rad]
 _SPREAD = 250  # postures from which rank and combinations are told
 
@@ -51,41 +59,10 @@ class Widths:
     translation: float = 4e-3
     rotation: float = 8e-3
     offset: float = 4e-2
-    deflection: float = 3e-2
+    deflection: float = DEFLECTION
     reading: float = 2e-3
     position: float = 5e-4
     orientation: float = 1e-3
-
-
-@dataclass(frozen=True)
-class Session:
-    """How far marker body and base are from where they were, on another day; standard deviations per axis.
-
-    Attributes:
-        base: Of the laboratory's frame in the base: translation [m], rotation [rad].
-        hand: Of the marker body in the tool: translation [m], rotation [rad].
-    """
-
-    base: tuple[float, float] = (1e-3, 2e-3)
-    hand: tuple[float, float] = (1e-3, 5e-3)
-
-    @property
-    def variances(self) -> np.ndarray:
-        """(12,) of the two local twists."""
-        return np.repeat([*self.base, *self.hand], 3) ** 2
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """Predicted marker positions with their uncertainty.
-
-    Attributes:
-        positions: (n, m, 3) [m, lab].
-        covariance: (n, m, 3, 3) [m^2, lab]: parameters, random errors and, where asked for, another session.
-    """
-
-    positions: np.ndarray
-    covariance: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -117,19 +94,8 @@ class GeometryFit:
 
     def predict_with_covariance(self, q: np.ndarray, session: Session | None = None) -> Predicted:
         """The same with covariance, of this session, or of any other one where `session` is given."""
-        found = self.hand.poses_and_derivatives(np.asarray(q, dtype=float))
-        k = len(self.fit.play)
-        sources = [found.J @ np.linalg.cholesky(self.fit.covariance), found.J_joint * self.fit.play]
-        pose = np.zeros(6)
-        pose[: 3 * len(self.fit.widths.noise[k:-1])] = np.repeat(self.fit.widths.noise[k:-1], 3)
-        sources.append(np.broadcast_to(np.diag(pose), (len(q), 6, 6)))
-        if session is not None:
-            both = np.concatenate([adjoint(inverse(found.T)), np.broadcast_to(np.eye(6), (len(q), 6, 6))], axis=2)
-            sources.append(both * np.sqrt(session.variances))
-        B = np.concatenate(sources, axis=2)
-        moved = found.T[:, None, :3, :3] @ (B[:, None, :3] - skew(self.markers) @ B[:, None, 3:])
-        positions = np.einsum("nij,mj->nmi", found.T[:, :3, :3], self.markers) + found.T[:, None, :3, 3]
-        return Predicted(positions, moved @ np.swapaxes(moved, 2, 3))
+        spread = Spread(self.fit.covariance, self.fit.play, self.fit.hand_error)
+        return predicted_points(self.hand, spread, self.markers, q, session)
 
 
 def fit_geometry(
@@ -216,7 +182,7 @@ def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarra
 def _parameters(chain: Chain, start: Start, widths: Widths, postures: Postures, oriented: bool) -> ParameterSet:
     """Everything, frames without a prior; what a single point cannot tell of the hand's rotation stays at zero."""
     k, lengths = len(chain.joints), joint_lengths(chain)
-    torque = np.maximum(np.abs(chain.gravity_torques(postures.q)).max(axis=0), _TORQUE)
+    gears = gear_tolerances(chain, chain.gravity_torques(postures.q), widths.deflection)
     frames = np.full(12, np.inf)
     frames[9:] = np.inf if oriented else _FIXED
     placement = [widths.translation] * 3 + [widths.rotation] * 3
@@ -227,6 +193,6 @@ def _parameters(chain: Chain, start: Start, widths: Widths, postures: Postures, 
         + tuple("m" if s else "rad" for s in slides)
         + tuple("m/N" if s else "rad/(N.m)" for s in slides),
         np.concatenate([start.frames, np.zeros(8 * k)]),
-        np.concatenate([frames, placement * k, widths.offset * lengths, widths.deflection * lengths / torque]),
+        np.concatenate([frames, placement * k, widths.offset * lengths, gears]),
         np.concatenate([np.full(12, -1), placement_groups(k), np.full(k, ZEROS), np.full(k, COMPLIANCES)]),
     )

@@ -18,8 +18,8 @@ _CONDITION = 1e6  # scaled [-]
 _OFFSET = 0.5  # largest believable zero of a reading [rad, a tenth of it in m]
 _FACTOR = 6.0  # largest believable ratio of a prior's width to what it began with [-]
 _READING = 0.03  # largest believable random error of a reading [rad, a tenth of it in m]
+MANY_ODD = 0.25  # share of postures that may be wrong
 _HAND = (("position [m]", 1e-2), ("rotation [rad]", 5e-2))  # largest believable random errors of the hand
-_LEFT_OUT = 0.25  # share of postures that may be wrong
 
 
 def distinct(q: np.ndarray, apart: np.ndarray, enough: int = sys.maxsize) -> int:
@@ -77,5 +77,5 @@ def unusable_fit(
     if fit.widths.prior.max(initial=0.0) > _FACTOR**2:
         yield f"the robot departs from its drawing {np.sqrt(fit.widths.prior.max()):.0f} times as far as robots do"
     wrong = n - int(found.kept.sum())
-    if wrong > _LEFT_OUT * n:
+    if wrong > MANY_ODD * n:
         yield f"{wrong} of {n} postures contradict the others; more than mistakes of some rows"

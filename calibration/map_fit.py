@@ -79,6 +79,11 @@ class Fit:
         return self.widths.noise[: self.at.J_joint.shape[2]]
 
     @property
+    def hand_error(self) -> np.ndarray:
+        """Random errors of the hand's position [m] and rotation [rad], (2,), (1,) or (0,) as they were asked for."""
+        return self.widths.noise[self.at.J_joint.shape[2] : -1]
+
+    @property
     def J_white(self) -> np.ndarray:
         """Whitened Jacobian (d n, p)."""
         return (self.whitener @ self.at.J).reshape(-1, len(self.theta))

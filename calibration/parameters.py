@@ -21,6 +21,8 @@ from calibration.se3 import from_vector, to_vector
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 TRANSLATIONS, ROTATIONS, ZEROS, COMPLIANCES = range(4)  # groups of parameters whose tolerances share a factor
+DEFLECTION = 3e-2  # of a gear at its own largest gravity torque, play that gravity holds on one flank included [rad]
+_TORQUE = 0.5  # [N.m, N] a joint that gravity loads less has no own range of torque
 METRES_PER_RAD = 0.1  # a prismatic joint's tolerances are an angle's times this
 
 
@@ -48,8 +50,12 @@ class ParameterSet:
     @property
     def prior(self) -> Prior:
         """What is believed of them beforehand."""
-        group = np.full(len(self), -1) if self.group is None else self.group
-        return Prior(self.nominal, self.tolerance, group)
+        return Prior(self.nominal, self.tolerance, self.groups)
+
+    @property
+    def groups(self) -> np.ndarray:
+        """(p,) group of each, -1 where its tolerance stands."""
+        return np.full(len(self), -1) if self.group is None else self.group
 
     @property
     def scale(self) -> np.ndarray:
@@ -103,6 +109,25 @@ def geometry_parameters(chain: Chain, description: Description) -> ParameterSet:
         ),
         np.concatenate([np.full(12, -1), placement_groups(k), np.full(k, ZEROS)]),
     )
+
+
+def gear_parameters(chain: Chain, description: Description, tau: np.ndarray) -> ParameterSet:
+    """Those of the geometry and the compliance of every gear, seen at gravity torques tau (n, k) [N.m, N]."""
+    geometry, k = geometry_parameters(chain, description), len(chain.joints)
+    slides = [chain.is_prismatic(j) for j in chain.joints]
+    return ParameterSet(
+        parameter_names(chain),
+        geometry.units + tuple("m/N" if s else "rad/(N.m)" for s in slides),
+        np.append(geometry.nominal, np.zeros(k)),
+        np.append(geometry.tolerance, gear_tolerances(chain, tau, DEFLECTION)),
+        np.append(geometry.groups, np.full(k, COMPLIANCES)),
+    )
+
+
+def gear_tolerances(chain: Chain, tau: np.ndarray, deflection: float) -> np.ndarray:
+    """(k,) compliance that turns each joint by `deflection` [rad] at the largest of its torques tau (n, k)."""
+    lengths = np.array([METRES_PER_RAD if chain.is_prismatic(j) else 1.0 for j in chain.joints])
+    return deflection * lengths / np.maximum(np.abs(tau).max(axis=0), _TORQUE)
 
 
 def placement_groups(k: int) -> np.ndarray:

@@ -17,6 +17,7 @@ from calibration.dataset import Dataset
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
 from calibration.estimate import Estimate, RobotNames
 from calibration.estimate_parts import joints_model, suspension_model
+from calibration.gears import calibrate_gears
 from calibration.geometry import calibrate_geometry
 from calibration.joint_fit import fit_joint_models
 from calibration.options import Options
@@ -32,7 +33,7 @@ Progress = Callable[[str, float], None]
 
 STAGES = ("clocks", "registration", "base_frame", "arm_tool", "suspension", "geometry", "joints")
 _FRAMES = ("base_frame", "arm_tool")  # run where there is a spin; alone where the arm only ever posed
-MAIN = ("model_2", "arm_tool", "registration")  # rows an estimate can stand for, the best first
+MAIN = ("full", "model_2", "arm_tool", "registration")  # rows an estimate can stand for, the best first
 _NEEDS = {"joints": "geometry", "arm_tool": "base_frame"}
 _NO_CLOCKS = (Verdict("clocks", "missing", "posture means only: there is no time, and no clock to tell"),)
 
@@ -134,7 +135,11 @@ def _suspend(work: Work) -> Work:
 
 
 def _calibrate_geometry(work: Work) -> Work:
-    return work.with_model(*calibrate_geometry(work.chain, work.description, postures_of(work)))
+    found, postures = calibrate_geometry(work.chain, work.description, postures_of(work)), postures_of(work)
+    work = work.with_model(*found)
+    if work.clock("robot") is not None or any(v.verdict == "refused" for v in found[1]):
+        return work
+    return work.with_model(*calibrate_gears(work.chain, work.description, postures))
 
 
 def _calibrate_joints(work: Work) -> Work:

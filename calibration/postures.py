@@ -11,7 +11,7 @@ correlated in time, and motion that has not died out.
 
 import logging
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -42,19 +42,22 @@ class Postures:
         covariance: (n, 6, 6) of its local twist [m, rad]; (n, 3, 3) of its position in the base body's axes where only
             a point was seen.
         misfit: (n,) rms distance of markers from their nominal places in their cluster [m].
+        label: (n,) trial and number, counted from 0; empty where they have no name.
     """
 
     q: np.ndarray
     T_base_hand: np.ndarray
     covariance: np.ndarray
     misfit: np.ndarray
+    label: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=str))
 
     def __len__(self) -> int:
         return len(self.q)
 
     def rows(self, chosen: np.ndarray) -> "Postures":
         """Some of the postures."""
-        return Postures(*(getattr(self, f.name)[chosen] for f in fields(self)))
+        label = self.label[chosen] if len(self.label) else self.label
+        return Postures(self.q[chosen], self.T_base_hand[chosen], self.covariance[chosen], self.misfit[chosen], label)
 
     def joined(self, other: "Postures") -> "Postures":
         """These postures, then the other ones."""
@@ -77,11 +80,11 @@ def read_postures(description: Description, trials: Iterable[Trial], robot: Cloc
     found = [p for trial in trials for p in _of_trial(description, trial, robot)]
     if not found:
         raise NotEnoughData("no static calibration posture shows base and hand; record a static trial with dwells")
-    q, T, quarters, unit, misfit = (np.array(x) for x in zip(*found, strict=True))
+    q, T, quarters, unit, misfit, label = (np.array(x) for x in zip(*found, strict=True))
     unit = unit * description.sigmas.marker**2
     factor = inflation(quarters, unit)
     _log.info("%d postures, noise of their means %.1f times that of independent samples", len(q), np.sqrt(factor))
-    return Postures(q, T, factor * unit, misfit)
+    return Postures(q, T, factor * unit, misfit, label)
 
 
 def mean_postures(description: Description, means: PostureMeans) -> Postures:
@@ -92,7 +95,8 @@ def mean_postures(description: Description, means: PostureMeans) -> Postures:
     S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
     squares = (np.concatenate([base.residual, hand.residual], axis=1) ** 2).sum(axis=2)
     good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(means.q_motor).all(axis=1)
-    return Postures(means.q_motor[good], T[good], S[good], np.sqrt(np.nanmean(squares[good], axis=1)))
+    label = np.array([f"{means.id} {k}" for k in np.flatnonzero(good)], dtype=str)
+    return Postures(means.q_motor[good], T[good], S[good], np.sqrt(np.nanmean(squares[good], axis=1)), label)
 
 
 def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
@@ -124,7 +128,7 @@ def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray)
     return found
 
 
-def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray, ...]]:
+def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray | str, ...]]:
     t_robot = robot.to_mocap(trial.t_robot)
     bodies = (base_body(description), hand_body(description))
     for k, (start, stop) in enumerate(dwell_windows(trial)):
@@ -142,7 +146,14 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
         Ad = adjoint(inverse(T[0]))
         covariance = (hand.covariance[0] + Ad @ base.covariance[0] @ Ad.T) / len(seen)
         misfit = np.sqrt(np.nanmean(np.concatenate([base.residual[0], hand.residual[0]]) ** 2) * 3.0)
-        yield trial.q_motor[rows].mean(axis=0), T[0], to_vector(inverse(T[:1]) @ T[1:]), covariance, misfit
+        yield (
+            trial.q_motor[rows].mean(axis=0),
+            T[0],
+            to_vector(inverse(T[:1]) @ T[1:]),
+            covariance,
+            misfit,
+            f"{trial.id} {k}",
+        )
 
 
 def mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:

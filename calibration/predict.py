@@ -52,6 +52,7 @@ _ROWS: tuple[tuple[str, tuple[Base, ...], tuple[Encoder, ...]], ...] = (
     ("arm_tool", _EVERY, ("motor",)),
     ("model_2", _EVERY, ("motor",)),
     ("model_3", _EVERY, ("motor", "link")),
+    ("full", _EVERY, ("motor",)),
 )
 
 
@@ -120,7 +121,7 @@ class Predictor:
         """
         T_lab_B = means.poses_of(base_body(self.description)).T
         for name, hand, encoder, _ in self._rows():
-            if encoder == "motor" and name in ("nominal", "registration", "model_2"):
+            if encoder == "motor" and name in ("nominal", "registration", "model_2", "full"):
                 T = T_lab_B @ hand.poses(means.q_motor)
                 yield Prediction(name, "measured", "motor", entry.id, entry.kind, np.arange(float(len(means))), T)
 

@@ -23,4 +23,5 @@ def model_of(name: str, chain: Chain, parameters: ParameterSet, found: Fit) -> M
         found.play,
         known.rank,
         known.condition,
+        found.hand_error,
     )

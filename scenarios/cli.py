@@ -122,6 +122,7 @@ def evaluate(
     with console.progress() as progress:
         steps.evaluate(estimate, dataset, out, truth, progress)
     console.show(console.ladder(out))
+    console.show(console.points(out))
     for line in console.remarks(out):
         typer.echo(line)
     console.show(console.confirmation(out))

@@ -112,6 +112,19 @@ def confirmation(results: Path) -> Table | None:
     return _errors("Another session, marker bodies registered anew, against mocap", rows) if rows else None
 
 
+def points(results: Path) -> Table | None:
+    """Return the table of single markers with the band promised for any session, or None where there are none."""
+    rows = json.loads((results / "evaluation.json").read_text(encoding="utf-8")).get("points", [])
+    table = _table("marker", "row", "trial", "RMSE\nnorm [mm]", "largest\n[mm]", "95 % band\n[mm]", "inside\n[%]")
+    table.title, table.title_justify = "Markers of the hand, with the band for any session", "left"
+    for column in table.columns[3:]:
+        column.justify = "right"
+    for row in rows:
+        figures = (f"{row[key]:.2f}" for key in ("rmse_norm_mm", "max_norm_mm", "band_95_mm"))
+        table.add_row(row["marker"], row["model"], row["trial"], *figures, f"{100.0 * row['inside']:.0f}")
+    return table if rows else None
+
+
 def _errors(title: str, rows: Sequence[dict[str, Any]]) -> Table:
     columns = ("position RMSE\nper component [mm]", "position RMSE\nnorm [mm]", "orientation\nRMSE [deg]")
     table = _table("row", "base", "encoder", "trials", *columns)

@@ -70,7 +70,7 @@ def test_geometry_is_calibrated_from_means_alone_and_predicts_others(tmp_path):
     assert said == {
         "clocks": "missing", "registration": "ok", "suspension": "missing", "geometry": "ok", "joints": "missing"
     }  # fmt: skip
-    assert estimate.calibrated and estimate.main == "model_2"
+    assert estimate.calibrated and estimate.main == "full"
     ladder = evaluate(estimate, load(folder))
     rows = {r.model: r.metrics.position_rmse_norm_mm for r in ladder.rows if r.trials == "static"}
     assert {(r.base, r.encoder) for r in ladder.rows} == {("measured", "motor")}

@@ -22,7 +22,7 @@ def test_static_postures_are_calibrated_and_say_what_is_missing(tmp_path):
     folder, _ = imported(tmp_path, "qualisys_2021-11-30_postures.csv", "qualisys_postures.yaml")
     estimate = calibrate(load(folder))
     said = {v.stage: v for v in estimate.verdicts}
-    assert estimate.calibrated and estimate.main == "model_2"
+    assert estimate.calibrated and estimate.main == "full"
     assert "37 postures" in said["registration"].message
     assert (said["suspension"].verdict, said["joints"].verdict) == ("missing", "missing")
 
