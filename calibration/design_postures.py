@@ -1,7 +1,6 @@
 """Postures to record: chosen for what they tell, with the side each joint comes from, in an order to drive them."""
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from calibration.design_search import Design, search
 from calibration.design_sides import Sides, sides
 from calibration.design_tour import Tour, tour
 from calibration.hand import HandModel, nominal_hand
-from calibration.information import prospect
+from calibration.information import Prospect, prospect
 from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
 from calibration.remedy import Posture, Remedy, Sigma
 from calibration.robot import chain_of
@@ -31,12 +30,18 @@ class Task:
         model: The robot as far as it is known.
         parameters: To be found, with tolerances.
         play: (k,) random error of each joint's reading [rad, m].
+        known: (p, p) covariance of the scaled parameters by what is recorded already; None: nothing is.
     """
 
     room: Room
     model: HandModel
     parameters: ParameterSet
     play: np.ndarray
+    known: np.ndarray | None = None
+
+    def prospect(self, q: np.ndarray, at: np.ndarray) -> Prospect:
+        """What candidates q tell of the hand at other postures."""
+        return prospect(self.model, self.parameters, self.room.description, self.play, q, at, self.known)
 
 
 @dataclass(frozen=True)
@@ -98,8 +103,7 @@ def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> 
     Raises:
         NotEnoughData: The robot has hardly any posture clear of itself and in sight.
     """
-    at = partial(prospect, task.model, task.parameters, task.room.description, task.play)
-    found = search(task.room, at, n, criterion, rng)
+    found = search(task.room, task.prospect, n, criterion, rng)
     return Plan(task, found, sides(found.prospect, found.chosen, task.play, rng), tour(found.q, task.room.shapes))
 
 
@@ -108,7 +112,7 @@ def compared(found: Plan, rng: np.random.Generator) -> Comparison:
     task, n = found.task, len(found.design.chosen)
     drawn = task.room.pool(_FRESH + 4 * n, rng)
     q = np.concatenate([drawn[_FRESH:], found.design.q])
-    p = prospect(task.model, task.parameters, task.room.description, task.play, q, drawn[:_FRESH])
+    p = task.prospect(q, drawn[:_FRESH])
     sets = [rng.choice(4 * n, n, replace=False) for _ in range(_RANDOM)]
     random = np.array([p.hand(p.after(rows)).max() for rows in sets])
     return Comparison(float(p.hand(p.after(4 * n + np.arange(n))).max()), random)

@@ -13,6 +13,7 @@ from calibration.hand import HandModel, nominal_hand
 from calibration.identifiability import Combination, Status
 from calibration.options import Options
 from calibration.parameters import AXES, parameter_names
+from calibration.remedy import Remedy
 from calibration.robot import Chain
 from calibration.schema import Description
 from calibration.se3 import from_vector
@@ -129,6 +130,7 @@ class Estimate:
         link_zero: Motor minus link reading of each measured joint over the calibration postures [rad, m].
         options: What was chosen.
         laboratory: What dataset.json declares, without its trials; None where the source does not say.
+        remedies: What to record next, for what the data do not tell.
     """
 
     status: Literal["calibrated", "not_calibrated"]
@@ -143,6 +145,7 @@ class Estimate:
     link_zero: tuple[float, ...] = ()
     options: Options = field(default_factory=Options)
     laboratory: Description | None = None
+    remedies: tuple[Remedy, ...] = ()
 
     def model(self, name: str) -> Model:
         """The model of that name.

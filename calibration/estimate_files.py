@@ -2,6 +2,7 @@
 
     estimate.json            parameters, combinations, verdicts, clocks
     estimate.nc              covariances, one group a model
+    record_next.yaml         postures and motions for what the data do not tell, see `remedy`; if there is such
     nominal.urdf             what the placement twists are relative to
     calibrated.urdf          joint placements of the main model        } only if the result
     master_calibration.yaml  zeros of the readings of the main model   } may be used: see `estimate_tables`
@@ -12,6 +13,7 @@ The same estimate gives the same bytes. `load_estimate` also reads somebody else
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +26,13 @@ from calibration.errors import InputError
 from calibration.estimate import Estimate, Model
 from calibration.estimate_schema import EstimateFile, to_estimate, to_file
 from calibration.estimate_tables import parameters_text, zeros_text
+from calibration.remedy import read_remedies, to_text
 from calibration.robot import chain_of_frames
 from calibration.urdf_export import calibrated_urdf
 
 JSON, COVARIANCES, NOMINAL = "estimate.json", "estimate.nc", "nominal.urdf"
 CALIBRATED, ZEROS, TABLE = "calibrated.urdf", "master_calibration.yaml", "parameters.csv"
+NEXT = "record_next.yaml"
 
 
 def save_estimate(estimate: Estimate, folder: Path | str) -> None:
@@ -39,8 +43,10 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
     _write_covariances(folder / COVARIANCES, estimate)
     if estimate.urdf is not None:
         _replace_text(folder / NOMINAL, estimate.urdf)
-    for name in (CALIBRATED, ZEROS, TABLE):
+    for name in (CALIBRATED, ZEROS, TABLE, NEXT):
         (folder / name).unlink(missing_ok=True)
+    if estimate.remedies and estimate.robot is not None:
+        _replace_text(folder / NEXT, to_text(estimate.robot.joints, estimate.remedies))
     if estimate.calibrated and estimate.urdf is not None and estimate.robot is not None:
         chain = chain_of_frames(
             estimate.urdf, estimate.robot.joints, estimate.robot.base_frame, estimate.robot.tool_frame
@@ -73,7 +79,9 @@ def load_estimate(path: Path | str) -> Estimate:
         raise InputError(file, "; ".join(lines)) from error
     nominal = file.parent / NOMINAL
     urdf = _text(nominal) if nominal.is_file() else None
-    return to_estimate(found, urdf, _read_covariances(file.parent / COVARIANCES))
+    suggested = file.parent / NEXT
+    remedies = read_remedies(suggested)[1] if suggested.is_file() else ()
+    return replace(to_estimate(found, urdf, _read_covariances(file.parent / COVARIANCES)), remedies=remedies)
 
 
 def _text(path: Path) -> str:

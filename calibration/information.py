@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.bodies import body_poses
-from calibration.hand import HandModel
+from calibration.hand import HandModel, HandPoses
 from calibration.markers import base_body, hand_body
 from calibration.parameters import ParameterSet
-from calibration.schema import Description
+from calibration.schema import Body, Description
 from calibration.se3 import adjoint, inverse
 
 _CLIFF = 1e-6  # singular values below this share of the largest are zero [-]
@@ -70,25 +70,48 @@ def prospect(
     play: np.ndarray,
     q: np.ndarray,
     at: np.ndarray,
+    known: np.ndarray | None = None,
 ) -> Prospect:
-    """Candidates q (n, n_measured), nothing recorded yet, the hand to be predicted at postures `at` (e, n_measured).
+    """Candidates q (n, n_measured), the hand to be predicted at postures `at` (e, n_measured).
 
     Args:
         model: The robot as far as it is known.
-        parameters: What is to be found, with tolerances.
+        parameters: What is to be found, with tolerances; the first of `HandModel.theta`.
         description: Markers and their noise.
         play: (k,) random error of each joint's reading [rad, m].
         q: Candidates.
         at: Where the hand is to be predicted.
+        known: (p, p) covariance of the scaled parameters by what is recorded already; V is the identity then.
     """
-    found = model.poses_and_derivatives(q, n_parameters=len(parameters))
-    Ad = adjoint(inverse(found.T))
-    S = _cluster(description, "hand") + Ad @ _cluster(description, "base") @ np.swapaxes(Ad, 1, 2)
-    W = np.linalg.inv(np.linalg.cholesky(S + (found.J_joint * play**2) @ np.swapaxes(found.J_joint, 1, 2)))
-    A = (W @ found.J) * parameters.scale
-    V = told_directions(A)
-    P = model.poses_and_derivatives(at, n_parameters=len(parameters)).J[:, :3] * parameters.scale @ V
-    return Prospect(q, A @ V, P, V, parameters.scale, W @ found.J_joint, np.eye(V.shape[1]))
+    p = len(parameters)
+    found = model.poses_and_derivatives(q, n_parameters=p)
+    W, J, J_joint = _whitened(found, description, play)
+    A = (W @ J) * parameters.scale
+    V = told_directions(A) if known is None else np.eye(p)
+    P = model.poses_and_derivatives(at, n_parameters=p).J[:, :3] * parameters.scale @ V
+    C = np.eye(V.shape[1]) if known is None else known
+    return Prospect(q, A @ V, P, V, parameters.scale, W @ J_joint, C)
+
+
+def _whitened(
+    found: HandPoses, description: Description, play: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """W (n, d, d), derivatives by parameters and by joints of what a dwell measures: a pose, or lone markers' place."""
+    S, J, J_joint = dwell_noise(found.T, description), found.J, found.J_joint
+    if S.shape[1] == 3:
+        R = found.T[:, :3, :3]
+        J, J_joint = R @ J[:, :3], R @ J_joint[:, :3]
+    return np.linalg.inv(np.linalg.cholesky(S + (J_joint * play**2) @ np.swapaxes(J_joint, 1, 2))), J, J_joint
+
+
+def dwell_noise(T: np.ndarray, description: Description) -> np.ndarray:
+    """Covariance (n, 6, 6) of a dwell's hand poses T (n, 4, 4) by the markers; (n, 3, 3) of a point's place."""
+    hand, Ad = hand_body(description), adjoint(inverse(T))
+    S = Ad @ _cluster(base_body(description), description) @ np.swapaxes(Ad, 1, 2)
+    if not 0 < len(hand.markers) < 3:
+        return np.asarray(S + _cluster(hand, description))
+    R, n = T[:, :3, :3], SAMPLES * len(hand.markers)
+    return np.asarray(R @ S[:, :3, :3] @ np.swapaxes(R, 1, 2) + description.sigmas.marker**2 / n * np.eye(3))
 
 
 def told_directions(A: np.ndarray) -> np.ndarray:
@@ -97,9 +120,8 @@ def told_directions(A: np.ndarray) -> np.ndarray:
     return np.asarray(Vt[: int((s > _CLIFF * s[0]).sum())].T)
 
 
-def _cluster(description: Description, which: str) -> np.ndarray:
-    """Covariance (6, 6) of a dwell's mean pose of the base's or the hand's markers [m, rad]."""
-    body = base_body(description) if which == "base" else hand_body(description)
+def _cluster(body: Body, description: Description) -> np.ndarray:
+    """Covariance (6, 6) of a dwell's mean pose of a marker body [m, rad]; 0 for one that has no markers."""
     if not body.markers:
         return np.zeros((6, 6))
     xyz = np.array([m.xyz for m in body.markers])

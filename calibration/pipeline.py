@@ -23,6 +23,8 @@ from calibration.joint_fit import fit_joint_models
 from calibration.options import Options
 from calibration.parameters import nominal_frames
 from calibration.plausibility import implausible_inputs
+from calibration.record_next import record_next
+from calibration.record_next_base import drive_next
 from calibration.registration import register
 from calibration.robot import chain_of
 from calibration.suspension_fit import Form, fit_suspension
@@ -115,9 +117,12 @@ def _register(work: Work) -> Work:
 def _locate_base(work: Work) -> Work:
     moves = [(entry.kind, trial) for entry, trial in work.dataset.trials("calibration", *MOVES)]
     if not moves:
-        return work.saying(Verdict("base_frame", "missing", "no trial of kind spin: T_base_B stays as drawn"))
-    model, said = locate_base(work.chain, work.description, read_stations(work.description, moves))
-    return work.saying(*said) if model is None else work.with_model(model, said)
+        work = work.saying(Verdict("base_frame", "missing", "no trial of kind spin: T_base_B stays as drawn"))
+        return work.suggesting(*drive_next(work.chain, work.description, None, None))
+    stations = read_stations(work.description, moves)
+    model, said = locate_base(work.chain, work.description, stations)
+    work = work.saying(*said) if model is None else work.with_model(model, said)
+    return work.suggesting(*drive_next(work.chain, work.description, stations, model))
 
 
 def _locate_arm(work: Work) -> Work:
@@ -135,11 +140,14 @@ def _suspend(work: Work) -> Work:
 
 
 def _calibrate_geometry(work: Work) -> Work:
-    found, postures = calibrate_geometry(work.chain, work.description, postures_of(work)), postures_of(work)
-    work = work.with_model(*found)
-    if work.clock("robot") is not None or any(v.verdict == "refused" for v in found[1]):
+    chain, description, postures = work.chain, work.description, postures_of(work)
+    model, said = calibrate_geometry(chain, description, postures)
+    refused = any(v.verdict == "refused" for v in said)
+    suggested = record_next(work.dataset.urdf, chain, description, postures, model, refused)
+    work = work.with_model(model, said).suggesting(*suggested)
+    if work.clock("robot") is not None or refused:
         return work
-    return work.with_model(*calibrate_gears(work.chain, work.description, postures))
+    return work.with_model(*calibrate_gears(chain, description, postures))
 
 
 def _calibrate_joints(work: Work) -> Work:

@@ -11,6 +11,7 @@ from calibration.estimate import Estimate, Model
 from calibration.means import PostureMeans
 from calibration.postures import Postures, mean_postures, read_passing, read_postures
 from calibration.recording import Trial
+from calibration.remedy import Remedy
 from calibration.robot import Chain
 from calibration.schema import Description, TrialEntry
 from calibration.verdict import Verdict
@@ -54,6 +55,12 @@ class Work:
         e = self.estimate
         grown = replace(e, models=(*e.models, model.with_clocks(self.clocks)), verdicts=(*e.verdicts, *said), **parts)  # type: ignore[arg-type]
         return replace(self, estimate=grown)
+
+    def suggesting(self, remedy: Remedy | None, said: Sequence[Verdict]) -> "Work":
+        """With something to record next, if there is."""
+        work = self.saying(*said)
+        remedies = work.estimate.remedies if remedy is None else (*work.estimate.remedies, remedy)
+        return replace(work, estimate=replace(work.estimate, remedies=remedies))
 
     def saying(self, *said: Verdict) -> "Work":
         """With something to say and no model."""

@@ -1,0 +1,129 @@
+"""The five postures that would tell most of what the recorded ones leave to the tolerances.
+
+    C before = T^-1 Sigma T^-1,     Sigma the covariance of the fit, T = diag(tolerance)        (see `information`)
+    C after  = (C^-1 + sum_5 B' B)^-1
+
+A direction is untold where the data shrink its prior variance by less than a tenth, while postures elsewhere inside the
+limits would shrink it. Directions no posture tells, the gauge, do not move the hand and are not counted. The five are
+chosen by D, which looks for untold directions first. After a refused fit nothing of it is used: the postures are taken
+at the datasheet's random errors.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.design_pool import room_of
+from calibration.design_postures import Plan, Task, plan
+from calibration.errors import NotEnoughData
+from calibration.estimate import Model
+from calibration.hand import HandModel, nominal_hand
+from calibration.information import dwell_noise, prospect, told_directions
+from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
+from calibration.postures import Postures
+from calibration.remedy import Remedy, Sigma
+from calibration.robot import Chain
+from calibration.schema import Description
+from calibration.shapes import shapes_of
+from calibration.verdict import Verdict
+
+STAGE, FILE = "geometry", "record_next.yaml"
+N = 5
+_UNTOLD = 0.9  # of a direction's prior variance, left of it [-]
+_FALLS = 0.7  # sigma after over before, of parameters worth naming [-]
+_NAMED = 12
+_PROBES = 120  # postures anywhere inside the limits, for what could be told at all
+_SEED = 0  # the same data get the same suggestion
+
+
+@dataclass(frozen=True)
+class Known:
+    """What recorded postures tell of a geometry.
+
+    Attributes:
+        hand: The robot as far as it is known.
+        parameters: To be found, with tolerances.
+        play: (k,) random error of each joint's reading [rad, m].
+        description: With the marker noise the recorded postures had.
+        C: (p, p) covariance of the scaled parameters.
+        untold: Number of directions that postures could tell and these did not.
+    """
+
+    hand: HandModel
+    parameters: ParameterSet
+    play: np.ndarray
+    description: Description
+    C: np.ndarray
+    untold: int
+
+
+def record_next(
+    urdf: str, chain: Chain, description: Description, postures: Postures, model: Model, refused: bool
+) -> tuple[Remedy | None, tuple[Verdict, ...]]:
+    """Postures to record after the geometry `model` from `postures`; None where they would tell nothing new."""
+    rng = np.random.default_rng(_SEED)
+    known = _known(chain, description, postures, None if refused else model, rng)
+    lost = tuple(
+        p.name for p in model.parameters if p.status == "not_identifiable" and p.name in known.parameters.names
+    )
+    if not known.untold and not lost:
+        return None, ()
+    try:
+        room = room_of(shapes_of(urdf, chain, description), known.description, rng)
+        found = plan(Task(room, known.hand, known.parameters, known.play, known.C), N, "D", rng)
+    except NotEnoughData as error:
+        return None, (Verdict(STAGE, "warning", f"no postures to suggest: {error}"),)
+    remedy = _remedy(found, known, lost)
+    sigma = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in remedy.sigma[:3])
+    return remedy, (Verdict(STAGE, "warning", f"{remedy.why}; {N} postures that would tell, in {FILE}: {sigma}"),)
+
+
+def _known(
+    chain: Chain, description: Description, postures: Postures, model: Model | None, rng: np.random.Generator
+) -> Known:
+    """From a fit, or from the datasheet where there is none to rely on."""
+    parameters = geometry_parameters(chain, description)
+    hand, p = nominal_hand(chain, parameters.nominal[:12]), len(parameters)
+    play = np.maximum(play_start(chain, description), play_floor(chain, description))
+    if model is not None:
+        hand = model.hand(chain, parameters.nominal[:12])
+        play = model.play if len(model.play) else play
+    description = _as_measured(description, postures)
+    low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits())
+    anywhere = rng.uniform(low, high, size=(_PROBES, len(low)))
+    V = told_directions(prospect(hand, parameters, description, play, anywhere, anywhere[:1], np.eye(p)).B)
+    told = prospect(hand, parameters, description, play, postures.q, anywhere[:1], np.eye(p))
+    C = by_tolerance = told.after(np.arange(len(postures)))
+    if model is not None:
+        names = [x.name for x in model.parameters]
+        rows = [names.index(name) for name in parameters.names]
+        C = model.covariance[np.ix_(rows, rows)] / np.outer(parameters.scale, parameters.scale)
+    untold = int((np.linalg.eigvalsh(V.T @ by_tolerance @ V) > _UNTOLD).sum())
+    return Known(hand, parameters, play, description, C, untold)
+
+
+def _as_measured(description: Description, postures: Postures) -> Description:
+    """With the marker noise that makes dwells as uncertain as the recorded ones are."""
+    expected = dwell_noise(postures.T_base_hand, description)
+    if expected.shape != postures.covariance.shape:
+        return description
+    ratio = np.trace(np.linalg.solve(expected, postures.covariance), axis1=1, axis2=2) / expected.shape[1]
+    sigma = description.sigmas.marker * float(np.sqrt(np.median(ratio)))
+    return description.model_copy(update={"sigmas": description.sigmas.model_copy(update={"marker": sigma})})
+
+
+def _remedy(found: Plan, known: Known, lost: tuple[str, ...]) -> Remedy:
+    """The postures with what they do to the hand, to what was lost, and to what they tell most."""
+    hand = [float(found.design.prospect.hand(C).max()) for C in (found.design.prospect.C, found.design.C)]
+    whole = found.remedy(STAGE, "").sigma
+    most = sorted((s for s in whole if s.after < _FALLS * s.before), key=lambda s: s.after / s.before)[:_NAMED]
+    named = {s.name for s in most} | set(lost)
+    why = f"{known.untold} of {_directions(found)} combinations are told by the datasheet's tolerances alone"
+    if lost:
+        why += f"; not identifiable: {', '.join(lost)}"
+    told = (Sigma("hand.position", "m", *hand), *(s for s in whole if s.name in named))
+    return replace(found.remedy(STAGE, why), sigma=told)
+
+
+def _directions(found: Plan) -> int:
+    return int(told_directions(found.design.prospect.B).shape[1])

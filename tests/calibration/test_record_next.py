@@ -1,0 +1,146 @@
+"""What to record next, where the data leave something to the drawing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration import load_estimate, save_estimate
+from calibration.base_frame_stage import locate_base
+from calibration.estimate import Estimate, RobotNames
+from calibration.geometry import calibrate_geometry
+from calibration.hand import nominal_hand
+from calibration.hand_fit import linearised
+from calibration.information import dwell_noise
+from calibration.record_next import N, record_next
+from calibration.record_next_base import drive_next
+from calibration.remedy import read_remedies
+from calibration.robot import chain_of
+from calibration.twists import exp6
+from tests.calibration import matched, spinning
+
+DESCRIBED = matched.described()
+TRUTH = matched.defects(3)
+NOISE = 10.0  # of the markers, over the datasheet's
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return chain_of(mjcf.urdf(), DESCRIBED)
+
+
+def recorded(q, seed):
+    """Postures at angles q with noise as the markers make it."""
+    exact = matched.postures(TRUTH, q)
+    S = NOISE**2 * dwell_noise(exact.T_base_hand, DESCRIBED)
+    e = np.einsum("nij,nj->ni", np.linalg.cholesky(S), np.random.default_rng(seed).normal(size=(len(q), 6)))
+    return replace(exact, T_base_hand=exact.T_base_hand @ exp6(e), covariance=S)
+
+
+@pytest.fixture(scope="module")
+def still(chain):
+    """A campaign in which the torso and the last two joints never moved."""
+    q = matched.near_postures(np.random.default_rng(0), 25)
+    q[:, [0, 6, 7]] = 0.15, 0.1, 0.2
+    postures = recorded(q, 1)
+    return postures, *calibrate_geometry(chain, DESCRIBED, postures)
+
+
+@pytest.fixture(scope="module")
+def suggested(chain, still):
+    return record_next(mjcf.urdf(), chain, DESCRIBED, still[0], still[1], False)
+
+
+def test_five_postures_tell_what_joints_that_never_moved_left_open(suggested, still):
+    remedy, said = suggested
+    assert still[1].rank < 36 and len(remedy.postures) == N == 5
+    assert (
+        f"{36 - still[1].rank} of 36 combinations" in remedy.why
+        and said[0].verdict == "warning"
+        and "record_next.yaml" in said[0].message
+    )
+    assert remedy.sigma[0].name == "hand.position" and remedy.sigma[0].after < 0.1 * remedy.sigma[0].before
+    q = np.array([p.q for p in remedy.postures])
+    assert np.ptp(q[:, 0]) > 0.1 and np.ptp(q[:, 6]) > 0.5 and np.ptp(q[:, 7]) > 0.5
+
+
+def test_recording_them_gives_the_sigmas_that_were_predicted(chain, suggested, still):
+    """The five recorded and everything calibrated again: the fit's own sigmas, and errors they explain."""
+    remedy, _ = suggested
+    postures, before, _ = still
+    more = recorded(np.array([p.q for p in remedy.postures]) - TRUTH.offset, 2)
+    after, said = calibrate_geometry(chain, DESCRIBED, postures.joined(more))
+    assert after.rank == 36 and all(v.verdict == "ok" for v in said)
+    names = [p.name for p in before.parameters]
+    old, new = (np.array([m.parameters[names.index(s.name)].sigma for s in remedy.sigma[1:]]) for m in (before, after))
+    np.testing.assert_allclose([s.before for s in remedy.sigma[1:]], old, rtol=1e-6)
+    ratio = np.array([s.after for s in remedy.sigma[1:]]) / new
+    assert (ratio > 0.5).all() and (ratio < 1.6).all()  # play is estimated anew, and the width of the priors
+    assert (old / new > 2.0).all()
+
+
+def test_enough_postures_ask_for_no_more(chain):
+    postures = recorded(matched.near_postures(np.random.default_rng(0), 40), 1)
+    model, _ = calibrate_geometry(chain, DESCRIBED, postures)
+    assert record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, False) == (None, ())
+
+
+def test_a_refused_fit_ends_with_postures_too(chain):
+    postures = recorded(matched.near_postures(np.random.default_rng(0), 4), 1)
+    model, said = calibrate_geometry(chain, DESCRIBED, postures)
+    assert any(v.verdict == "refused" for v in said)
+    remedy, _ = record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, True)
+    assert len(remedy.postures) == N and remedy.sigma[0].after < 0.6 * remedy.sigma[0].before
+
+
+@pytest.mark.slow
+def test_the_same_data_get_the_same_postures(chain, still, suggested):
+    assert record_next(mjcf.urdf(), chain, DESCRIBED, still[0], still[1], False) == suggested
+
+
+def test_what_is_predicted_of_a_dwell_is_its_derivative(chain):
+    """B of the recorded postures is the fit's own whitened Jacobian, play none."""
+    from calibration.information import prospect
+    from calibration.parameters import geometry_parameters
+
+    parameters = geometry_parameters(chain, DESCRIBED)
+    hand = nominal_hand(chain, parameters.nominal[:12])
+    q = matched.near_postures(np.random.default_rng(0), 5)
+    exact = replace(matched.postures(matched.Truth(), q), covariance=dwell_noise(hand.poses(q), DESCRIBED))
+    J = linearised(hand, parameters.nominal, exact).J
+    W = np.linalg.inv(np.linalg.cholesky(exact.covariance))
+    told = prospect(hand, parameters, DESCRIBED, np.zeros(8), q, q[:1], np.eye(len(parameters)))
+    np.testing.assert_allclose(told.B, W @ J * parameters.scale, rtol=1e-6, atol=1e-5)
+
+
+def test_a_missing_drive_is_asked_for_and_tells_what_it_should(chain):
+    """Predicted from the spin alone; then driven."""
+    rng = np.random.default_rng(0)
+    spun = spinning.stations(*spinning.path(drives=0), spinning.SIGMA, rng)
+    model, _ = locate_base(chain, DESCRIBED, spun)
+    remedy, said = drive_next(chain, DESCRIBED, spun, model)
+    assert [m.kind for m in remedy.motions] == ["drive"] and said[0].verdict == "warning"
+    heading = next(s for s in remedy.sigma if s.name.endswith("rz"))
+    assert heading.before == pytest.approx(DESCRIBED.tolerances.body_rotation)
+    both, _ = locate_base(chain, DESCRIBED, spinning.stations(*spinning.path(), spinning.SIGMA, rng))
+    assert heading.after == pytest.approx(both.parameters[5].sigma, rel=0.4)
+    assert drive_next(chain, DESCRIBED, spinning.stations(*spinning.path()), both) == (None, ())
+
+
+def test_no_motion_of_the_base_at_all_asks_for_both(chain):
+    remedy, _ = drive_next(chain, DESCRIBED, None, None)
+    assert [m.kind for m in remedy.motions] == ["spin", "drive"]
+    assert {s.name[-2:] for s in remedy.sigma} >= {".x", ".y", "rz"}
+    assert all(s.after < 0.1 * s.before for s in remedy.sigma if s.name[-2:] in (".x", ".y", "rz"))
+
+
+def test_the_estimate_keeps_them_as_a_file(chain, suggested, tmp_path):
+    names = RobotNames(chain.measured, chain.base_frame, chain.tool_frame)
+    remedies = (suggested[0], drive_next(chain, DESCRIBED, None, None)[0])
+    estimate = Estimate("not_calibrated", (), (), (), "", mjcf.urdf(), names, remedies=remedies)
+    save_estimate(estimate, tmp_path)
+    assert read_remedies(tmp_path / "record_next.yaml") == (chain.measured, remedies)
+    assert load_estimate(tmp_path).remedies == remedies
+    save_estimate(replace(estimate, remedies=()), tmp_path)
+    assert not (tmp_path / "record_next.yaml").exists()
