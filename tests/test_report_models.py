@@ -221,12 +221,15 @@ def test_stiffness_stands_beside_the_truth(whole):
 
 
 def test_damping_stands_beside_the_truth_even_where_nothing_gives(run):
-    true = [[None if i == j == 2 else float(v) for j, v in enumerate(row)] for i, row in enumerate(0.5 * C)]
-    (run / "truth/truth.json").write_text(json.dumps({"derived": {"K": true, "C": true}, "parameters": []}))
+    true = {
+        letter: [[None if i == j == 2 else float(v) for j, v in enumerate(row)] for i, row in enumerate(matrix)]
+        for letter, matrix in (("K", 0.8 * K), ("C", 0.5 * C))
+    }
+    (run / "truth/truth.json").write_text(json.dumps({"derived": true, "parameters": []}))
     write(run)
     table = "Damping C of the base, identified and true"
     assert row_of(run, table, "roll, roll")[:4] == ["N.m.s/rad", fixed(C[3, 3], 0), "–", fixed(0.5 * C[3, 3], 0)]
-    assert row_of(run, table, "z, z")[3] == "–"
+    assert [row_of(run, of, "z, z")[3] for of in (table, "Stiffness K")] == ["–", "–"]
 
 
 def test_wheels_are_told_as_combinations_with_the_rank_of_one_wrench(whole):
