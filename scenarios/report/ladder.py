@@ -85,7 +85,10 @@ def _index(known: Sequence[str], name: str) -> int:
 
 
 def predictive(steps: Iterable[Step], model: str) -> Step | None:
-    """The row of a model that reads motor encoders and no measured base; the one that models the base's motion best."""
+    """The row of a model that reads motor encoders and no measured base.
+
+    The base's motion from dynamics, which a robot knows wherever it stands; else from a plate, else none.
+    """
     return _first(steps, model, _PREDICTIVE)
 
 
