@@ -30,7 +30,7 @@ def test_a_wrong_plate_is_refused_and_the_command_ends_with_1(
     """Neither passes for a clock that is off by half a period."""
     copy = rewritten(folder, tmp_path / "dataset", dict.fromkeys(CALIBRATION, lambda t: read_on(axes, t)))
     with pytest.raises(SystemExit) as end:
-        cli.main(("calibrate", str(copy), "--out", str(tmp_path / "estimate"), "--stages", "suspension"))
+        cli.main(("calibrate", str(copy), "--out", str(tmp_path / "estimate"), "--stages", "registration,suspension"))
     printed = capsys.readouterr()
     assert end.value.code == 1 and "must not be used" in printed.err and said in printed.out
     found = load_estimate(tmp_path / "estimate")
