@@ -20,7 +20,7 @@ from calibration.comparison import comparisons
 from calibration.dataset import Dataset
 from calibration.errors import NotEnoughData
 from calibration.estimate import Estimate
-from calibration.evaluation_checks import moved_in_trials
+from calibration.evaluation_checks import moved_in_trials, no_better
 from calibration.joint_regimes import Explained, on_repetitions, on_validation
 from calibration.markers import hand_body
 from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics
@@ -106,6 +106,7 @@ class Evaluation:
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         part = folder / "evaluation.json.part"
+        compared = tuple(comparisons(self.traces))
         content = {
             "schema": 1,
             "rows": [row_entry(r) for r in self.rows],
@@ -114,8 +115,8 @@ class Evaluation:
             "trials": [trial_entry(t) for t in self.traces],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],
             "regimes": [x.entry() for x in self.regimes],
-            "verdicts": [asdict(v) for v in self.verdicts],
-            "comparisons": [asdict(c) for c in comparisons(self.traces)],
+            "verdicts": [asdict(v) for v in (*self.verdicts, *no_better(compared))],
+            "comparisons": [asdict(c) for c in compared],
         }
         part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
         os.replace(part, folder / "evaluation.json")

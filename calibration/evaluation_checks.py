@@ -1,6 +1,7 @@
-"""Held-out trials whose errors are not the model's: the base was pushed, rolled or lifted while they were recorded.
+"""What is to be said of an evaluation: trials whose errors are not the model's, rows worse than those they build on.
 
-No prediction is told; those that do not measure the base keep the place it had in the first second.
+A base that was pushed, rolled or lifted while a trial was recorded: no prediction is told, and those that do not
+measure the base keep the place it had in the first second.
 """
 
 from collections.abc import Iterable, Iterator
@@ -9,6 +10,7 @@ import numpy as np
 
 from calibration.base_motion import MOVES
 from calibration.bodies import poses_of
+from calibration.comparison import Comparison
 from calibration.markers import base_body
 from calibration.recording import Trial
 from calibration.schema import Description, TrialEntry
@@ -27,6 +29,14 @@ def moved_in_trials(description: Description, pairs: Iterable[tuple[TrialEntry, 
     if told:
         message = f"base moved during {told}: their errors with the base not measured are not the model's"
         yield Verdict(STAGE, "warning", message)
+
+
+def no_better(compared: Iterable[Comparison]) -> Iterator[Verdict]:
+    """A warning for each row that is worse than the one it builds on, and why where that is known."""
+    for c in compared:
+        if c.finding == "worse":
+            message = f"{c.b[0]} ({c.b[1]}) is worse than {c.a[0]} by {c.difference_mm:.2f} mm"
+            yield Verdict(STAGE, "warning", message + (f": {c.reason}" if c.reason else ""))
 
 
 def _moved(description: Description, trial: Trial) -> str:

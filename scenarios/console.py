@@ -155,15 +155,9 @@ def frames(results: Path) -> Table | None:
 
 
 def remarks(results: Path) -> list[str]:
-    """Return what to know of the figures: trials that are not the model's, rows worse than those they build on."""
+    """Return what an evaluation says of its trials and rows, to know before its figures are used."""
     evaluation = json.loads((results / "evaluation.json").read_text(encoding="utf-8"))
-    found = evaluation.get("comparisons", [])
-    return [v["message"] for v in evaluation.get("verdicts", [])] + [
-        f"{c['b'][0]} ({c['b'][1]}) is worse than {c['a'][0]} by {c['difference_mm']:.2f} mm"
-        + (f": {c['reason']}" if c.get("reason") else "")
-        for c in found
-        if c["finding"] == "worse"
-    ]
+    return [v["message"] for v in evaluation.get("verdicts", [])]
 
 
 def verdicts(found: Sequence[Any]) -> Table:

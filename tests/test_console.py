@@ -83,20 +83,7 @@ def test_steps_are_bars_on_a_terminal(fails):
     assert last == {"simulate": "100", "calibrate": "25" if fails else "100"}
 
 
-def test_a_row_that_is_worse_is_told_with_its_reason(tmp_path):
-    rows = [
-        {
-            "a": ["nominal", "fixed"],
-            "b": ["model_1", "plate"],
-            "difference_mm": 0.123,
-            "finding": finding,
-            "reason": why,
-        }
-        for finding, why in (("worse", "the base moved the hand by 0.40 mm"), ("better", "it did"), ("worse", ""))
-    ]
-    (tmp_path / "evaluation.json").write_text(json.dumps({"rows": [], "comparisons": rows}))
-    told = "model_1 (plate) is worse than nominal by 0.12 mm"
-    assert console.remarks(tmp_path) == [f"{told}: the base moved the hand by 0.40 mm", told]
+def test_what_an_evaluation_says_is_told(tmp_path):
     moved = [{"stage": "evaluation", "verdict": "warning", "message": "base moved during xyz"}]
     (tmp_path / "evaluation.json").write_text(json.dumps({"rows": [], "verdicts": moved}))
     assert console.remarks(tmp_path) == ["base moved during xyz"]
