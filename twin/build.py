@@ -102,7 +102,8 @@ def _sense(spec: mujoco.MjSpec, links: Sequence[str]) -> None:
     for link in links:
         for kind in _POSES:
             spec.add_sensor(name=f"{link}.{kind.name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_XBODY, objname=link)
-    for site in ("plate", *_wrist_sites(spec)):
+    plates = [s.name for s in spec.sites if s.name.startswith("plate")]
+    for site in (*plates, *_wrist_sites(spec)):
         for kind in _WRENCH:
             spec.add_sensor(name=f"{site}.{kind.name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
 

@@ -12,6 +12,7 @@ from pydantic import Field, field_validator
 from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
+from twin.config_datasheet import Datasheet
 from twin.config_departures import Departures
 from twin.config_driving import Driving
 from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, WristSensor
@@ -176,6 +177,7 @@ class Instruments:
         motor_encoders: Eccentricity on the motor side.
         mocap: What is wrong with the motion capture.
         plate: With the plate.
+        plate_grid: Into how many plates, along x and y, the plate's square is cut; no wheel may stand on a seam.
         log: With the robot's log.
         wrist: The force-torque sensor of the wrist; null: none.
     """
@@ -195,6 +197,7 @@ class Instruments:
     mocap: MocapErrors = field(default_factory=MocapErrors)
     plate: PlateErrors = field(default_factory=PlateErrors)
     log: LogErrors = field(default_factory=LogErrors)
+    plate_grid: tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]] = (1, 1)
     wrist: WristSensor | None = field(default_factory=WristSensor)
 
 
@@ -240,21 +243,6 @@ class Campaign:
 
 
 @dataclass(frozen=True, config=STRICT)
-class Datasheet:
-    """Tolerances declared to the laboratory, standard deviations; see `calibration.schema.Tolerances`."""
-
-    joint_translation: FixedPositive
-    joint_rotation: FixedPositive
-    encoder_offset: FixedPositive
-    joint_play: FixedPositive
-    body_translation: FixedPositive
-    body_rotation: FixedPositive
-    link_mass: FixedPositive
-    link_com: FixedPositive
-    payload_mass: FixedNonNegative
-
-
-@dataclass(frozen=True, config=STRICT)
 class TwinConfig:
     """Everything `record` needs beside a seed.
 
@@ -291,6 +279,10 @@ class TwinConfig:
     session: Session = field(default_factory=Session)
 
     def __post_init__(self) -> None:
-        """Only wheels on bushings and contacts can roll."""
+        """Only wheels on bushings and contacts can roll; only contacts press on one plate or another."""
+        if self.base.wheels == "anchored" and self.instruments.plate_grid != (1, 1):
+            raise ValueError(
+                "instruments.plate_grid: anchored wheels press on the floor as a whole; use contact or rigid"
+            )
         if "wheels" in self.campaign.driving.forms and self.base.wheels != "contact":
             raise ValueError(f"campaign.driving.forms: wheels cannot roll where base.wheels is {self.base.wheels!r}")

@@ -15,6 +15,7 @@ from calibration.schema import (
 )
 from twin.config import TwinConfig
 from twin.draw import BASE, TOOL, TORSO
+from twin.instruments.tiles import Tiles
 
 _LAB_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -35,7 +36,7 @@ def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Descripti
             for n, b in i.bodies.items()
         ),
         wheels=tuple(Wheel(name=w.name, type=w.type, centre=w.centre, contact=w.contact) for w in mjcf.wheels()),
-        plates=(_plate(),),
+        plates=_plates(Tiles(i.plate_grid)),
         payload=_payload(config),
         sigmas=Sigmas(
             marker=i.marker_noise, encoder=finest, plate_force=i.plate_force_noise, plate_moment=i.plate_moment_noise
@@ -54,12 +55,14 @@ def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Descripti
     )
 
 
-def _plate() -> Plate:
+def _plates(tiles: Tiles) -> tuple[Plate, ...]:
     spec = mjcf.spec()
     plate, geom = spec.body("plate"), spec.geom("plate")
     x, y, z = map(float, plate.pos + spec.site("plate").pos)
-    size = 2.0 * geom.size
-    return Plate(name="plate", centre=(x, y, z), axes=_LAB_AXES, size=(float(size[0]), float(size[1])))
+    cut = tiles.cut(*(2.0 * geom.size[:2]).tolist())
+    return tuple(
+        Plate(name=t.name, centre=(x + t.shift[0], y + t.shift[1], z), axes=_LAB_AXES, size=t.size) for t in cut
+    )
 
 
 def _payload(config: TwinConfig) -> Payload | None:

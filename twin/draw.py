@@ -18,6 +18,7 @@ from twin.defects.loads import Flexibility, LinkMass, Payload
 from twin.defects.placements import Placement
 from twin.defects.sensing import Cluster, Encoder
 from twin.draw_base import ground, wheels_of
+from twin.instruments.tiles import Tiles
 from twin.randomness import generator
 
 TORSO = "torso_lift_joint"
@@ -52,6 +53,7 @@ def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
     wheels = wheels_of(config.base)
     return Robot(
         defects=(
+            Tiles(config.instruments.plate_grid),
             *_placements(config, seed),
             *_masses(config, nominal, seed),
             *_gears(config, seed),

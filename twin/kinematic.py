@@ -36,6 +36,7 @@ def carried(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
         command=q,
         poses=dict(zip(twin.links, poses, strict=True)),
         wrench=np.zeros((len(q), 6)),
+        plates=np.zeros((len(q), 1, 6)),
         wrist=np.zeros((len(q), 6)),
     )
 

@@ -19,6 +19,7 @@ from twin.draw import BASE, Robot
 from twin.instruments import mocap, optics, plate, robot_log, wrist
 from twin.instruments.clock import Clock, Latency
 from twin.instruments.sampling import averaged, interpolate, interpolate_poses
+from twin.instruments.tiles import Tiles, felt
 from twin.kinematic import without_plate
 from twin.laboratory import EPOCH, Laboratory
 from twin.motions import JOINTS, Motion
@@ -57,10 +58,10 @@ def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tu
         marker_body=tuple(c.name for c in lab.robot.clusters for _ in c.marker_names),
         t_mocap=t_mocap,
         marker_position=_markers(lab, motion, states, true, start),
-        plate=(PLATE,),
+        plate=Tiles(i.plate_grid).names,
         t_plate=t_plate,
-        plate_wrench=_wrench(lab, motion, states, true_plate, start)[:, None],
-        plate_centre=plate_centre(lab.twin.model)[None],
+        plate_wrench=_wrenches(lab, motion, states, true_plate, start),
+        plate_centre=plate_centres(lab.twin.model),
         dwell_start=motion.dwells[:, 0] + start + late,
         dwell_stop=motion.dwells[:, 1] + start + late,
         approach=motion.approach,
@@ -91,12 +92,15 @@ def _wrist(lab: Laboratory, motion: Motion, states: States, t: np.ndarray) -> np
 
 def instrument_errors(lab: Laboratory) -> tuple[Defect | Clock | Latency, ...]:
     """Every constant of the instruments; the clocks against the motion capture's, latencies included."""
-    i, (robot, force), worn = lab.config.instruments, clocks(lab.config), _plate(lab)
+    i, (robot, force), worn = lab.config.instruments, clocks(lab.config), _plates(lab)
     late = i.mocap.latency
-    robot, force = replace(robot, offset=robot.offset + late), replace(force, offset=force.offset + late - worn.delay)
-    latencies = (Latency("mocap", late), Latency("robot", i.log.latency), Latency("plate", worn.delay))
+    robot, force = (
+        replace(robot, offset=robot.offset + late),
+        replace(force, offset=force.offset + late - worn[0].delay),
+    )
+    latencies = (Latency("mocap", late), Latency("robot", i.log.latency), Latency("plate", worn[0].delay))
     held = () if i.wrist is None else (wrist.draw(i.wrist, generator(lab.seed, "wrist")),)
-    return robot, force, *(x for x in latencies if x.value), worn, _volume(lab), *held
+    return robot, force, *(x for x in latencies if x.value), *worn, _volume(lab), *held
 
 
 def plate_centre(model: mujoco.MjModel) -> np.ndarray:
@@ -106,19 +110,30 @@ def plate_centre(model: mujoco.MjModel) -> np.ndarray:
     return data.site("plate").xpos.copy()
 
 
-def _plate(lab: Laboratory) -> plate.PlateDefect:
-    return plate.draw(PLATE, lab.config.instruments.plate, generator(lab.seed, "plate", PLATE))
+def plate_centres(model: mujoco.MjModel) -> np.ndarray:
+    """Surface centre of each plate in the lab (n_plates, 3) [m]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return np.array([data.site(name).xpos for name in felt(model) or (PLATE,)])
+
+
+def _plates(lab: Laboratory) -> tuple[plate.PlateDefect, ...]:
+    i = lab.config.instruments
+    return tuple(plate.draw(n, i.plate, generator(lab.seed, "plate", n)) for n in Tiles(i.plate_grid).names)
 
 
 def _volume(lab: Laboratory) -> optics.Volume:
     return optics.volume(lab.config.instruments.mocap, generator(lab.seed, "volume"))
 
 
-def _wrench(lab: Laboratory, motion: Motion, states: States, true: np.ndarray, start: float) -> np.ndarray:
+def _wrenches(lab: Laboratory, motion: Motion, states: States, true: np.ndarray, start: float) -> np.ndarray:
+    """What the plates say (n, n_plates, 6), one after the other in the stream of their noise."""
     i = lab.config.instruments
     sigma = np.repeat([i.plate_force_noise, i.plate_moment_noise], 3)
     at = plate.Sampling(true, EPOCH, i.plate_rate, sigma)
-    return plate.measured(at, states.t + start, states.wrench, _plate(lab), generator(lab.seed, motion.id, "plate"))
+    rng, t = generator(lab.seed, motion.id, "plate"), states.t + start
+    each = zip(np.moveaxis(states.plates, 1, 0), _plates(lab), strict=True)
+    return np.stack([plate.measured(at, t, wrench, worn, rng) for wrench, worn in each], axis=1)
 
 
 def _markers(lab: Laboratory, motion: Motion, states: States, true: TruthTrial, start: float) -> np.ndarray:

@@ -10,6 +10,7 @@ from mujoco import rollout
 from twin.build import Twin
 from twin.conventions import states_with_their_sensors, transform
 from twin.inputs import driven, prepare
+from twin.instruments.tiles import felt
 from twin.motions import JOINTS, Motion
 from twin.root import anchored, floor_wrench
 from twin.stability import check
@@ -30,6 +31,7 @@ class States:
         command: Interpolated set-points (n, 8) [m, rad].
         poses: T_lab_link (n, 4, 4) by link.
         wrench: Action of the robot on the plate, lab axes, about the plate's centre (n, 6) [N, N.m].
+        plates: Its parts on each plate, about that one's centre (n, n_plates, 6) [N, N.m].
         wrist: Action of the hand on the wrist's sensor, its axes, about its origin (n, 6) [N, N.m].
     """
 
@@ -41,6 +43,7 @@ class States:
     command: np.ndarray
     poses: dict[str, np.ndarray]
     wrench: np.ndarray
+    plates: np.ndarray
     wrist: np.ndarray
 
 
@@ -75,6 +78,8 @@ def _unpack(
     velocity = np.stack([qvel[:, model.joint(driven(j)).dofadr[0]] for j in JOINTS], axis=1)
     servos = [model.actuator(driven(j)).id for j in JOINTS]
     kp, kv = model.actuator_gainprm[servos, 0], -model.actuator_biasprm[servos, 2]
+    wrench = _floor_wrench(model, qpos, qvel) if anchored(model) else _wrench(model, sensors, "plate")
+    several = felt(model)
     return States(
         t=np.arange(len(states)) * model.opt.timestep,
         motor=motor,
@@ -83,7 +88,8 @@ def _unpack(
         torque=kp * (command - motor) - kv * velocity,
         command=command,
         poses={name: _pose(model, sensors, name) for name in links},
-        wrench=_floor_wrench(model, qpos, qvel) if anchored(model) else _wrench(model, sensors),
+        wrench=wrench,
+        plates=np.stack([_wrench(model, sensors, n) for n in several], axis=1) if several else wrench[:, None],
         wrist=_wrist(model, sensors),
     )
 
@@ -104,12 +110,12 @@ def _floor_wrench(model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> 
     return floor_wrench(model, qpos, qvel, data.site("plate").xpos)
 
 
-def _wrench(model: mujoco.MjModel, sensors: np.ndarray) -> np.ndarray:
-    """Action on the plate: the site's sensors give what holds the plate up, less its own weight."""
-    support = _held_up(model, sensors, "plate")
-    plate = model.body(model.site("plate").bodyid[0])
+def _wrench(model: mujoco.MjModel, sensors: np.ndarray, site: str) -> np.ndarray:
+    """Action on a plate: its site's sensors give what holds it up, less its own weight."""
+    support = _held_up(model, sensors, site)
+    plate = model.body(model.site(site).bodyid[0])
     weight = plate.mass[0] * model.opt.gravity
-    lever = plate.ipos - model.site("plate").pos
+    lever = plate.ipos - model.site(site).pos
     return -support - np.concatenate([weight, np.cross(lever, weight)])
 
 

@@ -8,11 +8,13 @@ import numpy as np
 
 from twin.errors import Diverged, NotStanding
 from twin.inputs import Inputs
+from twin.instruments.tiles import felt
 from twin.motions import SETTLE, Motion
 from twin.root import ROOT, base_poses
 
 _FAST = 100.0  # [m/s, rad/s] nothing of this robot moves like that
 _MIN_UPRIGHT = 0.98  # [-] cosine of the base's tilt below which the robot has tipped
+_SEAM = 0.01  # [m] a wheel nearer to a seam may touch both plates
 _WHEEL = "_contact"  # ends the name of a wheel's contact geom
 
 
@@ -57,6 +59,21 @@ def _on_plate(inputs: Inputs, motion: Motion, T_lab_base: np.ndarray) -> None:
             p_plate = T_lab_base[:, :2, :3] @ p_base + T_lab_base[:, :2, 3] - plate.xpos[:2]
             left = (np.abs(p_plate) > half).any(axis=1)
             _refuse(left, f"{name.removesuffix(_WHEEL)} is off the plate", motion, model.opt.timestep)
+            on_seam = (np.abs(p_plate[:, None] - _seams(model)) < _SEAM).any(axis=(1, 2))
+            what = f"{name.removesuffix(_WHEEL)} stands on a seam of plate_grid and would touch both plates"
+            _refuse(on_seam, what, motion, model.opt.timestep)
+
+
+def _seams(model: mujoco.MjModel) -> np.ndarray:
+    """Where plates meet (n, 2), x and y from the whole square's centre [m], NaN for the other axis."""
+    centres = np.array([model.body(model.site(name).bodyid[0]).pos[:2] for name in felt(model)]).reshape(-1, 2)
+    found = [np.empty((0, 2))]
+    for axis in range(2):
+        along = np.unique(np.round(centres[:, axis], 9))
+        seams = np.full((max(len(along) - 1, 0), 2), np.nan)
+        seams[:, axis] = 0.5 * (along[1:] + along[:-1])
+        found.append(seams)
+    return np.concatenate(found)
 
 
 def _refuse(found: np.ndarray, what: str, motion: Motion, step: float) -> None:
