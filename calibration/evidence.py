@@ -18,7 +18,6 @@ from calibration.linearised import Linearised, Prior
 
 _HELD = 20.0
 _STEPS = 30
-_SAME = 1e-3  # iterations stop below this change of any log v, or log f [-]
 _LARGEST = 1.0  # of a standard deviation [rad, m]: data that ask for more do not belong to the model
 _NEGLIGIBLE = 10.0  # standard deviations below this many floors need not stand still
 
@@ -79,8 +78,8 @@ class _Point:
     spread: np.ndarray
 
 
-def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Widths:
-    """Widths of highest evidence for the linearised problem."""
+def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: float) -> Widths:
+    """Widths of highest evidence for the linearised problem, to a change of their logarithms below `same`."""
     damping, now = 1e-3, _point(at, noise, prior, widths)
     for _ in range(_STEPS):
         f = _prior_factors(prior, now, widths.prior)
@@ -92,7 +91,7 @@ def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Width
         damping = 0.1 * damping
         moved = max(moved_by(widths.noise, v, _NEGLIGIBLE * noise.floor), moved_by(widths.prior, f, 1e-12) / 2.0)
         widths, now = Widths(v, f), trial
-        if moved < _SAME:
+        if moved < same:
             break
     return widths
 

@@ -64,7 +64,10 @@ def fit_robustly(chain: Chain, parameters: ParameterSet, postures: Postures, err
     """The fit of the postures that agree, from nominal values."""
     nominal = nominal_hand(chain, parameters.nominal[:12])
     return robust_fit(
-        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors), len(postures), parameters.nominal
+        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors),
+        len(postures),
+        6,
+        parameters.nominal,
     )
 
 

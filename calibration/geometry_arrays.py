@@ -39,7 +39,7 @@ from calibration.verdict import Verdict
 _STAGE = "geometry"
 _LEAST = 1e-6  # [m, rad] smallest noise of a measured pose
 _FIXED = 1e-6  # [rad]
-_SPREAD = 250  # postures from which rank and combinations are told
+_SPREAD = 120  # postures from which rank and combinations are told
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,10 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     pose = np.array([widths.position, widths.orientation][: 1 + oriented])
     errors = Errors(reading, 1e-2 * reading, pose)
     found = robust_fit(
-        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors), len(postures), parameters.nominal
+        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors),
+        len(postures),
+        3 + 3 * oriented,
+        parameters.nominal,
     )
     known = identifiability(found.fit.J_white[: 6 * _SPREAD], parameters)
     if refused := list(unusable_fit(chain, parameters, found, known, len(postures))):

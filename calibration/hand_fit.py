@@ -46,7 +46,8 @@ def fit(model: HandModel, parameters: ParameterSet, postures: Postures, play: np
         floor: (k,) least of them: the encoders' own noise [rad, m].
     """
     errors = Errors(np.maximum(play, floor), floor, np.zeros(0))
-    return solve(hand_problem(model, parameters, postures, errors), parameters.nominal)
+    problem = hand_problem(model, parameters, postures, errors)
+    return solve(problem, problem.linearise(parameters.nominal))
 
 
 def hand_problem(model: HandModel, parameters: ParameterSet, postures: Postures, errors: Errors) -> Problem:
@@ -78,7 +79,7 @@ def fit_weighted(model: HandModel, parameters: ParameterSet, postures: Postures,
 
     prior = replace(parameters, group=None).prior
     problem = Problem(lambda theta: linearised(model, theta, postures), sources, prior, Widths(still, np.zeros(0)))
-    found = solve(problem, parameters.nominal)
+    found = solve(problem, problem.linearise(parameters.nominal))
     factor = float((found.r_white**2).sum()) / max(1, found.r_white.size - len(parameters))
     return replace(found, covariance=factor * found.covariance)
 

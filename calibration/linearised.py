@@ -25,6 +25,10 @@ class Linearised:
         """Some of the postures."""
         return Linearised(self.theta, self.r[chosen], self.J[chosen], self.J_joint[chosen])
 
+    def moved(self, change: np.ndarray) -> "Linearised":
+        """The same linear problem at theta + change."""
+        return Linearised(self.theta + change, self.r + self.J @ change, self.J, self.J_joint)
+
 
 @dataclass(frozen=True)
 class Prior:

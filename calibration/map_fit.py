@@ -22,10 +22,10 @@ from calibration.evidence import Noise, Widths, inverse_and_log_det, moved_by, r
 from calibration.linearised import Linearised, Prior
 
 _OUTER = 15
-_PROMISE = 1e-10  # Gauss-Newton stops when a step promises a smaller decrease of the cost [-]: 1e-5 sigma
-_SAME = 1e-3  # outer iterations stop below this change of log s [-]
-_HASTY = 0.05
-_MANY = 160  # postures the evidence is asked with: standard deviations to 4 %
+_PROMISE = 1e-7  # the last Gauss-Newton step promises a smaller decrease of the cost [-]: 3e-4 sigma
+_SAME = 1e-2  # outer iterations stop below this change of log s [-], a fraction of what 160 postures tell
+_HASTY = 0.1
+_MANY = 960  # components the evidence is asked with: standard deviations to 4 %
 _LEVERAGE = 20.0  # components per parameter above which a posture hardly moves its own prediction
 _ALIKE = 1e-5  # smallest over largest pivot of the normal equations [-]
 _log = logging.getLogger(__name__)
@@ -105,25 +105,24 @@ class _Step:
 
 
 def solve(
-    problem: Problem, theta: np.ndarray, weigh: Callable[[np.ndarray], np.ndarray] | None = None, hasty: bool = False
+    problem: Problem, at: Linearised, weigh: Callable[[np.ndarray], np.ndarray] | None = None, hasty: bool = False
 ) -> Fit:
-    """Alternate evidence and Gauss-Newton from theta (p,) until both stand still.
+    """Alternate evidence and Gauss-Newton until both stand still.
 
     Args:
         problem: What is to be fitted.
-        theta: Start.
+        at: The problem where to start.
         weigh: Weights (n,) from squared distances (n,) as `distances` gives them; one where it is not given.
-        hasty: Be content with widths to a twentieth and theta to a tenth of a sigma.
+        hasty: Be content with widths to a tenth and theta to a third of a sigma.
     """
     same, promise = (_HASTY, _HASTY) if hasty else (_SAME, _PROMISE)
-    at, widths = problem.linearise(theta), problem.widths
-    noise = problem.sources(at)
-    some = np.unique(np.linspace(0, len(at.r) - 1, _MANY).astype(int))
+    widths, noise = problem.widths, problem.sources(at)
+    some = spread(len(at.r), at.r.shape[1], _MANY)
     change = np.inf
     for _ in range(_OUTER):
         settled = change < same
         old = widths
-        widths = old if settled else refined(at.rows(some), noise.rows(some), problem.prior, widths)
+        widths = old if settled else refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
         W = noise.whitener(widths.noise)
         step = _step(problem.prior, at, W, widths)
         if not settled:
@@ -136,12 +135,17 @@ def solve(
             change = max(change, float(np.abs(noise.weight - before.weight).max()))
         still = step.promise < promise
         if still and settled:
-            return Fit(at, noise, widths, step.covariance, W, True)
+            return Fit(at.moved(step.change), noise, widths, step.covariance, W, True)
         lower = at if still else _descended(problem, at, W, widths, step)
         if lower is None:
             break
         at, noise = lower, replace(problem.sources(lower), weight=noise.weight)
     return Fit(at, noise, widths, step.covariance, W, False)
+
+
+def spread(n: int, d: int, components: int) -> np.ndarray:
+    """Evenly spread ones of n postures with d components each, together about as many as asked for."""
+    return np.unique(np.linspace(0, n - 1, components // d).astype(int))
 
 
 def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarray, change: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ import numpy as np
 from calibration.bodies import body_poses
 
 _MANY = 200  # postures the first guess is made from
+_FEW = 50  # that tell whether it is to be mirrored
 _ODD = 6.0  # a posture's misfit over the median one's beyond which its markers are not that body's [-]
 _FLAT = 1e-3  # third-largest-but-one extent over the largest below which markers stand in line [-]
 
@@ -51,7 +52,7 @@ def cluster(positions: np.ndarray) -> Cluster:
     """The cluster of markers (n, m, 3) [m], m >= 3 and not in line, NaN where one was not seen."""
     values, vectors = _scaled(positions)
     xyz = vectors * np.sqrt(np.maximum(values, 0.0))
-    m, some = positions.shape[1], _some(positions)
+    m, some = positions.shape[1], _some(positions, _FEW)
     mirrored, upright = (_misfit(body_poses(xyz * [1.0, 1.0, z], some).residual) for z in (-1.0, 1.0))
     if np.nanmedian(mirrored) < np.nanmedian(upright):
         xyz = xyz * [1.0, 1.0, -1.0]
@@ -78,7 +79,7 @@ def _misfit(residual: np.ndarray) -> np.ndarray:
 
 def _scaled(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Three largest eigenvalues (3,) and their vectors (m, 3) of the centred squared distances."""
-    positions, m = _some(positions), positions.shape[1]
+    positions, m = _some(positions, _MANY), positions.shape[1]
     D = np.zeros((m, m))
     for i in range(m):
         for j in range(i):
@@ -88,6 +89,6 @@ def _scaled(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values[::-1][:3], vectors[:, ::-1][:, :3]
 
 
-def _some(positions: np.ndarray) -> np.ndarray:
+def _some(positions: np.ndarray, many: int) -> np.ndarray:
     """Evenly spread postures, few enough for a first guess."""
-    return positions[np.unique(np.linspace(0, len(positions) - 1, _MANY).astype(int))]
+    return positions[np.unique(np.linspace(0, len(positions) - 1, many).astype(int))]

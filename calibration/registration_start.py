@@ -13,7 +13,7 @@ import numpy as np
 
 from calibration.se3 import compose, inverse, mean, to_vector
 
-_MANY = 200  # postures that are enough for a start
+_MANY = 100  # postures that are enough for a start
 _ROUNDS = 8  # of weighing by the inverse of the distance left: the sum of distances is minimised, not of squares
 _TRIMMED = 4.0  # distances beyond this many medians are left out in the end
 

@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from calibration.map_fit import Fit, Problem, distances, solve
+from calibration.linearised import Linearised
+from calibration.map_fit import Fit, Problem, distances, solve, spread
 
 _NU = 4.0
+_ROUGHLY = 2.0  # times the limit, for what few postures say of all
+_FEW = 300  # components that are enough to find where most agree
 _RARE = 1e-5  # share of good postures beyond the limit, were their errors Gaussian
-_MANY = 160  # postures that are enough to find where most agree
 _ROUNDS = 6
 
 
@@ -37,25 +39,24 @@ class RobustFit:
     distance: np.ndarray
 
 
-def robust_fit(problem: Callable[[np.ndarray], Problem], n: int, theta: np.ndarray) -> RobustFit:
-    """Fit from theta (p,); `problem` makes that of some of the n postures, given as a mask."""
-    everything, some = problem(np.ones(n, dtype=bool)), np.zeros(n, dtype=bool)
-    some[np.linspace(0, n - 1, min(n, _MANY)).astype(int)] = True
-    few = everything if some.all() else problem(some)
-    d = few.linearise(theta).r.shape[1]
+def robust_fit(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.ndarray) -> RobustFit:
+    """Fit from theta (p,); `problem` makes that of some of the n postures of d components, given as a mask."""
+    everything, some = problem(np.ones(n, dtype=bool)), spread(n, d, _FEW)
+    mask = np.isin(np.arange(n), some)
+    few = everything if mask.all() else problem(mask)
     limit = float(chi2.isf(_RARE, d))
-    found = solve(few, theta, lambda distance: (_NU + d) / (_NU + distance), hasty=True)
+    found = solve(few, few.linearise(theta), lambda distance: (_NU + d) / (_NU + distance), hasty=True)
     weight = np.zeros(n)
     weight[some] = found.noise.weight
-    distance = _judged(everything, found, weight)
-    kept = _near(distance, limit)
+    at, distance = _judged(everything, found, weight)
+    kept = _near(distance, _ROUGHLY * limit)
     for _ in range(_ROUNDS):
         good = everything if kept.all() else problem(kept)
-        found = solve(replace(good, widths=found.widths), found.theta)
+        found = solve(replace(good, widths=found.widths), at.rows(kept))
         if kept.all():
             distance = distances(found.at, found.noise, found.widths, found.covariance, np.zeros(len(theta)))
         else:
-            distance = _judged(everything, found, kept.astype(float))
+            at, distance = _judged(everything, found, kept.astype(float))
         if np.array_equal(_near(distance, limit), kept):
             break
         kept = _near(distance, limit)
@@ -67,7 +68,8 @@ def _near(distance: np.ndarray, limit: float) -> np.ndarray:
     return distance <= max(limit, float(np.median(distance)))
 
 
-def _judged(problem: Problem, found: Fit, weight: np.ndarray) -> np.ndarray:
+def _judged(problem: Problem, found: Fit, weight: np.ndarray) -> tuple[Linearised, np.ndarray]:
+    """The problem at what was found, and the squared distance (n,) of every posture."""
     at = problem.linearise(found.theta)
     noise = replace(problem.sources(at), weight=weight)
-    return distances(at, noise, found.widths, found.covariance, np.zeros(len(found.theta)))
+    return at, distances(at, noise, found.widths, found.covariance, np.zeros(len(found.theta)))
