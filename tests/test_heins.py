@@ -79,6 +79,12 @@ def test_the_table_of_frames_has_them_all(folder):
     assert tuple(sorted(table.columns[0].cells)) == tuple(sorted(FRAMES))
 
 
+def test_the_report_shows_the_frames(folder):
+    steps.report(folder)
+    assert "frame.base.arm = T_ba" in (folder / "report.html").read_text()
+    assert (folder / "figures/frames.svg").is_file()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1000, 1001, 1002])
 def test_a_spin_by_the_wheels_finds_the_base(tmp_path, seed):

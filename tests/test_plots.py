@@ -17,6 +17,7 @@ from scenarios.plots import (
     error_boxes,
     error_traces,
     figure,
+    frame_chain,
     hysteresis,
     intervals,
     joint_chain,
@@ -100,6 +101,7 @@ def test_a_line_ends_where_time_jumps_or_starts_anew():
     ("draw", "names"),
     [
         (joint_chain, ("backlash.", "gear.<joint>.", "encoder.<joint>.motor.", "encoder.<joint>.link.", "q_link")),
+        (frame_chain, ("frame.base.base", "frame.base.arm", "frame.tool.hand", "base_footprint", "$T_{ae}(q)$")),
         (wheeled_base, ("suspension.<wheel>.", "contact.<wheel>.", "base_footprint", "wrench", "$r_i$")),
     ],
 )

@@ -2,6 +2,7 @@
 
 from scenarios.plots.boxes import Sample, error_boxes
 from scenarios.plots.forest import Interval, intervals
+from scenarios.plots.frame_chain import FRAME_CHAIN, frame_chain
 from scenarios.plots.histogram import z_histogram
 from scenarios.plots.hysteresis import BACK, FORTH, Flank, hysteresis
 from scenarios.plots.joint_chain import JOINT_CHAIN, joint_chain
@@ -13,6 +14,7 @@ __all__ = [
     "BACK",
     "ESTIMATE",
     "FORTH",
+    "FRAME_CHAIN",
     "JOINT_CHAIN",
     "MISSED",
     "NOMINAL",
@@ -28,6 +30,7 @@ __all__ = [
     "error_boxes",
     "error_traces",
     "figure",
+    "frame_chain",
     "hysteresis",
     "intervals",
     "joint_chain",

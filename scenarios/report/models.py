@@ -7,7 +7,16 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.plots import JOINT_CHAIN, WHEELED_BASE, drawing, figure, joint_chain, wheeled_base
+from scenarios.plots import (
+    FRAME_CHAIN,
+    JOINT_CHAIN,
+    WHEELED_BASE,
+    drawing,
+    figure,
+    frame_chain,
+    joint_chain,
+    wheeled_base,
+)
 from scenarios.report import loads, loops, paper, regimes, stiffness, sway
 from scenarios.report.ladder import Step
 from scenarios.report.results import Results
@@ -58,6 +67,7 @@ def section(results: Results, steps: Sequence[Step]) -> Section:
         "load_rows": loads.load_rows(results, steps, trials),
     }
     figures = {
+        "frames": _diagram(frame_chain, *FRAME_CHAIN) if _has_frames(results) else None,
         "paper": paper.boxes(results, steps),
         "wheels": _diagram(wheeled_base, *WHEELED_BASE),
         "sway": sway.drawn(swayed) if swayed else None,
@@ -88,6 +98,10 @@ def section(results: Results, steps: Sequence[Step]) -> Section:
     )
     tables = zip(names, (values[c] for c in (*contents, "joint_lines", "regimes")), strict=True)
     return Section(values, figures, tuple(tables))
+
+
+def _has_frames(results: Results) -> bool:
+    return results.estimate is not None and any(m.name in ("base_frame", "arm_tool") for m in results.estimate.models)
 
 
 def _diagram(draw: Callable[[Axes], Axes], width: float, height: float) -> Figure:

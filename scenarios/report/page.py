@@ -19,7 +19,7 @@ from scenarios.report.recordings import instruments
 from scenarios.report.results import Results, read
 
 _TEMPLATES = Path(__file__).parent.parent / "templates"
-_NAMES = ("paper", "wheels", "sway", "joint", "loops", "errors", "traces", "parameters", "z_scores")
+_NAMES = ("frames", "paper", "wheels", "sway", "joint", "loops", "errors", "traces", "parameters", "z_scores")
 
 
 @dataclass(frozen=True)
