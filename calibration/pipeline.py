@@ -25,6 +25,7 @@ from calibration.parameters import nominal_frames
 from calibration.plausibility import implausible_inputs
 from calibration.record_next import record_next
 from calibration.record_next_base import drive_next
+from calibration.record_next_joints import sweeps_next
 from calibration.registration import register
 from calibration.robot import chain_of
 from calibration.suspension_fit import Form, fit_suspension
@@ -171,7 +172,7 @@ def _calibrate_joints(work: Work) -> Work:
     )
     if not found.models:
         return work.saying(*said)
-    return replace(work, estimate=grown)
+    return replace(work, estimate=grown).suggesting(*sweeps_next(found.models))
 
 
 _RUN: dict[str, Callable[[Work], Work]] = {

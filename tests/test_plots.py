@@ -1,5 +1,7 @@
 """Plots say what they show: labels with units, and an artist for every datum."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -28,6 +30,7 @@ from scenarios.plots import (
 )
 from scenarios.plots.hysteresis import strokes
 from scenarios.plots.trace import thinned
+from tests.draw_frames import frames_svg
 
 
 @pytest.fixture
@@ -164,3 +167,8 @@ def test_svg_is_the_same_every_time_has_its_own_ids_and_no_reference_outside():
     assert "<metadata" not in text
     assert "<text" in text, "text is text"
     assert 'href="http' not in text
+
+
+def test_the_frames_in_the_documents_are_the_ones_we_draw():
+    """`python -m tests.draw_frames` writes them again."""
+    assert (Path(__file__).parent.parent / "docs/frames.svg").read_text(encoding="utf-8") == frames_svg()

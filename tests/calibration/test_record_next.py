@@ -13,8 +13,11 @@ from calibration.geometry import calibrate_geometry
 from calibration.hand import nominal_hand
 from calibration.hand_fit import linearised
 from calibration.information import dwell_noise
+from calibration.joint_model import JointModel, Quality
+from calibration.joint_projection import RHO, Problem, search
 from calibration.record_next import N, record_next
 from calibration.record_next_base import drive_next
+from calibration.record_next_joints import predicted_sigma, sweep, sweeps_next
 from calibration.remedy import read_remedies
 from calibration.robot import chain_of
 from calibration.twists import exp6
@@ -144,3 +147,42 @@ def test_the_estimate_keeps_them_as_a_file(chain, suggested, tmp_path):
     assert load_estimate(tmp_path).remedies == remedies
     save_estimate(replace(estimate, remedies=()), tmp_path)
     assert not (tmp_path / "record_next.yaml").exists()
+
+
+def flanks(rho, size=10e-3, residual=1e-3):
+    """A joint whose reading is off by -+size/2, chosen by the sign of its motion."""
+    box = np.array([[-1.0, 1.0], [-5.0, 5.0]])
+    a, b = np.array([0.5 * size]), np.array([-0.5 * size])
+    quality = Quality(size, residual, 0.9, 0.9)
+    return JointModel("arm_6_joint", "total", 0, ((0, 0),), (), rho, a, b, box, 0.0, quality=quality)
+
+
+def test_a_rho_at_its_limit_is_asked_for_by_a_sweep_at_the_right_speed():
+    remedy, said = sweeps_next([flanks(RHO[1]), flanks(50.0)])
+    (motion,) = remedy.motions
+    peak = 2.0 * np.pi * motion.frequency * motion.amplitude
+    assert motion.kind == "sweep" and 1.0 < RHO[1] * peak < 10.0
+    assert remedy.sigma[0].after < 0.5 * remedy.sigma[0].before and said[0].verdict == "warning"
+    fast = sweeps_next([flanks(RHO[0], 0.1)])[0].motions[0]
+    assert 2.0 * np.pi * fast.frequency * fast.amplitude > 0.5 / RHO[0]
+
+
+def test_flanks_that_lie_together_are_not_asked_for():
+    remedy, said = sweeps_next([flanks(RHO[1], 1e-5)])
+    assert remedy is None and "no sweep would tell" in said[0].message
+    assert sweeps_next([flanks(50.0)]) == (None, ())
+
+
+def test_the_sigma_of_rho_is_that_of_simulated_sweeps():
+    """Errors that stay for a second, fitted as the stage does."""
+    model = flanks(300.0)
+    motion = sweep(flanks(RHO[1]))
+    t = np.arange(0.0, motion.seconds, 0.1)
+    v = 2.0 * np.pi * motion.frequency * motion.amplitude * np.cos(2.0 * np.pi * motion.frequency * t)
+    exact = model.discrepancy(np.zeros(len(t)), np.zeros(len(t)), v)
+    found = []
+    for seed in range(80):
+        rng = np.random.default_rng(seed)
+        error = model.quality.residual * rng.normal(size=int(motion.seconds) + 1)[t.astype(int)]
+        found.append(search(Problem(np.ones((len(t), 1)), v, exact + error)).rho)
+    assert np.std(found) == pytest.approx(predicted_sigma(model, motion), rel=0.3)
