@@ -32,7 +32,8 @@ def implausible_readings(chain: Chain, q: np.ndarray) -> Iterator[str]:
         margin = _BEYOND * (1.0 + (high - low))
         outside = float(((column < low - margin) | (column > high + margin)).mean())
         if outside > _SHARE:
-            in_degrees = np.degrees(low) - 60.0 < column.min() and column.max() < np.degrees(high) + 60.0
+            within = np.degrees(low) - 60.0 < column.min() and column.max() < np.degrees(high) + 60.0
+            in_degrees = within and np.abs(column).max() > 2.0 * np.pi
             unit = " (recorded in degrees?)" if in_degrees and not chain.is_prismatic(name) else ""
             yield (
                 f"joint {name!r} reads {column.min():.3g} to {column.max():.3g}, its limits are {low:.3g} to "

@@ -41,11 +41,8 @@ class C3dFile:
 
     @property
     def positions(self) -> np.ndarray:
-        """Points (n, m, 3) in POINT:UNITS, NaN where the residual is negative."""
-        p = np.moveaxis(self._c3d["data"]["points"][:3], 0, 2).swapaxes(0, 1).astype(float)
-        bad = self._c3d["data"]["meta_points"]["residuals"][0].T < 0.0
-        p[bad] = np.nan
-        return p
+        """Points (n, m, 3) in POINT:UNITS; ezc3d gives NaN where the residual is negative."""
+        return np.asarray(np.moveaxis(self._c3d["data"]["points"][:3], 0, 2).swapaxes(0, 1), dtype=float)
 
     @property
     def analogs(self) -> np.ndarray:

@@ -84,13 +84,10 @@ def _add_points(c3d: Any, trial: Trial, rate: float, n_frames: int) -> None:
     points = np.full((4, len(trial.marker), n_frames), np.nan)
     points[:3, :, : len(trial.t_mocap)] = 1e3 * np.moveaxis(trial.marker_position, (2, 1, 0), (0, 1, 2))
     points[3] = 1.0
-    seen = np.isfinite(points[:3]).all(axis=0)
     c3d["parameters"]["POINT"]["RATE"]["value"] = [rate]
     c3d["parameters"]["POINT"]["LABELS"]["value"] = tuple(trial.marker)
     c3d["parameters"]["POINT"]["UNITS"]["value"] = ("mm",)
     c3d["data"]["points"] = points
-    c3d["data"]["meta_points"]["residuals"] = np.where(seen, 0.0, -1.0)[None]
-    c3d["data"]["meta_points"]["camera_masks"] = np.zeros((7, *seen.shape), dtype=bool)
 
 
 def _add_plates(c3d: Any, trial: Trial, plates: list[C3dPlate], n: int, rate: float) -> None:

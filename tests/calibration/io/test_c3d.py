@@ -116,6 +116,20 @@ def test_an_independent_reader_finds_the_same_markers_wrench_and_centre_of_press
         assert np.abs(cop - (along @ axes + centre)).max() < MICRON
 
 
+@pytest.mark.parametrize("left", [0.0, 512.0])
+def test_a_marker_with_a_negative_residual_was_not_seen_whatever_its_coordinates_say(lab, file, left):
+    """Laboratories leave zeros, or the last position, in the gaps."""
+    raw, header = bytearray(file.read_bytes()), checked_header(file)
+    stride = 4 * (4 * header.points + header.analog)
+    for frame in range(50, 60):
+        struct.pack_into("<4f", raw, header.data_start + frame * stride + 4 * 4 * 2, left, left, left, -1.0)
+    file.write_bytes(bytes(raw))
+    lab.run(mapping(), file, kind="c3d")
+    ((_, found),) = load(lab.out).trials("calibration")
+    assert np.isnan(found.marker_position[50:60, 2]).all()
+    assert np.isfinite(found.marker_position[49, 2]).all() and np.isfinite(found.marker_position[60, 2]).all()
+
+
 def test_a_laboratory_reads_the_reaction_upwards(file):
     f, *_ = Independent(file).reaction(0)
     assert np.nanmean(f[:, 2]) > 300.0

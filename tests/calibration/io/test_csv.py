@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from calibration import load
+from calibration.io.csv_read import read_csv
+from calibration.io.layouts import CsvTable
+from calibration.schema import Setup
 from tests.calibration import matched
 
 JOINTS = {name: {"motor": name, "unit": "m" if name.startswith("torso") else "rad"} for name in matched.JOINTS}
@@ -193,6 +196,21 @@ def test_a_declared_convention_the_cop_contradicts_is_refused_and_the_right_one_
     assert "is" in said and words in said
 
 
+def test_a_centre_of_pressure_that_wanders_while_nothing_presses_confirms_nothing_and_hurts_nothing(lab):
+    columns, rng = series(), np.random.default_rng(3)
+    empty = np.arange(300) < 200  # the robot is put down after two thirds of the file
+    for name in (*PLATE["force"], *PLATE["moment"]):
+        columns[name] = np.where(empty, rng.normal(size=300), columns[name])
+    for name in ("Cx", "Cy"):
+        columns[name] = np.where(empty, 5.0 * rng.normal(size=300), columns[name])
+    described = series_mapping()
+    described["setup"]["plates"][0]["size"] = [20.0, 20.0]
+    file = write_csv(lab.folder / "log.csv", columns)
+    table = CsvTable.model_validate(described["csv"][0])
+    recorded = read_csv([file], [table], Setup.model_validate(described["setup"]))
+    assert "confirmed by its CoP to" in recorded.notes[0]
+
+
 def test_a_plate_with_z_down_is_recognised_by_its_cop(lab, capsys):
     columns = series()
     down = {c: -columns[c] for c in ("Fy", "Fz", "My", "Mz")}
@@ -291,3 +309,10 @@ def test_a_wrist_without_joints_beside_it_is_told(lab, capsys):
     described["csv"][0]["joints"] = {}
     said = lab.refused(capsys, described, write_csv(lab.folder / "log.csv", series()))
     assert "`wrist` is sampled with the joints" in said
+
+
+def test_readings_off_by_a_wrong_zero_are_not_called_degrees(lab, capsys):
+    columns = postures()
+    columns["arm_4_joint"] = columns["arm_4_joint"] - 3.5
+    said = lab.refused(capsys, static_mapping(), write_csv(lab.folder / "postures.csv", columns))
+    assert "joint 'arm_4_joint' reads -" in said and "degrees" not in said
