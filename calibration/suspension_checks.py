@@ -4,7 +4,7 @@ sign       at rest the robot presses down: Fz < 0 (ACTION on the plate), and eac
            inverse dynamics, not its mirror image
 place      its centre of pressure lies between the wheels' contact points
 rotation   psi = atan2(sum m_d x m_p, sum m_d . m_p) from the horizontal moments of dynamics to those of the plate,
-           about the plate's centre
+           about the plate's centre; the median over trials, since a base that slips in one turns its moments
 moved      the base rests where it rested before: more than slip has happened when it does not
 """
 
@@ -54,9 +54,10 @@ def _against_dynamics(
         message = f"plate scale: it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} N"
         yield Verdict(STAGE, "refused", message)
         return
-    p, d = _slow(plate, dynamics)
+    pairs = _slow(plate, dynamics)
+    p, d = (np.concatenate(a) for a in zip(*pairs, strict=True))
     mirrored = [name for k, name in enumerate(_NAMES) if _is_mirrored(k, p[:, k], d[:, k])]
-    psi = _turn(d[:, 3:5], p[:, 3:5])
+    psi = _turn([(d[:, 3:5], p[:, 3:5]) for p, d in pairs])
     outside = _outside(description, np.array([-rest[4], rest[3]]) / rest[2])
     if abs(psi) > _WRONG:
         message = f"plate rotated by {np.degrees(psi):.0f} deg about the vertical against the lab: turn its axes"
@@ -90,8 +91,8 @@ def moved_by(after: np.ndarray) -> str:
     return f"{1e3 * shift:.1f} mm, {1e3 * turn:.0f} mrad" if shift > _SHIFTED or turn > _TWISTED else ""
 
 
-def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> tuple[np.ndarray, np.ndarray]:
-    """Slow changes of both wrenches as the plate reads them, about its centre, at common times of all trials."""
+def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Slow changes of both wrenches (n, 6) as the plate reads them, about its centre, at common times, by trial."""
     rows = []
     for p, d in zip(plate, dynamics, strict=True):
         slow_p, slow_d = (low_passed(Signal(f.t, f.w, np.ones(len(f.t), bool)), _SLOW).x for f in (p, d))
@@ -100,11 +101,18 @@ def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> tuple[np.nda
         inside = (d.t >= p.t[0]) & (d.t <= p.t[-1])
         at = np.stack([np.interp(d.t[inside], p.t, column) for column in slow_p.T], axis=1)
         rows.append((at, slow_d[inside]))
-    both = [np.concatenate(a) for a in zip(*rows, strict=True)]
-    return both[0], both[1]
+    return rows
 
 
-def _turn(d: np.ndarray, p: np.ndarray) -> float:
+def _turn(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Angle [rad] from d to p, (n, 2) each, the median over the trials that are loud enough to show one."""
+    whole = _angle(*(np.concatenate(a) for a in zip(*pairs, strict=True)))
+    loud = [(d, p) for d, p in pairs if min(d.std(axis=0).max(), p.std(axis=0).max()) > _FAINT[1]]
+    off = [np.angle(np.exp(1j * (psi - whole))) for d, p in loud if (psi := _angle(d, p)) != 0.0]
+    return whole + float(np.median(off)) if off else whole
+
+
+def _angle(d: np.ndarray, p: np.ndarray) -> float:
     """Angle from d to p (n, 2) [rad]; 0 where they do not show the same motion, or rather its mirror image."""
     turned = complex(np.vdot(d[:, 0] + 1j * d[:, 1], p[:, 0] + 1j * p[:, 1]))
     mirrored = complex(np.vdot(d[:, 0] - 1j * d[:, 1], p[:, 0] + 1j * p[:, 1]))

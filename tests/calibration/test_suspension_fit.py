@@ -139,10 +139,20 @@ def test_a_wrong_plate_is_refused_by_name(trials, change, told):
     assert told in said(verdicts, "refused")
 
 
+def turned(trial, degrees):
+    """The trial with its plate's axes turned about the vertical."""
+    R = pin.exp3(np.array([0.0, 0.0, np.radians(degrees)]))
+    return plated(trial, np.hstack([trial.plate_wrench[:, 0, :3] @ R.T, trial.plate_wrench[:, 0, 3:] @ R.T]))
+
+
 def test_a_slightly_turned_plate_is_told(trials):
-    R = pin.exp3(np.array([0.0, 0.0, np.radians(8.0)]))
-    turned = [plated(t, np.hstack([t.plate_wrench[:, 0, :3] @ R.T, t.plate_wrench[:, 0, 3:] @ R.T])) for t in trials]
-    assert "rotated by 8" in said(fit(turned)[1], "warning")
+    assert "rotated by 8" in said(fit([turned(t, 8.0) for t in trials])[1], "warning")
+
+
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_a_base_that_slips_about_the_vertical_in_one_trial_is_no_turned_plate(trials, which):
+    some = [turned(t, 16.0) if k == which else t for k, t in enumerate(trials)]
+    assert "rotated" not in said(fit(some)[1], "warning")
 
 
 def test_a_base_that_was_pushed_is_told_and_left_out(trials, fitted):
