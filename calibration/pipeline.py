@@ -26,6 +26,7 @@ from calibration.plausibility import implausible_inputs
 from calibration.record_next import record_next
 from calibration.record_next_base import drive_next
 from calibration.record_next_joints import sweeps_next
+from calibration.record_next_suspension import swings_next
 from calibration.registration import register
 from calibration.robot import chain_of
 from calibration.suspension_fit import Form, fit_suspension
@@ -137,7 +138,7 @@ def _suspend(work: Work) -> Work:
     found, said = fit_suspension(work.dataset.urdf, work.description, work.trials, robot, plate, form=form)
     if found is None:
         return work.saying(*said)
-    return work.with_model(suspension_model(found), said, suspension=found)
+    return work.with_model(suspension_model(found), said, suspension=found).suggesting(*swings_next(found))
 
 
 def _calibrate_geometry(work: Work) -> Work:

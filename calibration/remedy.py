@@ -45,7 +45,8 @@ class Motion:
         kind: As in dataset.json: the base spins or drives, resting every `step`; a joint sweeps; all joints swing.
         rests: How many, of a spin or drive.
         step: Between rests, turn [rad] or way [m].
-        joint: That sweeps or swings; empty: the base moves.
+        joint: That sweeps; empty: the base moves, or all joints do as in the recorded swings.
+        repeats: How many trials of it.
         amplitude: About the middle of the joint's range [rad, m].
         frequency: Of its sine [Hz].
         seconds: How long it lasts.
@@ -55,6 +56,7 @@ class Motion:
     rests: int = 0
     step: float = 0.0
     joint: str = ""
+    repeats: int = 0
     amplitude: float = 0.0
     frequency: float = 0.0
     seconds: float = 0.0

@@ -17,7 +17,7 @@ from calibration.schema import Tolerances
 from calibration.se3 import skew
 from calibration.suspension_wheels import WheelModel
 
-_KNOWN = 0.3  # sigma over the geometric mean of the diagonal pair [-]
+KNOWN = 0.3  # sigma over the geometric mean of the diagonal pair [-]
 
 
 def element_parameters(
@@ -30,7 +30,7 @@ def element_parameters(
         for j in range(i, 6):
             if not couples[i, j]:
                 continue
-            known = sigma[i, j] < _KNOWN * root[i] * root[j] and not (slips[i] or slips[j])
+            known = sigma[i, j] < KNOWN * root[i] * root[j] and not (slips[i] or slips[j])
             status: Status = "estimated" if known else "not_identifiable"
             name = f"suspension.{letter}.{i + 1}{j + 1}"
             found.append(Parameter(name, _unit(letter, i, j), 0.0, float(matrix[i, j]), float(sigma[i, j]), status))

@@ -8,7 +8,7 @@ import pytest
 import mjcf
 from calibration import load_estimate, save_estimate
 from calibration.base_frame_stage import locate_base
-from calibration.estimate import Estimate, RobotNames
+from calibration.estimate import Estimate, Parameter, RobotNames
 from calibration.geometry import calibrate_geometry
 from calibration.hand import nominal_hand
 from calibration.hand_fit import linearised
@@ -18,8 +18,12 @@ from calibration.joint_projection import RHO, Problem, search
 from calibration.record_next import N, record_next
 from calibration.record_next_base import drive_next
 from calibration.record_next_joints import predicted_sigma, sweep, sweeps_next
+from calibration.record_next_suspension import swings_next
 from calibration.remedy import read_remedies
 from calibration.robot import chain_of
+from calibration.suspension import Suspension
+from calibration.suspension_held_out import HeldOut
+from calibration.suspension_parameters import KNOWN, jackknife
 from calibration.twists import exp6
 from tests.calibration import matched, spinning
 
@@ -186,3 +190,39 @@ def test_the_sigma_of_rho_is_that_of_simulated_sweeps():
         error = model.quality.residual * rng.normal(size=int(motion.seconds) + 1)[t.astype(int)]
         found.append(search(Problem(np.ones((len(t), 1)), v, exact + error)).rho)
     assert np.std(found) == pytest.approx(predicted_sigma(model, motion), rel=0.3)
+
+
+def scattering(slip: bool, n: int = 6) -> Suspension:
+    """A suspension whose x y element scatters a little too much between trials."""
+    K, none = np.diag([1e5, 1e5, 1e6, 2e4, 2e4, 1e4]), np.full((6, 6), np.nan)
+    error = np.zeros((n, 6))
+    error[:, 1] = 0.9 * slip
+    held = HeldOut(error, np.ones((n, 6)), np.zeros((n, 6)), np.full(n, 100.0))
+    p = Parameter("suspension.K.12", "N/m", 0.0, 0.0, 4e4, "not_identifiable")
+    q = Parameter("suspension.K.11", "N/m", 0.0, 1e5, 1e3, "estimated")
+    return Suspension("compliance", K, 0.01 * K, none, none, none, none, (("plate", held),), (q, p), ())
+
+
+def test_elements_that_scatter_ask_for_as_many_swings_as_would_tell_them():
+    remedy, said = swings_next(scattering(slip=False))
+    (motion,), (sigma,) = remedy.motions, remedy.sigma
+    assert sigma.name == "suspension.K.12" and sigma.before == 4e4
+    assert sigma.after < KNOWN * 1e5  # told, as the stage counts it
+    assert sigma.before * np.sqrt(6 / (6 + motion.repeats - 2)) > KNOWN * 1e5  # and no more than needed
+    assert f"{motion.repeats} more swings" in said[0].message
+
+
+def test_elements_of_axes_that_slip_are_said_to_be_beyond_any_motion():
+    remedy, said = swings_next(scattering(slip=True))
+    assert remedy is None and "1 elements of K and C: no motion tells a spring along y" in said[0].message
+
+
+def test_a_jackknife_falls_with_the_number_of_trials_as_is_predicted():
+    rng = np.random.default_rng(0)
+    few, many = (np.mean([jackknife(left_out(rng.normal(size=(n, 1))))[0, 0] for _ in range(2000)]) for n in (6, 15))
+    assert np.sqrt(many / few) == pytest.approx(np.sqrt(6 / 15), rel=0.03)
+
+
+def left_out(values):
+    """Means without one each."""
+    return (values.sum(axis=0) - values) / (len(values) - 1)
