@@ -7,8 +7,10 @@ import pytest
 import mjcf
 from scenarios import load
 from twin import build, load_test, release_test
+from twin.defects.bushing import RunsAhead
 from twin.defects.contact import TurnsLate
 from twin.draw import draw
+from twin.load_test import Restless
 from twin.stiffness import spatial_stiffness
 
 
@@ -60,6 +62,39 @@ def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
     base = twin.model.body("base_footprint").id
     weight, centre = 9.81 * twin.model.body_subtreemass[base], data.subtree_com[base] - data.xpos[base]
     np.testing.assert_allclose(np.diag(found.K_gravity)[3:5], -weight * centre[2], rtol=0.2)  # loads turn with the base
+
+
+def random_base(seed):
+    """Every value of every wheel type within a factor of two of the default's; friction no less, for none may slip."""
+    rng, base, found = np.random.default_rng(seed), load("humanoids2024").twin.base, []
+    for wheel in ("drive", "caster_front", "caster_back"):
+        for field in ("stiffness", "damping", "contact_stiffness", "contact_damping", "friction"):
+            value = np.array(getattr(getattr(base, wheel), field))
+            least, most = 1.0 if field == "friction" else 0.5, 1.3 if field == "contact_damping" else 2.0
+            drawn = value * np.exp(rng.uniform(np.log(least), np.log(most), value.shape))
+            found.append(f"twin.base.{wheel}.{field}={drawn.tolist()}")
+    return found
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
+def test_the_springs_and_dampers_of_random_bases_are_found(nominal, seed):
+    twin, wheels = standing(nominal, *random_base(seed))
+    K, C = spatial_stiffness(wheels)
+    errors = error(load_test(twin).K, K), error(release_test(twin), C)
+    print("K, C", errors)
+    assert errors[0] < 1e-3
+    assert errors[1] < 0.05
+
+
+def test_a_wheel_that_slips_under_the_test_is_told(nominal):
+    twin, _ = standing(nominal, "twin.base.caster_back.friction=0.005")
+    with pytest.raises(Restless, match="a wheel slips under"):
+        load_test(twin)
+
+
+def test_a_caster_too_light_for_its_springs_is_refused(nominal):
+    with pytest.raises(RunsAhead, match="stiffness 120000 N/m .*'caster_back"):
+        standing(nominal, "twin.base.caster_back.stiffness=[120000.0, 25000.0, 170000.0]")
 
 
 TORSION = {

@@ -2,6 +2,11 @@
 
 F = k s + c ds/dt                 three slides
 M = k_r phi + c_r dphi/dt         hinges about the hub, where the wheel can turn against the base
+
+Where friction holds a wheel of mass m, MuJoCo finds the friction for m alone and then steps with m + h c, since
+damping is implicit. The excess h c dv of a step is taken up by the contact's own damping of slip, dv_w/dt = -b v_w:
+the wheel runs ahead by c / (m b) of the base's speed, and its spring takes h k / (m b) of the damping away (10 % at a
+caster, 1 ms). `tune_held` gives that back.
 """
 
 from dataclasses import dataclass
@@ -9,9 +14,22 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from twin.errors import TwinError
+
 Vector = tuple[float, float, float]
 DIRECTIONS = "xyz"
+_AHEAD = 0.5  # h k / (m b), at most
 _NONE = (0.0, 0.0, 0.0)
+
+
+class RunsAhead(TwinError):
+    """A bushing so stiff that its wheel, held by friction, would follow the base within a step."""
+
+    def __init__(self, wheel: str, stiffness: float, limit: float) -> None:
+        super().__init__(
+            f"stiffness {stiffness:g} N/m in the floor's plane is more than the light wheel {wheel!r} bears at this "
+            f"time step; use at most {limit:.2g} N/m, a shorter step or anchored wheels"
+        )
 
 
 @dataclass(frozen=True)
@@ -53,6 +71,19 @@ class Bushing:
                     stiffness=np.array([k, 0.0, 0.0]),
                     damping=np.array([c, 0.0, 0.0]),
                 )
+
+    def tune_held(self, model: mujoco.MjModel, name: str, body_name: str, geom_name: str) -> None:
+        """Give back the damping that a wheel loses in the floor's plane while friction holds it.
+
+        Raises:
+            RunsAhead: The wheel is too light for its springs.
+        """
+        mass, geom = float(model.body_subtreemass[model.body(body_name).id]), model.geom(geom_name)
+        per_stiffness = model.opt.timestep / (mass * -float(geom.solref[1] / geom.solimp[1]))
+        if max(self.stiffness[:2]) * per_stiffness > _AHEAD:
+            raise RunsAhead(name, max(self.stiffness[:2]), _AHEAD / per_stiffness)
+        for i in range(2):
+            model.joint(joint_name(name, i)).damping[0] = self.damping[i] / (1.0 - self.stiffness[i] * per_stiffness)
 
 
 def joint_name(wheel: str, i: int) -> str:

@@ -65,6 +65,8 @@ class Wheel(Defect):
             torsion = None if self.bushing is None else np.array(self.bushing.torsion)
             self.footing.tune(model, self.name, self.contact_geom, torsion)
             self._check_torsion(model)
+            if self.bushing is not None:
+                self.bushing.tune_held(model, self.name, self.body_name, self.contact_geom)
 
     def _check_torsion(self, model: mujoco.MjModel) -> None:
         """The contact holds the wheel by its bare inertia, the damper acts on what it holds."""
