@@ -6,7 +6,7 @@ The law is MuJoCo's with constant impedance d: Kc = S / ((1 - d) iw), iw the inv
 model of the body that carries the geom. It adds a mass d / ((1 - d) iw) to the motion of the contact: of the light
 wheel's size at d = 0.5 where the wheel rides on a bushing, 1 % of the base's at d = 0.01 where it is fixed to it.
 The same Bc damps slip, so Bc (1 - d) iw dt <= 1 or friction flips its sign at every step: a 0.14 kg caster bears
-280 N.s/m at 1 ms.
+280 N.s/m at 1 ms. A stiff one makes the wheel hop where Kc (1 - d) iw dt^2 > 8: 2.2 MN/m.
 """
 
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from twin.defects.base import Parameter
 from twin.errors import TwinError
 
 _ON_BUSHING, _ON_BASE = 0.5, 0.01
+_HOPS = 8.0  # Kc (1 - d) iw dt^2, at most
 
 
 class Chatters(TwinError):
-    """A contact whose friction would overshoot rest within one step and flip its sign at every step."""
+    """A contact that overshoots rest within one step: its friction flips its sign at every step, or its wheel hops."""
 
-    def __init__(self, wheel: str, damping: float, limit: float) -> None:
+    def __init__(self, wheel: str, what: str, does: str, limit: str) -> None:
         super().__init__(
-            f"contact damping {damping:g} N.s/m of {wheel!r} makes its friction chatter at this time step; "
-            f"use at most {limit:.0f} N.s/m or a shorter step"
+            f"contact {what} of {wheel!r} makes {does} at this time step; use at most {limit} or a shorter step"
         )
 
 
@@ -62,13 +62,18 @@ class Contact:
         """Set the geom's reference parameters; `torsion` (3,) of the bushing, None where there is no bushing.
 
         Raises:
-            Chatters: Friction would flip its sign at every step.
+            Chatters: Friction would flip its sign at every step, or the wheel hop.
         """
         d = _ON_BASE if torsion is None else _ON_BUSHING
         geom = model.geom(geom_name)
         scale = (1.0 - d) * model.body_invweight0[geom.bodyid[0], 0]
-        if self.damping * scale * model.opt.timestep > 1.0:
-            raise Chatters(wheel, self.damping, 1.0 / (scale * model.opt.timestep))
+        step = model.opt.timestep
+        if self.damping * scale * step > 1.0:
+            limit = f"{1.0 / (scale * step):.0f} N.s/m"
+            raise Chatters(wheel, f"damping {self.damping:g} N.s/m", "its friction chatter", limit)
+        if self.stiffness * scale * step**2 > _HOPS:
+            limit = f"{_HOPS / (scale * step**2):.2g} N/m"
+            raise Chatters(wheel, f"stiffness {self.stiffness:g} N/m", "the wheel hop", limit)
         geom.solref[:] = -self.stiffness * scale, -self.damping * scale
         geom.solimp[:] = d, d, 0.001, 0.5, 2.0
         geom.friction[:] = self.friction, self.torsional_friction, self.rolling_friction
