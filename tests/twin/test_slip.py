@@ -36,6 +36,39 @@ def test_normal_forces_are_those_of_the_contacts(stood):
     np.testing.assert_allclose([found[w.contact_geom] for w in wheels], normal_forces(twin, wheels), rtol=5e-3)
 
 
+def grip(b, state, wrench):
+    """Largest share of its friction that a wheel uses."""
+    data, share, force = mujoco.MjData(b.bare), [], np.zeros(6)
+    mujoco.mj_setState(b.bare, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    base = b.bare.body("base_footprint")
+    data.qfrc_applied[:], data.xfrc_applied[base.id] = b.hold, wrench
+    data.xfrc_applied[base.id, 3:] -= np.cross(base.ipos, wrench[:3])
+    mujoco.mj_forward(b.bare, data)
+    for i in range(data.ncon):
+        mujoco.mj_contactForce(b.bare, data, i, force)
+        share.append(np.linalg.norm(force[1:3]) / force[0] / data.contact[i].friction[0])
+    return max(share)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_the_slip_load_is_where_the_first_wheel_uses_all_its_friction(stood, axis):
+    """Mean of both senses: what settling leaves in the wheels adds to one and is taken from the other."""
+    twin, wheels, b = stood
+    load, measured = slip_loads(twin, wheels)[axis], []
+    for sense in (1.0, -1.0):
+        state, shares, used = b.rest, np.arange(0.7, 1.2, 0.05), []
+        for share in shares:
+            wrench = sense * share * load * UNIT[axis]
+            state = b.run(b.model, state, wrench, 0.3)[-1]
+            used.append(grip(b, state, wrench))
+        held = np.array(used) < 0.97
+        assert held[0]
+        assert not held[-1]
+        measured.append(np.polyval(np.polyfit(np.array(used)[held], shares[held], 1), 1.0))
+    print("measured over computed", measured, np.mean(measured))
+    np.testing.assert_allclose(np.mean(measured), 1.0, atol=0.03)
+
+
 @pytest.mark.parametrize("axis", range(3))
 def test_friction_holds_below_the_slip_load_and_leaves_a_set_beyond(stood, axis):
     # settling leaves up to 6 % of a caster's friction in it: 0.85 and 1.15 of the load of a rest without
