@@ -68,7 +68,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class _Point:
+class Evidence:
     """The evidence at some widths: minus its logarithm, its derivatives by the variances, and what theta would be."""
 
     value: float
@@ -80,11 +80,11 @@ class _Point:
 
 def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: float) -> Widths:
     """Widths of highest evidence for the linearised problem, to a change of their logarithms below `same`."""
-    damping, now = 1e-3, _point(at, noise, prior, widths)
+    damping, now = 1e-3, evidence(at, noise, prior, widths)
     for _ in range(_STEPS):
         f = _prior_factors(prior, now, widths.prior)
         v = _scored(now, noise, widths.noise, damping)
-        trial = _point(at, noise, prior, Widths(v, f))
+        trial = evidence(at, noise, prior, Widths(v, f))
         if trial.value > now.value + 1e-9 * abs(now.value) and damping < 1e6:
             damping = max(10.0 * damping, 1e-2)
             continue
@@ -101,7 +101,7 @@ def moved_by(old: np.ndarray, new: np.ndarray, least: np.ndarray | float) -> flo
     return float(np.abs(np.log(np.maximum(new, least) / np.maximum(old, least))).max(initial=0.0))
 
 
-def _point(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> _Point:
+def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evidence:
     """Evaluate; the slope is by variance, the information that of the postures taken one by one."""
     root, scale = noise.roots(widths.noise), prior.scale
     n, d, p = at.J.shape
@@ -121,12 +121,12 @@ def _point(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> _Point
     groups = np.eye(len(noise.floor))[noise.group]
     value = log_det - 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
     value += float((rest**2).sum() + (precision * off**2).sum()) + prior.held(widths.prior, _HELD)
-    return _Point(
+    return Evidence(
         0.5 * value, groups.T @ slope, groups.T @ together @ groups, off * scale, np.diag(covariance) * scale**2
     )
 
 
-def _scored(now: _Point, noise: Noise, s: np.ndarray, damping: float) -> np.ndarray:
+def _scored(now: Evidence, noise: Noise, s: np.ndarray, damping: float) -> np.ndarray:
     """Standard deviations after one Fisher scoring step of the variances that are not held at their floor."""
     v, low = s**2, noise.floor**2
     free = noise.free & ~((v <= low * 1.0000001) & (now.slope > 0.0))
@@ -139,7 +139,7 @@ def _scored(now: _Point, noise: Noise, s: np.ndarray, damping: float) -> np.ndar
     return np.sqrt(np.clip(v + np.clip(step, -0.97 * v, 20.0 * v + 4.0 * low), low, np.maximum(_LARGEST**2, low)))
 
 
-def _prior_factors(prior: Prior, now: _Point, f: np.ndarray) -> np.ndarray:
+def _prior_factors(prior: Prior, now: Evidence, f: np.ndarray) -> np.ndarray:
     """MacKay's fixed point for the factors on squared tolerances."""
     new = np.array(f)
     for h in range(len(f)):

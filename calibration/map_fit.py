@@ -20,6 +20,7 @@ from scipy.linalg import lapack
 
 from calibration.evidence import Noise, Widths, inverse_and_log_det, moved_by, refined
 from calibration.linearised import Linearised, Prior
+from calibration.parsimony import without_needless
 
 _OUTER = 15
 _PROMISE = 1e-7  # the last Gauss-Newton step promises a smaller decrease of the cost [-]: 3e-4 sigma
@@ -119,10 +120,12 @@ def solve(
     widths, noise = problem.widths, problem.sources(at)
     some = spread(len(at.r), at.r.shape[1], _MANY)
     change = np.inf
-    for _ in range(_OUTER):
+    for round_ in range(_OUTER):
         settled = change < same
         old = widths
         widths = old if settled else refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
+        if round_ == 0 and not hasty and len(some) == len(at.r):
+            noise, widths = without_needless(at, noise, problem.prior, widths)
         W = noise.whitener(widths.noise)
         step = _step(problem.prior, at, W, widths)
         if not settled:
@@ -139,7 +142,7 @@ def solve(
         lower = at if still else _descended(problem, at, W, widths, step)
         if lower is None:
             break
-        at, noise = lower, replace(problem.sources(lower), weight=noise.weight)
+        at, noise = lower, replace(problem.sources(lower), weight=noise.weight, free=noise.free)
     return Fit(at, noise, widths, step.covariance, W, False)
 
 

@@ -17,7 +17,7 @@ from calibration.bodies import body_poses
 
 _MANY = 200  # postures the first guess is made from
 _FEW = 50  # that tell whether it is to be mirrored
-_ODD = 6.0  # a posture's misfit over the median one's beyond which its markers are not that body's [-]
+ODD = 6.0  # a posture's misfit over the median one's beyond which its markers are not that body's [-]
 _FLAT = 1e-3  # third-largest-but-one extent over the largest below which markers stand in line [-]
 
 
@@ -58,12 +58,12 @@ def cluster(positions: np.ndarray) -> Cluster:
         xyz = xyz * [1.0, 1.0, -1.0]
     found = body_poses(xyz, positions)
     fit = _misfit(found.residual)
-    good = fit <= _ODD * np.nanmedian(fit)
+    good = fit <= ODD * np.nanmedian(fit)
     R, p = found.T[good, :3, :3], found.T[good, :3, 3]
     xyz = np.nanmean((positions[good] - p[:, None]) @ R, axis=0)
     found = body_poses(xyz, positions)
     fit = _misfit(found.residual)
-    odd = ~(fit <= _ODD * np.nanmedian(fit))
+    odd = ~(fit <= ODD * np.nanmedian(fit))
     dof = np.isfinite(found.residual[~odd]).sum() - 6 * (~odd).sum() - (3 * m - 6)
     sigma = float(np.sqrt(np.nansum(found.residual[~odd] ** 2) / max(1, dof)))
     return Cluster(xyz, found.T, found.covariance * sigma**2, sigma, odd)

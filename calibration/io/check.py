@@ -28,7 +28,7 @@ _SIZE = (0.02, 2.0)  # [m] believable largest distance within a body of markers
 _FLEX = 0.01  # [m] a distance within a body may scatter by this much
 _DRAWN = 0.03  # [m] a distance within a body may be off its drawing by this much
 _LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or its inverse
-_HAND = 0.05  # [m] rms distance between the hand and the nominal robot's, their frames fitted
+_HAND = 0.05  # [m] median distance between the hand and the nominal robot's, their frames fitted
 
 
 def check(file: str, trial: Trial | PostureMeans, description: Description, chain: Chain, mass: float) -> None:
@@ -137,7 +137,7 @@ def _size(body: Body, trial: Trial | PostureMeans) -> float:
 
 def _rigid(trial: Trial | PostureMeans, description: Description) -> Iterator[str]:
     for body in description.bodies:
-        scatter = [(float(np.nanstd(d)), a, b) for a, b, d in _pairs(body, trial) if np.isfinite(d).any()]
+        scatter = [(_scatter(d), a, b) for a, b, d in _pairs(body, trial) if np.isfinite(d).any()]
         worst, a, b = max(scatter, default=(0.0, "", ""))
         if worst > _FLEX:
             yield (
@@ -156,6 +156,11 @@ def _rigid(trial: Trial | PostureMeans, description: Description) -> Iterator[st
                 return
 
 
+def _scatter(d: np.ndarray) -> float:
+    """Standard deviation of most of the distances d (n,); a few wrong postures are for the calibration to name."""
+    return float(1.4826 * np.nanmedian(np.abs(d - np.nanmedian(d))))
+
+
 def _hand(means: PostureMeans, description: Description, chain: Chain) -> Iterator[str]:
     postures = mean_postures(description, means)
     if len(postures) < 4:
@@ -164,9 +169,9 @@ def _hand(means: PostureMeans, description: Description, chain: Chain) -> Iterat
     predicted = hand.poses(postures.q)
     X, Y = hand_eye(predicted, postures.T_base_hand)
     error = (X @ predicted @ Y)[:, :3, 3] - postures.T_base_hand[:, :3, 3]
-    rms = float(np.sqrt((error**2).sum(axis=1).mean()))
-    if rms > _HAND:
+    off = float(np.median(np.linalg.norm(error, axis=1)))
+    if off > _HAND:
         yield (
-            f"the hand is {1e3 * rms:.0f} mm (rms) from where the readings put it, its frames fitted: columns of "
+            f"the hand is {1e3 * off:.0f} mm (median) from where the readings put it, its frames fitted: columns of "
             "joints or markers are swapped, signs reversed, or this is another robot's URDF"
         )

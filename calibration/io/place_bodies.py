@@ -1,6 +1,6 @@
 """Where markers sit that nobody measured: their shape from the recording, their place by the base or the nominal robot.
 
-    shape      mean over all samples of the cluster, each brought onto the mean by the rotation that fits best
+    shape      mean over all samples of the cluster that have one shape, see marker_shape
     standing   x_m = T_lab_base^-1 p_m, the base frame declared to stand at (x, y, heading) in the first second
     fitted     B_i = X A_i Y     A_i nominal T_base_hand(q_i), B_i measured; closed form: for all pairs of postures
                log(A_i^-1 A_j) = R_Y log(B_i^-1 B_j), R_X by the mean, then both translations linearly
@@ -13,11 +13,11 @@ Reference: Park, Martin, IEEE Trans. Robotics and Automation 1994 (hand-eye cali
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calibration.bodies import body_poses
 from calibration.errors import NotEnoughData
+from calibration.marker_shape import cluster
 from calibration.se3 import compose, inverse, mean, rotation_vector
 
-_SWEEPS = 20
+_ODD = 3.0  # times the median distance left, beyond which a posture is wrong
 _FEWEST = 4  # postures
 _CLEAR = 2.8  # [rad] a rotation vector near pi may turn its sign
 
@@ -31,12 +31,8 @@ def mean_shape(positions: np.ndarray) -> np.ndarray:
     whole = positions[np.isfinite(positions).all(axis=(1, 2))]
     if not len(whole):
         raise NotEnoughData("no sample shows all of its markers together, so its shape is not known")
-    shape = whole[0] - whole[0].mean(axis=0)
-    for _ in range(_SWEEPS):
-        T = body_poses(shape, whole).T
-        shape = (np.swapaxes(T[:, :3, :3], 1, 2) @ np.swapaxes(whole - T[:, None, :3, 3], 1, 2)).mean(axis=0).T
-        shape = shape - shape.mean(axis=0)
-    return shape
+    shape = cluster(whole).xyz
+    return np.asarray(shape - shape.mean(axis=0))
 
 
 def standing_shape(positions: np.ndarray, x: float, y: float, heading: float) -> np.ndarray:
@@ -47,7 +43,7 @@ def standing_shape(positions: np.ndarray, x: float, y: float, heading: float) ->
 
 
 def hand_eye(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """X, Y (4, 4) with B_i = X A_i Y in the least-squares sense, for poses A, B (n, 4, 4).
+    """X, Y (4, 4) with B_i = X A_i Y in the least-squares sense, for poses A, B (n, 4, 4), wrong ones left out.
 
     Raises:
         NotEnoughData: Too few postures, or all turned about one direction.
@@ -56,6 +52,13 @@ def hand_eye(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     A, B = A[good], B[good]
     if len(A) < _FEWEST or _spread(A) < 1e-3:
         raise NotEnoughData(f"{len(A)} postures do not turn the hand enough to place its markers; record more")
+    X, Y = _hand_eye(A, B)
+    off = np.linalg.norm((X @ A @ Y)[:, :3, 3] - B[:, :3, 3], axis=1)
+    near = off <= _ODD * np.median(off)
+    return (X, Y) if near.all() else _hand_eye(A[near], B[near])
+
+
+def _hand_eye(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     i, j = np.triu_indices(len(A), 1)
     turns = [rotation_vector(np.swapaxes(T[i, :3, :3], 1, 2) @ T[j, :3, :3]) for T in (A, B)]
     clear = np.linalg.norm(turns[0], axis=1) < _CLEAR
