@@ -149,7 +149,8 @@ def _calibrate_geometry(work: Work) -> Work:
     work = work.with_model(model, said).suggesting(*suggested)
     if work.clock("robot") is not None or refused:
         return work
-    return work.with_model(*calibrate_gears(chain, description, postures))
+    soft, more = calibrate_gears(chain, description, postures)
+    return work.with_model(soft, [v for v in more if v not in said])
 
 
 def _calibrate_joints(work: Work) -> Work:
