@@ -269,7 +269,12 @@ def lower(c3d):
     c3d.add_parameter("FORCE_PLATFORM", "CORNERS", c + np.array([0.0, 0.0, 50.0])[:, None, None])
 
 
+def holes(c3d):
+    c3d["data"]["analogs"][0, 2, 500:520] = np.nan
+
+
 BAD = {
+    "a block of NaN": (holes, "plate: 20 samples are missing, the first is 500; cut them out"),
     "mirrored corners": (corners([1, 0, 3, 2]), "CORNERS put its z axis upwards"),
     "corners from another one": (corners([1, 2, 3, 0]), "x axis along"),
     "crossed corners": (corners([0, 2, 1, 3]), "the four corners are no rectangle"),

@@ -149,6 +149,9 @@ def series_cases():
     back, twice = good["t"].copy(), good["t"].copy()
     back[50], twice[50] = 0.2, good["t"][49]
     up = {c: -good[c] for c in (*PLATE["force"], *PLATE["moment"])}
+    kilo = {c: 1e-3 * good[c] for c in (*PLATE["force"], *PLATE["moment"])}
+    milli, blind = {c: 1e3 * good[c] for c in PLATE["moment"]}, {"plate": PLATE}
+    never = {c: np.full(300, np.nan) for c in BASE["base3"]}
     return {
         "time goes back": (changed(good, t=back), {}, ["log.csv:52:1: t: time 0.2 does not increase; remove"]),
         "time twice": (changed(good, t=twice), {}, ["log.csv:52:1: t: time 0.49 is the same as in the row before"]),
@@ -157,6 +160,10 @@ def series_cases():
         "no column": ({k: v for k, v in good.items() if k != "My"}, {}, ["log.csv:1:1: My: no such column"]),
         "zero gap": (good | zero, {}, ["log.csv:52:5: base1_x: the marker is at exactly (0, 0, 0)", "gaps: zero"]),
         "upside down": (good | up, {}, ["log.csv: Fx, Fy, Fz", "pull it up with 730 N", "convention: reaction"]),
+        "kilonewtons": (good | kilo, {"plates": blind}, ["log.csv", "plate carries 0.73 N", "see the plate's units"]),
+        "moments in newton millimetres": (good | milli, {"plates": blind},
+            ["log.csv", "its centre of pressure is", "outside the plate; see the moments' unit"]),
+        "a marker never seen": (good | never, {}, ["log.csv", "marker base3 is never seen; take it out"]),
         "plate gap": (changed(good, Fz=gap), {}, ["log.csv:9:16: Fz: the cell is empty"]),
     }  # fmt: skip
 
