@@ -323,3 +323,25 @@ def test_readings_off_by_a_wrong_zero_are_not_called_degrees(lab, capsys):
     columns["arm_4_joint"] = columns["arm_4_joint"] - 3.5
     said = lab.refused(capsys, static_mapping(), write_csv(lab.folder / "postures.csv", columns))
     assert "joint 'arm_4_joint' reads -" in said and "degrees" not in said
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda j: j.pop("arm_4_joint"),
+            "joints: ['arm_4_joint'] of the setup are not mapped, [] are not in the setup",
+        ),
+        (lambda j: j.update(arm_9_joint=j.pop("arm_7_joint")), "['arm_7_joint'] of the setup are not mapped, ['arm_9_"),
+    ],
+)
+def test_joints_of_samples_that_do_not_fit_the_setup_are_told(lab, capsys, change, words):
+    described = robot_mapping()
+    described["csv"][0]["joints"] = dict(JOINTS)
+    change(described["csv"][0]["joints"])
+    columns = {"t": np.arange(50) / 100.0} | {
+        n: np.full(50, q) for n, q in zip(matched.JOINTS, matched.CENTRE, strict=True)
+    }
+    columns |= dict.fromkeys(("Wx", "Wy", "Wz", "Tx", "Ty", "Tz"), np.zeros(50))
+    said = lab.refused(capsys, described, write_csv(lab.folder / "log.csv", columns))
+    assert "log.csv" in said and words in said
