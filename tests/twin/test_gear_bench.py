@@ -54,6 +54,20 @@ def test_a_friction_held_mesh_has_the_loop_of_a_spring_and_a_slider():
     np.testing.assert_allclose(torque[crossing], SLIP, rtol=1e-2)
 
 
+def test_play_and_stiffness_of_a_friction_held_mesh_are_those_written():
+    """Where the slider slips, a flank is a line of the mesh's stiffness from half the play on, SLIP above zero."""
+    log = bench([gear(), HYSTERESIS]).run(hold=wave(0.013, period=8.0))
+    late = log.t >= 8.0
+    delta, torque, rate = log.twist[late, 0], log.torque[late, 0], np.gradient(log.twist[late, 0])
+    starts = []
+    for sign in (1.0, -1.0):
+        loading = (sign * delta > 0.011) & (sign * rate > 0)
+        stiffness, at_rest = np.polyfit(delta[loading], torque[loading], 1)
+        assert stiffness == pytest.approx(K, rel=1e-2)
+        starts.append((sign * SLIP - at_rest) / stiffness)
+    assert starts[0] - starts[1] == pytest.approx(GAP, rel=1e-2)
+
+
 def test_a_mesh_that_slips_is_stiffer_after_each_reversal():
     log = bench([gear(), HYSTERESIS]).run(hold=wave(0.013, period=8.0))
     late = log.t >= 8.0
