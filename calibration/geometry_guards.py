@@ -13,7 +13,7 @@ from calibration.robot import Chain
 from calibration.robust import RobustFit
 
 _SCALE = 1.2  # believable ratio of the robot's size to the measured one, or its inverse [-]
-_APART = 0.05  # [rad, a tenth of it in m] postures closer than this in every joint are one
+APART = 0.05  # [rad, a tenth of it in m] postures closer than this in every joint are one
 _CONDITION = 1e6  # scaled [-]
 _OFFSET = 0.5  # largest believable zero of a reading [rad, a tenth of it in m]
 _FACTOR = 6.0  # largest believable ratio of a prior's width to what it began with [-]
@@ -38,11 +38,16 @@ def joint_lengths(chain: Chain) -> np.ndarray:
     return np.array([METRES_PER_RAD if chain.is_prismatic(name) else 1.0 for name in chain.joints])
 
 
+def fewest(chain: Chain, components: int) -> int:
+    """Distinct postures a geometry needs, twice as many equations as it has combinations."""
+    return int(np.ceil(2 * (6 + 4 * len(chain.joints)) / components))
+
+
 def unusable_data(chain: Chain, q: np.ndarray, start: Start, components: int) -> Iterator[str]:
     """What is wrong with readings q (n, n_measured) and a start made from them, `components` measured a posture."""
     yield from implausible_readings(chain, q)
-    needed = int(np.ceil(2 * (6 + 4 * len(chain.joints)) / components))
-    n = distinct(q[:, chain.columns], _APART * joint_lengths(chain), needed)
+    needed = fewest(chain, components)
+    n = distinct(q[:, chain.columns], APART * joint_lengths(chain), needed)
     if n < needed:
         yield f"{n} distinct postures among {len(q)}; at least {needed} are needed, spread over all joints"
         return

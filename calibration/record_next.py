@@ -1,10 +1,10 @@
-"""The five postures that would tell most of what the recorded ones leave to the tolerances.
+"""The five postures (more, where more are lacking) that would tell most of what the recorded ones leave to tolerances.
 
     C before = T^-1 Sigma T^-1,     Sigma the covariance of the fit, T = diag(tolerance)        (see `information`)
     C after  = (C^-1 + sum_5 B' B)^-1
 
 A direction is untold where the data shrink its prior variance by less than a tenth, while postures elsewhere inside the
-limits would shrink it. Directions no posture tells, the gauge, do not move the hand and are not counted. The five are
+limits would shrink it. Directions no posture tells, the gauge, do not move the hand and are not counted. They are
 chosen by D, which looks for untold directions first. After a refused fit nothing of it is used: the postures are taken
 at the datasheet's random errors.
 """
@@ -17,6 +17,7 @@ from calibration.design_pool import room_of
 from calibration.design_postures import Plan, Task, plan
 from calibration.errors import NotEnoughData
 from calibration.estimate import Model
+from calibration.geometry_guards import APART, distinct, fewest, joint_lengths
 from calibration.hand import HandModel, nominal_hand
 from calibration.information import dwell_noise, prospect, told_directions
 from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
@@ -70,12 +71,15 @@ def record_next(
         return None, ()
     try:
         room = room_of(shapes_of(urdf, chain, description), known.description, rng)
-        found = plan(Task(room, known.hand, known.parameters, known.play, known.C), N, "D", rng)
+        task = Task(room, known.hand, known.parameters, known.play, known.C)
+        found = plan(task, max(N, _short(chain, postures)), "D", rng)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "warning", f"no postures to suggest: {error}"),)
     remedy = _remedy(found, known, lost)
     sigma = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in remedy.sigma[:3])
-    return remedy, (Verdict(STAGE, "warning", f"{remedy.why}; {N} postures that would tell, in {FILE}: {sigma}"),)
+    return remedy, (
+        Verdict(STAGE, "warning", f"{remedy.why}; {len(remedy.postures)} postures that would tell, in {FILE}: {sigma}"),
+    )
 
 
 def _known(
@@ -100,6 +104,12 @@ def _known(
         C = model.covariance[np.ix_(rows, rows)] / np.outer(parameters.scale, parameters.scale)
     untold = int((np.linalg.eigvalsh(V.T @ by_tolerance @ V) > _UNTOLD).sum())
     return Known(hand, parameters, play, description, C, untold)
+
+
+def _short(chain: Chain, postures: Postures) -> int:
+    """How many distinct postures a geometry still lacks."""
+    enough = fewest(chain, postures.covariance.shape[1])
+    return enough - distinct(postures.q[:, chain.columns], APART * joint_lengths(chain), enough)
 
 
 def _as_measured(description: Description, postures: Postures) -> Description:

@@ -9,7 +9,7 @@ from scenarios.errors import ScenarioError
 from scenarios.options import Overrides, ScenarioName, Seed, overriding
 
 
-def design(
+def design(  # noqa: PLR0913  an option each
     scenario: ScenarioName,
     out: Annotated[Path, typer.Option(metavar="FILE", help="The YAML file to write.")],
     n: Annotated[int, typer.Option("-n", min=5, max=500, metavar="N", help="How many postures.")] = 30,
@@ -17,6 +17,9 @@ def design(
         Literal["D", "E", "G"],
         typer.Option(help="D: least volume; E: least worst direction; G: least worst-case error of the hand."),
     ] = "G",
+    campaign: Annotated[
+        Path | None, typer.Option(metavar="YAML", help="Write the scenario that records them, too.")
+    ] = None,
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
@@ -24,11 +27,11 @@ def design(
     from scenarios import console, steps
     from scenarios.design import design as designed
 
-    if out.is_dir():
-        raise ScenarioError(f"{out}: is a folder; name a file")
+    for path in (p for p in (out, campaign) if p is not None and p.is_dir()):
+        raise ScenarioError(f"{path}: is a folder; name a file")
     with console.progress() as progress:
         progress("design", "", 0.0)
-        found = designed(steps.load(scenario, overriding(overrides, seed)), n, criterion, out)
+        found = designed(steps.load(scenario, overriding(overrides, seed)), n, criterion, out, campaign)
     plan, against = found.plan, found.comparison
     typer.echo(
         f"{n} postures, {plan.design.prospect.B.shape[2]} identifiable combinations; predicted error of the hand at "
@@ -41,4 +44,4 @@ def design(
     )
     if plan.tour.contact:
         typer.echo(f"Not reached by a straight move clear of the robot: postures {list(plan.tour.contact)} (from 0)")
-    typer.echo(f"Postures: {out}")
+    typer.echo(f"Postures: {out}" + (f"\nScenario: {campaign}" if campaign else ""))

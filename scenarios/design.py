@@ -3,9 +3,9 @@
 Only what the scenario declares to a laboratory is used: nominal robot, marker bodies, datasheet sigmas, tolerances.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,8 +25,8 @@ class Designed:
     comparison: "Comparison"
 
 
-def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path) -> Designed:
-    """Choose n postures and write them to the file `out`.
+def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, campaign: Path | None = None) -> Designed:
+    """Choose n postures and write them to the file `out`, and to `campaign` the scenario that records them.
 
     Raises:
         NotEnoughData: The robot has hardly any posture clear of itself and in sight.
@@ -35,6 +35,7 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path) -> D
     import mjcf
     from calibration.design_postures import compared, nominal_task, plan
     from calibration.remedy import to_text
+    from scenarios import yaml_file
     from twin.declare import declaration
     from twin.randomness import generator
 
@@ -50,4 +51,14 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path) -> D
     with folder.updating(out.parent, [out.name]) as new:
         text = to_text(description.joint_names, [found.remedy("geometry", why)])
         (new / out.name).write_text(text, encoding="utf-8", newline="\n")
+    if campaign is not None:
+        with folder.updating(campaign.parent, [campaign.name]) as new:
+            yaml_file.write(new / campaign.name, recording(scenario, found))
     return Designed(found, against)
+
+
+def recording(scenario: "Scenario", plan: "Plan") -> "Scenario":
+    """The scenario with the postures of a plan as its calibration postures."""
+    given: Any = tuple(p.q for p in plan.postures)
+    changed = replace(scenario.twin.campaign, given_postures=given)
+    return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)})

@@ -17,9 +17,12 @@ from calibration.information import prospect
 from calibration.remedy import read_remedies, to_text
 from calibration.shapes import shapes_of
 from calibration.sight import in_sight, visible
-from scenarios import load
+from scenarios import load, yaml_file
+from scenarios.design import design, recording
 from tests.calibration import matched
 from twin.declare import declaration
+from twin.motions import RATE
+from twin.schedule import schedule
 
 DESCRIBED = declaration(load("humanoids2024").twin, ())
 
@@ -180,3 +183,20 @@ def test_a_robot_without_wheels_or_shapes_is_designed_for_too():
     at = partial(prospect, bare.model, bare.parameters, described, bare.play)
     q = bare.room.pool(80, np.random.default_rng(0))
     assert at(q[:60], q[60:]).B.shape[2] == 36
+
+
+@pytest.mark.slow
+def test_the_command_writes_postures_and_a_scenario_that_records_them(tmp_path):
+    out, campaign = tmp_path / "postures.yaml", tmp_path / "designed.yaml"
+    found = design(load("humanoids2024"), 5, "D", out, campaign)
+    (remedy,) = read_remedies(out)[1]
+    assert remedy.postures == found.plan.postures and len(remedy.postures) == 5
+    assert [p.q for p in remedy.postures] == list(load(campaign).twin.campaign.given_postures)
+
+
+def test_designed_postures_are_recorded_where_they_were_chosen(found, tmp_path):
+    yaml_file.write(tmp_path / "designed.yaml", recording(load("humanoids2024"), found))
+    config = load(tmp_path / "designed.yaml").twin
+    motion = schedule(config.campaign, mjcf.spec().compile(), 0)[0]
+    rests = [motion.command[round(0.5 * (a + b) * RATE)] for a, b in motion.dwells]
+    np.testing.assert_allclose(rests, [p.q for p in found.postures], atol=1e-12)

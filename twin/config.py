@@ -201,6 +201,9 @@ class Instruments:
     wrist: WristSensor | None = field(default_factory=WristSensor)
 
 
+GivenPosture = tuple[float, float, float, float, float, float, float, float]
+
+
 @dataclass(frozen=True, config=STRICT)
 class Campaign:
     """How much is recorded.
@@ -212,6 +215,8 @@ class Campaign:
         dwell: Rest in each static posture [s].
         calibration_postures: Number of.
         validation_postures: Number of.
+        given_postures: Calibration postures [m, rad] as `tiago-twin design` chooses them, the lift first, instead of
+            `calibration_postures` drawn ones.
         sweep: Duration of each one-joint sweep [s]; 0: no sweeps.
         calibration_swing: Duration of each calibration swing [s]; 0: none.
         validation_swing: Duration of each validation swing [s]; 0: none.
@@ -240,6 +245,7 @@ class Campaign:
     driving: Driving = field(default_factory=Driving)
     carried: bool = False
     only: tuple[TrialName, ...] = ()
+    given_postures: tuple[GivenPosture, ...] = ()
 
 
 @dataclass(frozen=True, config=STRICT)

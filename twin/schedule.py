@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import mujoco
+import numpy as np
 
 from calibration.schema import Role
 from twin import driving, motions, postures
@@ -20,7 +21,7 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
     Of them those the campaign asks for.
     """
     trials = (
-        _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign),
+        _calibration_postures(nominal, seed, campaign),
         *driving.trials(campaign),
         *_sweeps(campaign),
         *_swings("calibration", campaign.calibration_swing, motions.CALIBRATION_SWINGS, campaign),
@@ -47,6 +48,14 @@ def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tup
         *(replace(m, id=f"{m.id}_confirmation") for m in swings),
         _statics("postures_confirmation", "confirmation", campaign.validation_postures, nominal, seed, campaign),
     )
+
+
+def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> Motion:
+    """The given postures, from the first of them on, or drawn ones."""
+    if not campaign.given_postures:
+        return _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign)
+    q = np.array([campaign.given_postures[0], *campaign.given_postures])
+    return motions.postures("postures", "calibration", q, campaign)
 
 
 def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> Motion:
