@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from twin.defects.base import Defect, Parameter, body
+from twin.defects.base import UNTOUCHED, Defect, Parameter, body
 from twin.defects.ground import Wheel
 from twin.stiffness import spatial_stiffness
 
@@ -38,7 +38,7 @@ class Anchored(Defect):
         for wheel in self.wheels:
             wheel.fixed(spec)
             geom = spec.geom(wheel.contact_geom)
-            geom.contype, geom.conaffinity = 0, 0
+            geom.contype, geom.conaffinity = UNTOUCHED
         base = body(spec, _ROOT)
         for joint in base.joints:
             spec.delete(joint)

@@ -6,6 +6,9 @@ import mujoco
 
 from twin.errors import UnknownElement
 
+UNTOUCHED = (0, 2)
+"""contype and conaffinity of a shape that touches nothing, and that a compiler discarding such shapes still keeps."""
+
 
 class Parameter(NamedTuple):
     """One true number.

@@ -65,7 +65,9 @@ class Wheel(Defect):
             torsion = None if self.bushing is None else np.array(self.bushing.torsion)
             self.footing.tune(model, self.name, self.contact_geom, torsion)
             self._check_torsion(model)
-            if self.bushing is not None:
+            if self.bushing is None:
+                model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # six soft contacts on one heavy body: others creep
+            else:
                 self.bushing.tune_held(model, self.name, self.body_name, self.contact_geom)
 
     def _check_torsion(self, model: mujoco.MjModel) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from twin.defects.base import Defect, body
+from twin.defects.base import UNTOUCHED, Defect, body
 
 _PLATE = "plate"
 
@@ -67,7 +67,7 @@ class Tiles(Defect):
             shape.contype, shape.conaffinity, shape.mass = whole.contype, whole.conaffinity, 0.0
             shape.rgba, shape.group = whole.rgba, whole.group
             own.add_site(name=tile.name)
-        whole.contype = whole.conaffinity = 0
+        whole.contype, whole.conaffinity = UNTOUCHED
 
 
 def felt(model: mujoco.MjModel) -> tuple[str, ...]:
