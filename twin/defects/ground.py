@@ -19,6 +19,7 @@ from twin.defects.contact import Contact, TurnsLate
 
 Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
+_SHARED = 3, 1e-6  # friction shared by wheels of one rigid body is not unique: iterated to the end, it drifts
 _LATE = 0.1  # torsional damping times step over inertia of the wheel [-]
 
 
@@ -66,7 +67,7 @@ class Wheel(Defect):
             self.footing.tune(model, self.name, self.contact_geom, torsion)
             self._check_torsion(model)
             if self.bushing is None:
-                model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # six soft contacts on one heavy body: others creep
+                model.opt.noslip_iterations, model.opt.noslip_tolerance = _SHARED
             else:
                 self.bushing.tune_held(model, self.name, self.body_name, self.contact_geom)
 
