@@ -10,8 +10,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 def transform(position: np.ndarray, quat_wxyz: np.ndarray) -> np.ndarray:
     """T (..., 4, 4) from positions (..., 3) [m] and MuJoCo quaternions (..., 4)."""
-    rotation = Rotation.from_quat(quat_wxyz, scalar_first=True)
-    return RigidTransform.from_components(position, rotation).as_matrix()
+    T = np.zeros((*np.shape(position)[:-1], 4, 4))
+    T[..., :3, :3] = Rotation.from_quat(quat_wxyz, scalar_first=True).as_matrix()
+    T[..., :3, 3], T[..., 3, 3] = position, 1.0
+    return T
 
 
 def placement(T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
