@@ -13,7 +13,15 @@ from typing import Annotated
 
 import typer
 
-from scenarios import command_dataset, command_design, command_exchange, command_look, command_picture, command_study
+from scenarios import (
+    command_dataset,
+    command_design,
+    command_exchange,
+    command_look,
+    command_picture,
+    command_reality,
+    command_study,
+)
 from scenarios.errors import ScenarioError
 from scenarios.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
 
@@ -145,6 +153,7 @@ design = app.command()(command_design.design)
 study = app.command()(command_study.study)
 look = app.command()(command_look.look)
 picture = app.command()(command_picture.picture)
+reality = app.command()(command_reality.reality)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

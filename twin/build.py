@@ -93,7 +93,9 @@ def _brake(spec: mujoco.MjSpec) -> None:
 
 
 def _push(spec: mujoco.MjSpec) -> None:
-    """Three forces on the hand, in its own axes [N], that a motion may use."""
+    """Three forces on the hand, where there is one, in its own axes [N], that a motion may use."""
+    if spec.body(HAND) is None:
+        return
     site = body(spec, HAND).add_site(name="push")
     for k, name in enumerate(PUSH):
         force = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=site.name)

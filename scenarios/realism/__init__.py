@@ -1,0 +1,1 @@
+"""How robots of a scenario compare with recordings of a real one."""

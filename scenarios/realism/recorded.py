@@ -1,0 +1,92 @@
+"""What a recording tells of a base on its wheels: the wrench on the floor, and the displacement that went with it.
+
+Both in frame 0 (`calibration.suspension_rest`), about its origin. The wrench is low-passed at 20 Hz, since what slips
+slips in peaks, the displacement at 10 Hz. At rest a robot pulls the floor neither sideways nor about the vertical: what
+a plate reads there of these is its offset.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.bodies import body_poses
+from calibration.clock import Clock
+from calibration.dataset import Dataset
+from calibration.errors import NotEnoughData
+from calibration.markers import base_body
+from calibration.recording import Trial
+from calibration.schema import Description
+from calibration.signals import Signal, low_passed
+from calibration.suspension_rest import Rest, rest_of
+from calibration.suspension_sway import sway_of
+from calibration.suspension_wrench import CUTOFF, plate_load
+
+REST = slice(100, 150)
+"""Samples of a trial's rest that displacements are told from: of the log's second second, since its markers step by
+0.3 mrad within the first while the plate feels nothing."""
+
+_WRENCH = 20.0  # [Hz]
+_LEVEL = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])  # what of a resting wrench a floor can feel
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One trial.
+
+    Attributes:
+        trial_id: The trial.
+        t: (n,) [s], from 0, spacing 0.01 s.
+        rest: (6,) wrench on the floor at rest [N, N.m, frame 0].
+        w: (n, 6) its change since.
+        x: (n, 6) displacement since rest [m, rad, frame 0].
+        markers: (m, 3) of the base [m].
+        frame: Frame 0.
+    """
+
+    trial_id: str
+    t: np.ndarray
+    rest: np.ndarray
+    w: np.ndarray
+    x: np.ndarray
+    markers: np.ndarray
+    frame: Rest
+
+    def seen(self, x: np.ndarray, noise: float, rng: np.random.Generator) -> np.ndarray:
+        """What motion capture would make (n, 6) of a displacement (n, 6), white noise [m] on each marker."""
+        T = self.frame.poses(x)
+        positions = np.einsum("nij,mj->nmi", T[:, :3, :3], self.markers) + T[:, None, :3, 3]
+        positions += noise * rng.normal(size=positions.shape)
+        return referred(smooth(self.t, self.frame.displacement(body_poses(self.markers, positions).T)))
+
+
+def smooth(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """x (n, 6) without what is faster than a displacement is compared at."""
+    return low_passed(Signal(t, x, np.ones(len(t), dtype=bool)), CUTOFF).x
+
+
+def referred(x: np.ndarray) -> np.ndarray:
+    """Displacement (n, 6) since rest."""
+    return np.asarray(x - x[REST].mean(axis=0))
+
+
+def recorded(dataset: Dataset) -> tuple[Recorded, ...]:
+    """The moving trials of a dataset, whose plate must be on the clock of its markers.
+
+    Raises:
+        NotEnoughData: None shows the base's markers and a plate.
+    """
+    trials = [dataset.read(e) for e in dataset.description.trials if e.kind != "static" and not dataset.has_means(e)]
+    found = tuple(_trial(dataset.description, trial) for trial in trials if len(trial.t_plate))
+    if not found:
+        raise NotEnoughData("no trial of the dataset has base markers and a plate; record both while the arm moves")
+    return found
+
+
+def _trial(description: Description, trial: Trial) -> Recorded:
+    same = Clock("plate", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
+    rest = rest_of(description, trial, np.eye(4))
+    sway = sway_of(description, trial, rest, plate_load(trial, same, rest.T_lab_0, _WRENCH))
+    markers = np.array([m.xyz for m in base_body(description).markers])
+    forcing = sway.forcing
+    t = forcing.t - forcing.t[0]
+    return Recorded(trial.id, t, _LEVEL * forcing.rest, forcing.w, referred(sway.x), markers, rest)

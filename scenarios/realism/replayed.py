@@ -1,0 +1,72 @@
+"""A recorded wrench replayed on the bases of many drawn robots: does what was measured lie among what they do?
+
+inside_k = share of the time that  q05_k(t) <= x_k(t) <= q95_k(t)          axis k, quantiles over the draws
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenarios.realism.recorded import Recorded
+from twin.config import Base, TwinConfig
+from twin.instruments.plate import draw
+from twin.randomness import generator
+from twin.replay import Pull, carriage, replay
+from twin.uncertain import drawn
+
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+BAND = (0.05, 0.95)
+
+
+@dataclass(frozen=True)
+class Inside:
+    """How much of the time a measurement lies in the draws' band.
+
+    Attributes:
+        trial_id: The trial.
+        n: Samples.
+        share: (6,) of the time [-].
+        measured: (6,) peak to peak [m, rad].
+        spread: (3, 6) peak to peak of the draws: 5 %, median, 95 % [m, rad].
+    """
+
+    trial_id: str
+    n: int
+    share: np.ndarray
+    measured: np.ndarray
+    spread: np.ndarray
+
+
+def inside(trial: Recorded, draws: np.ndarray) -> Inside:
+    """Compare a trial with draws (k, n, 6) of its displacement."""
+    low, high = np.quantile(draws, BAND, axis=0)
+    share = ((trial.x >= low) & (trial.x <= high)).mean(axis=0)
+    spread = np.quantile(np.ptp(draws, axis=1), (BAND[0], 0.5, BAND[1]), axis=0)
+    return Inside(trial.trial_id, len(trial.t), share, np.ptp(trial.x, axis=0), spread)
+
+
+def together(found: Sequence[Inside]) -> np.ndarray:
+    """Share of the time (6,) over all trials."""
+    return np.average([f.share for f in found], axis=0, weights=[f.n for f in found])
+
+
+def gripping(base: Base, factor: float) -> Base:
+    """The same base on a floor with `factor` times the friction."""
+    kinds = {k: getattr(base, k) for k in ("drive", "caster_front", "caster_back")}
+    return replace(base, **{k: replace(w, friction=factor * w.friction) for k, w in kinds.items()})
+
+
+def replayed(config: TwinConfig, seed: int, trial: Recorded, grip: float = 1.0) -> np.ndarray:
+    """What one drawn robot's base does under a trial's wrench, as motion capture would see it (n, 6) [m, rad].
+
+    The plate's errors are drawn too: what it read is not what it felt.
+
+    Raises:
+        Diverged: The simulation left the numbers.
+    """
+    robot = drawn(config, seed)
+    plate = draw("plate", robot.instruments.plate, generator(seed, "plate"))
+    felt = (trial.w - plate.drift * trial.t[:, None]) @ np.linalg.inv(plate.gain).T
+    x = replay(carriage(gripping(robot.base, grip), robot.timestep), Pull(trial.t, trial.rest + felt))
+    return trial.seen(x, robot.instruments.marker_noise, generator(seed, "seen", trial.trial_id))

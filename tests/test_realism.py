@@ -1,0 +1,118 @@
+"""Drawn robots against the log of a real one."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration import load as load_dataset
+from calibration.errors import NotEnoughData
+from calibration.play import play
+from scenarios import cli, exchange, load
+from scenarios.realism.compare import compare_replay, compare_swings
+from scenarios.realism.recorded import Recorded, recorded, referred
+from scenarios.realism.replayed import gripping, inside, together
+from scenarios.realism.swings import LOG, Figures, Sway, figures, yaw_from_moment
+
+ROOT = Path(__file__).parents[1]
+LOG_FILE = ROOT.parent / "shared/data/real/vicon_forceplate_2023-09-20.csv"
+T = np.arange(0.0, 30.0, 0.01)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """The public log as a dataset."""
+    if not LOG_FILE.is_file():
+        pytest.skip(f"{LOG_FILE.name} is not beside the checkout")
+    folder = tmp_path_factory.mktemp("log") / "dataset"
+    exchange.import_files("csv", [LOG_FILE], ROOT / "docs/mappings/vicon_forceplate.yaml", folder)
+    return folder
+
+
+def swing_of(amplitude, start=0.0):
+    """A 0.2 Hz cycle between 2 s and 28 s, with a constant `start` from then on."""
+    moving = (T >= 2.0) & (T <= 28.0)
+    wave = amplitude * np.sin(2 * np.pi * 0.2 * (T - 2.0)) * moving
+    return wave + start * (T >= 2.0)
+
+
+def test_figures_are_those_of_the_motion():
+    rotation = np.column_stack([swing_of(1e-3), swing_of(2e-3), swing_of(3e-3, 4e-3)])
+    centroid = np.column_stack([swing_of(1e-4), swing_of(2e-4), swing_of(3e-4)])
+    wrench = np.column_stack([swing_of(a) for a in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)])
+    f = figures(Sway(T, rotation, centroid, wrench), 2.0)
+    assert (f.steady_roll, f.steady_pitch, f.steady_yaw) == pytest.approx((2e-3, 4e-3, 6e-3), rel=0.02)
+    assert (f.roll, f.pitch, f.yaw) == pytest.approx((2e-3, 4e-3, 7e-3), rel=0.02)
+    assert f.set == pytest.approx(4e-3, rel=0.01)
+    assert (f.x, f.y, f.z) == pytest.approx((2e-4, 4e-4, 6e-4), rel=0.01)
+    assert (f.Fz, f.Mx, f.My, f.Mz) == pytest.approx((6.0, 8.0, 10.0, 12.0), rel=0.02)
+    assert set(LOG) == {field.name for field in fields(Figures)}
+
+
+def test_yaw_that_slips_is_poorly_told_by_a_line_and_well_by_play():
+    moment = 10.0 * np.sin(2 * np.pi * 0.2 * T) * (1.0 + 0.3 * np.sin(2 * np.pi * 0.05 * T))
+    slipping = 1e-3 * play(moment[:, None], np.array([4.0]))[:, 0]
+    straight = yaw_from_moment(1e-3 * moment, moment)
+    assert straight.linear == pytest.approx(1.0) and straight.hysteretic == pytest.approx(1.0)
+    found = yaw_from_moment(slipping, moment)
+    assert found.linear < 0.9 and found.hysteretic > 0.95
+
+
+def test_a_measurement_lies_inside_where_it_lies_among_the_draws():
+    x = np.zeros((len(T), 6))
+    x[:, 2] = np.where(T < 15.0, 0.0, 9.0)
+    x[:, 5] = 9.0
+    trial = Recorded("a", T, np.zeros(6), np.zeros_like(x), x, np.zeros((3, 3)), None)
+    draws = np.linspace(-1.0, 1.0, 20)[:, None, None] + np.zeros((20, *x.shape))
+    found = inside(trial, draws)
+    assert found.share == pytest.approx([1.0, 1.0, 0.5, 1.0, 1.0, 0.0])
+    assert together([found, found]) == pytest.approx(found.share)
+
+
+def test_grip_scales_friction_and_nothing_else():
+    base = load("humanoids2024").twin.base
+    more = gripping(base, 2.0)
+    assert (
+        more.drive.friction == 2.0 * base.drive.friction
+        and more.caster_back.friction == 2.0 * base.caster_back.friction
+    )
+    assert more.drive.stiffness == base.drive.stiffness and more.pose == base.pose
+
+
+def test_a_recording_gives_the_wrench_on_a_floor_that_feels_no_offset(log):
+    slow, cycles = recorded(load_dataset(log))
+    assert (slow.trial_id, cycles.trial_id) == ("slow", "cycles")
+    assert slow.rest[[0, 1, 5]] == pytest.approx([0.0, 0.0, 0.0]) and slow.rest[2] == pytest.approx(-730.0, abs=1.0)
+    assert np.ptp(cycles.x[:, 5]) == pytest.approx(29.5e-3, rel=0.02)
+    still = referred(np.zeros_like(slow.x))
+    noise = slow.seen(still, 1e-4, np.random.default_rng(0)) - slow.seen(still, 0.0, np.random.default_rng(0))
+    assert 1e-5 < noise[:, 0].std() < 3e-4
+
+
+def test_a_dataset_without_a_plate_is_told(log):
+    dataset = load_dataset(log)
+    without = replace(dataset, description=dataset.description.model_copy(update={"trials": ()}))
+    with pytest.raises(NotEnoughData, match="record both while the arm moves"):
+        recorded(without)
+
+
+def test_the_command_refuses_a_scenario_it_does_not_know(tmp_path, capsys):
+    with pytest.raises(SystemExit) as left:
+        cli.main(["reality", "realty", "--out", str(tmp_path / "a.json")])
+    assert left.value.code == 2 and "reality" in capsys.readouterr().err
+    assert not (tmp_path / "a.json").exists()
+
+
+@pytest.mark.slow
+def test_a_floor_that_holds_what_the_plate_read_lets_the_base_turn_and_pitch_as_the_log_did(log):
+    """As drawn, friction is less than the log's start jerk needs, and most bases run away."""
+    trials = recorded(load_dataset(log))
+    drawn, held = (compare_replay(load("reality"), trials, 20, grip) for grip in (1.0, 2.0))
+    assert held.share[4] >= 0.8 and held.share[5] >= 0.8
+    assert drawn.share[5] < held.share[5]
+
+
+@pytest.mark.slow
+def test_with_a_heavier_hand_nine_figures_of_the_log_lie_among_the_draws():
+    assert compare_swings(load("reality", ["twin.payload.mass=2.5"]), 20).n_inside >= 9

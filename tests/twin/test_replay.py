@@ -1,0 +1,57 @@
+"""A base without the robot follows a wrench as its springs and its friction say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from twin.draw_base import wheels_of
+from twin.replay import Pull, carriage, replay
+from twin.stiffness import spatial_stiffness
+
+T = np.arange(0.0, 6.0, 0.01)
+STANDING = np.array([0.0, 0.0, -730.0, 0.0, 0.0, 0.0])
+
+
+def pull(change, profile):
+    """A wrench that stands still for a second, then changes as the profile (n,) says."""
+    return Pull(T, STANDING + np.outer(profile, change))
+
+
+def hump(start=1.0, stop=3.0, ramp=0.5):
+    return np.clip(np.minimum((T - start) / ramp, (stop - T) / ramp), 0.0, 1.0)
+
+
+@pytest.mark.parametrize("wheels", ["anchored", "contact"])
+def test_a_steady_load_moves_the_base_by_its_compliance(config, wheels):
+    base = replace(config.base, wheels=wheels)
+    change = np.array([2.0, -1.0, 0.0, 5.0, 4.0, 0.3])
+    x = replay(carriage(base), pull(change, hump(stop=9.0)))
+    K, _ = spatial_stiffness(wheels_of(base))
+    expected = np.linalg.solve(K + preload(base), change)
+    np.testing.assert_allclose(x[-1], expected, rtol=0.03, atol=3e-3 * np.abs(expected).max())
+
+
+def preload(base):
+    """Tangent of the wheels' loads, which turn with the base: -f x theta."""
+    G = np.zeros((6, 6))
+    G[0, 4], G[1, 3] = -730.0, 730.0
+    return G
+
+
+def test_what_friction_holds_comes_back_and_what_it_does_not_stays(config):
+    twin = carriage(config.base)
+    held = replay(twin, pull(np.array([0, 0, 0, 0, 0, 0.5]), hump()))
+    assert np.abs(held[-1]).max() < 0.02 * np.abs(held).max()
+    slipped = replay(twin, pull(np.array([0, 0, 0, 0, 0, 20.0]), hump()))
+    assert abs(slipped[-1, 5]) > 1e-3
+
+
+def test_nothing_moves_before_the_wrench_changes(config):
+    x = replay(carriage(config.base), pull(np.array([5.0, 0, 0, 0, 0, 0]), hump()))
+    assert np.abs(x[T < 0.95]).max() < 1e-5
+
+
+def test_a_replay_repeats_bit_for_bit(config):
+    twin, load = carriage(config.base), pull(np.array([0, 9.0, 0, 8.0, 0, 9.0]), hump())
+    np.testing.assert_array_equal(replay(twin, load), replay(twin, load))
