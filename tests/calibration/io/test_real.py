@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from calibration import calibrate, load
+from calibration import calibrate, evaluate, load
 from scenarios import exchange
 
 ROOT = Path(__file__).parents[3]
@@ -25,6 +26,53 @@ def test_static_postures_are_calibrated_and_say_what_is_missing(tmp_path):
     assert estimate.calibrated and estimate.main == "full"
     assert "37 postures" in said["registration"].message
     assert (said["suspension"].verdict, said["joints"].verdict) == ("missing", "missing")
+
+
+def real_rows() -> tuple[str, np.ndarray]:
+    path = REAL / "qualisys_2021-11-30_postures.csv"
+    if not path.is_file():
+        pytest.skip(f"{path.name} is not beside the checkout")
+    return path.read_text().splitlines()[0], np.loadtxt(path, delimiter=",", skiprows=1)
+
+
+def written(path: Path, head: str, rows: np.ndarray) -> Path:
+    np.savetxt(path, rows, delimiter=",", header=head, comments="", fmt="%.6f")
+    return path
+
+
+def test_a_second_file_is_predicted_within_its_band(tmp_path):
+    head, rows = real_rows()
+    order = np.random.default_rng(0).permutation(len(rows))
+    files = [written(tmp_path / f"day{k + 1}.csv", head, rows[part]) for k, part in enumerate((order[:25], order[25:]))]
+    mapping = ROOT / "docs/mappings/qualisys_two_days.yaml"
+    exchange.import_files("csv", files, mapping, tmp_path / "dataset")
+    dataset = load(tmp_path / "dataset")
+    found = evaluate(calibrate(dataset), dataset)
+    row = {p.marker: p for p in found.points}["all"]
+    norm = {r.model: r.metrics.position_rmse_norm_mm for r in found.rows if r.trials == "static"}
+    assert row.model == "full" and row.n == 48
+    assert norm["full"] < norm["model_2"] < 0.7 * norm["registration"]
+    assert row.rmse_norm_mm < 3.2 and row.inside >= 0.75 and row.band_95_mm < 9.0
+
+
+@pytest.mark.parametrize("kind", [0.02, 0.05, 0.3, "labels"])
+def test_wrong_rows_are_imported_and_named(tmp_path, kind):
+    head, rows = real_rows()
+    rng = np.random.default_rng(3)
+    wrong = sorted(rng.choice(len(rows), 4, replace=False).tolist())
+    for k in wrong:
+        p = rows[k, :12].reshape(4, 3)
+        way = rng.normal(size=3)
+        rows[k, :12] = (p[[1, 0, 2, 3]] if kind == "labels" else p + kind * way / np.linalg.norm(way)).ravel()
+    file = written(tmp_path / "qualisys_2021-11-30_postures.csv", head, rows)
+    exchange.import_files("csv", [file], ROOT / "docs/mappings/qualisys_postures.yaml", tmp_path / "dataset")
+    estimate = calibrate(load(tmp_path / "dataset"))
+    told = [v.message for v in estimate.verdicts if v.stage == "geometry" and v.verdict == "warning"]
+    assert estimate.calibrated
+    assert told == [
+        "4 of 37 postures contradict the others and were left out, counted from 0: "
+        + ", ".join(f"postures {k}" for k in wrong)
+    ]
 
 
 def test_base_and_plate_give_a_suspension_and_say_what_is_missing(tmp_path):
