@@ -30,7 +30,12 @@ def dataset(  # noqa: PLR0913  an option each
         steps.load(scenario, overriding(overrides, seed)), n, out, recordings if blind else recordings_and_truth, blind
     )
     with console.progress() as progress:
-        rows = collect(plan, engine.Workers(workers, scheduler), lambda at, share: progress("dataset", at, share))
+        rows = collect(
+            plan,
+            engine.Workers(workers, scheduler),
+            lambda at, share: progress("dataset", at, share),
+            announce=console.note,
+        )
     console.show_rows(rows)
     typer.echo(f"Index: {out / 'index.csv'}")
     if all(row.status != "ok" for row in rows):

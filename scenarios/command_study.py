@@ -48,7 +48,7 @@ def study(  # noqa: PLR0913  an option each
             folder = out / f"level_{k}" if path else out
             at = f"{path}={value} " if path else ""
             who = engine.Workers(workers, scheduler)
-            rows = collect(Plan(loaded, n, folder, produce), who, partial(_tell, progress, at))
+            rows = collect(Plan(loaded, n, folder, produce), who, partial(_tell, progress, at), announce=console.note)
             levels.append(study.level(value, rows))
             found = list(study.parameters(folder, rows))
     study.save(out / "study.json", levels, found if kind == "coverage" else [])

@@ -1,6 +1,7 @@
 """What the command line shows: progress on stderr, tables on stdout."""
 
 import json
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -73,6 +74,11 @@ def _lines(console: Console) -> Progress:
             last_step, last_time = step, now
 
     return show
+
+
+def note(text: str) -> None:
+    """Print a line on stderr that stays, above the bars where there are some."""
+    print(text, file=sys.stderr, flush=True)  # noqa: T201
 
 
 def show(table: Table | None) -> None:

@@ -62,8 +62,14 @@ class Plan:
         return (Order(i, place, text, self.produce, digest) for i in range(self.n))
 
 
-def collect(plan: Plan, workers: Workers, progress: Progress, task: Task = perform) -> tuple[Row, ...]:
-    """Make the runs that are missing or not right; return the rows of all.
+def collect(
+    plan: Plan,
+    workers: Workers,
+    progress: Progress,
+    task: Task = perform,
+    announce: Callable[[str], None] = lambda cost: None,
+) -> tuple[Row, ...]:
+    """Make the runs that are missing or not right; return the rows of all; announce bytes and time after the first.
 
     Raises:
         ScenarioError: The folder is not such a collection, or somebody else is writing it.
@@ -77,7 +83,7 @@ def collect(plan: Plan, workers: Workers, progress: Progress, task: Task = perfo
         write_whole(plan.folder / "collection.json", _description(plan))
         rows: list[Row] = []
         try:
-            for row in _told(compute(plan.orders(), workers, task), plan, workers, progress):
+            for row in _told(compute(plan.orders(), workers, task), plan, workers, progress, announce):
                 rows.append(row)
         finally:
             write_index(plan.folder / "index.csv", rows)
@@ -85,7 +91,9 @@ def collect(plan: Plan, workers: Workers, progress: Progress, task: Task = perfo
     return tuple(sorted(rows, key=lambda row: row.id))
 
 
-def _told(done: Iterator[Done], plan: Plan, workers: Workers, progress: Progress) -> Iterator[Row]:
+def _told(
+    done: Iterator[Done], plan: Plan, workers: Workers, progress: Progress, announce: Callable[[str], None]
+) -> Iterator[Row]:
     """Pass the rows on; say from the first one what the others will cost, then the rate and the time that is left."""
     progress("the first run tells the cost of the others", 0.0)
     start, width = time.monotonic(), max(1, workers.number)
@@ -95,7 +103,7 @@ def _told(done: Iterator[Done], plan: Plan, workers: Workers, progress: Progress
         if k == 1:
             _check_room(plan.folder, one.row.bytes * left)
             size = f"{_bytes(one.row.bytes * plan.n)} in all, {_hours(one.seconds * left / width)}"
-            progress(f"{size} to go with {width} at once", k / plan.n)
+            announce(f"{size} to go with {width} at once")
             start = time.monotonic()
         else:
             rate = (k - 1) / (time.monotonic() - start)
