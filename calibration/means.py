@@ -15,7 +15,7 @@ import numpy as np
 
 from calibration.bodies import BodyPoses, body_poses, still_poses
 from calibration.errors import InputError, NotEnoughData, ShapeError
-from calibration.recording import labels, sha256, write_labels, write_variable
+from calibration.recording import check_shapes, labels, sha256, write_labels, write_variable
 from calibration.schema import Body
 
 # name: (dimensions, units, what it is)
@@ -53,10 +53,7 @@ class PostureMeans:
 
     def __post_init__(self) -> None:
         sizes = {"posture": len(self.q_motor), "joint": len(self.joint), "marker": len(self.marker), "axis": 3}
-        for name, (dims, *_) in _LAYOUT.items():
-            expected = tuple(sizes[d] for d in dims)
-            if getattr(self, name).shape != expected:
-                raise ShapeError(f"{self.id}: {name}", getattr(self, name).shape, expected)
+        check_shapes(self.id, vars(self), {name: dims for name, (dims, *_) in _LAYOUT.items()}, sizes)
         if len(self.marker_body) != len(self.marker):
             raise ShapeError(f"{self.id}: marker_body", (len(self.marker_body),), (len(self.marker),))
 

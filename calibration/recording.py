@@ -76,6 +76,16 @@ def _empty(*shape: int) -> np.ndarray:
     return np.zeros(shape)
 
 
+def check_shapes(
+    id: str, arrays: Mapping[str, Any], layout: Mapping[str, tuple[str, ...]], sizes: Mapping[str, int]
+) -> None:
+    """Raise ShapeError for the first array of trial `id` that its dimensions contradict."""
+    for name, dims in layout.items():
+        expected = tuple(sizes[d] for d in dims)
+        if arrays[name].shape != expected:
+            raise ShapeError(f"{id}: {name}", arrays[name].shape, expected)
+
+
 @dataclass(frozen=True)
 class Trial:
     """One continuous recording, every instrument on its own clock.
@@ -132,10 +142,7 @@ class Trial:
             object.__setattr__(self, "wrist_wrench", np.full((len(self.t_robot), 6), np.nan))
         sizes = {"axis": 3, "wrench": 6, "joint": len(self.joint), "marker": len(self.marker), "plate": len(self.plate)}
         sizes |= {clock: len(getattr(self, clock)) for clock in _CLOCKS} | {"posture": len(self.dwell_start)}
-        for name, (dims, *_) in _LAYOUT.items():
-            expected = tuple(sizes[d] for d in dims)
-            if getattr(self, name).shape != expected:
-                raise ShapeError(f"{self.id}: {name}", getattr(self, name).shape, expected)
+        check_shapes(self.id, vars(self), {name: dims for name, (dims, *_) in _LAYOUT.items()}, sizes)
         if len(self.marker_body) != len(self.marker):
             raise ShapeError(f"{self.id}: marker_body", (len(self.marker_body),), (len(self.marker),))
 

@@ -3,6 +3,7 @@
 SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and tolerances only.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -19,6 +20,14 @@ class Declaration(BaseModel):
     """Strict and frozen: an unknown field or a NaN is an error, not a default."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def refuse_repeated(groups: Mapping[str, Sequence[str]]) -> None:
+    """Raise ValueError for the first group that holds a name more than once."""
+    for group, names in groups.items():
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise ValueError(f"{group} named more than once: {twice}")
 
 
 class Joint(Declaration):
@@ -177,10 +186,7 @@ class Description(Setup):
             "plates": [p.name for p in self.plates],
             "trials": [t.id for t in self.trials],
         }
-        for group, names in groups.items():
-            twice = sorted({n for n in names if names.count(n) > 1})
-            if twice:
-                raise ValueError(f"{group} named more than once: {twice}")
+        refuse_repeated(groups)
         return self
 
     @model_validator(mode="after")

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from calibration.recording import Trial
 
 Status = Literal["estimated", "combined", "not_identifiable", "not_estimated"]
-_SPAN_95 = 1.959963984540054
+SPAN_95 = 1.959963984540054
+"""Half width of a 95 % interval in standard deviations."""
 _ALIKE = 1e-9  # [-] share of the largest eigenvalue below which combinations repeat each other
 
 
@@ -126,7 +127,7 @@ def judge_parameters(model: Model, true: Iterable[Parameter]) -> ParameterScore:
     true = tuple(true)
     parameters = tuple(_parameter(name, unit, value, model) for name, unit, value in true)
     matrix, errors, combinations = _identified(model, {name: value for name, _, value in true})
-    covered = np.abs(errors / np.sqrt(np.diag(matrix))) <= _SPAN_95
+    covered = np.abs(errors / np.sqrt(np.diag(matrix))) <= SPAN_95
     nees, dof = _nees(errors, matrix)
     return ParameterScore(parameters, combinations, float(covered.mean()), int(covered.sum()), len(covered), nees, dof)
 

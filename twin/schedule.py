@@ -21,14 +21,14 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
     Of them those the campaign asks for.
     """
     trials = (
-        _calibration_postures(nominal, seed, campaign),
+        *_calibration_postures(nominal, seed, campaign),
         *driving.trials(campaign),
         *_sweeps(campaign),
         *_swings("calibration", campaign.calibration_swing, motions.CALIBRATION_SWINGS, campaign),
         *_swings("validation", campaign.validation_swing, motions.VALIDATION_SWINGS, campaign),
         *_loaded(campaign),
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
-        _statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
+        *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
         *(_confirmation(campaign, nominal, seed) if campaign.confirmation else ()),
     )
     return tuple(m for m in trials if not campaign.only or _group(m) in campaign.only)
@@ -46,22 +46,24 @@ def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tup
     return (
         replace(register, name=REGISTRATION),
         *(replace(m, id=f"{m.id}_confirmation") for m in swings),
-        _statics("postures_confirmation", "confirmation", campaign.validation_postures, nominal, seed, campaign),
+        *_statics("postures_confirmation", "confirmation", campaign.validation_postures, nominal, seed, campaign),
     )
 
 
-def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> Motion:
+def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
     """The given postures, from the first of them on, or drawn ones."""
     if not campaign.given_postures:
         return _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign)
     q = np.array([campaign.given_postures[0], *campaign.given_postures])
-    return motions.postures("postures", "calibration", q, campaign)
+    return (motions.postures("postures", "calibration", q, campaign),)
 
 
-def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> Motion:
-    """The first posture is where the trial starts, the n that follow are dwelt in."""
+def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
+    """The first posture is where the trial starts, the n that follow are dwelt in; not drawn unless asked for."""
+    if campaign.only and id not in campaign.only:
+        return ()
     q = postures.draw(nominal, n + 1, generator(seed, "postures", role))
-    return motions.postures(id, role, q, campaign)
+    return (motions.postures(id, role, q, campaign),)
 
 
 def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:

@@ -12,7 +12,18 @@ from pydantic import Field, model_validator
 
 from calibration.errors import InputError
 from calibration.io.layouts import BagLayout, C3dLayout, CsvTable
-from calibration.schema import Body, Declaration, Kind, Marker, NonNegative, Positive, Role, Setup, Vector6
+from calibration.schema import (
+    Body,
+    Declaration,
+    Kind,
+    Marker,
+    NonNegative,
+    Positive,
+    Role,
+    Setup,
+    Vector6,
+    refuse_repeated,
+)
 
 
 class Standing(Declaration):
@@ -126,10 +137,7 @@ class Mapping(Declaration):
             "markers": [name for b in self.bodies for name in b.marker_names],
             "trials": [t.id for t in self.trials],
         }
-        for group, names in groups.items():
-            twice = sorted({n for n in names if names.count(n) > 1})
-            if twice:
-                raise ValueError(f"{group} named more than once: {twice}")
+        refuse_repeated(groups)
         return self
 
 

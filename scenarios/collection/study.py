@@ -18,8 +18,7 @@ from scipy import stats
 
 from scenarios.collection.order import run_name
 from scenarios.collection.row import Row, write_whole
-
-_SPAN_95 = 1.959963984540054
+from scenarios.score import SPAN_95
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def parameters(folder: Path, rows: Sequence[Row]) -> Iterator[Parameter]:
     for (name, unit), values in found.items():
         error, sigma = np.array(values).T
         rmse, promised = np.sqrt((error**2).mean()), np.sqrt((sigma**2).mean())
-        inside = float((np.abs(error) <= _SPAN_95 * sigma).mean())
+        inside = float((np.abs(error) <= SPAN_95 * sigma).mean())
         yield Parameter(name, unit, len(values), float(error.mean()), float(rmse), float(promised), inside)
 
 
