@@ -18,6 +18,7 @@ from calibration.io.layouts import BagLayout
 from calibration.io.recorded import Joints, Recorded
 
 _FIELDS = tuple(SUFFIXES)
+_COMPRESSION = "ompression"  # in every message of rosbags about one it does not know
 
 
 def read_bag(files: Sequence[Path], layout: BagLayout) -> Recorded:
@@ -44,7 +45,7 @@ def bag_reader(layout: BagLayout) -> Reader:
 def _messages(path: Path, topics: Sequence[str]) -> dict[str, list[Any]]:
     """Messages of each topic, in the order of the bag."""
     store = typestore(2)
-    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.highlevel import AnyReader
 
     found: dict[str, list[Any]] = {topic: [] for topic in topics}
     try:
@@ -52,12 +53,26 @@ def _messages(path: Path, topics: Sequence[str]) -> dict[str, list[Any]]:
             for connection, _, raw in bag.messages([c for c in bag.connections if c.topic in found]):
                 found[connection.topic].append(bag.deserialize(raw, connection.msgtype))
             known = sorted(bag.topics)
-    except (AnyReaderError, OSError, ValueError, KeyError, AssertionError) as error:
-        raise InputError(path, f"cannot be read as a ROS bag ({error}); truncated? copy it again") from error
+    except _unreadable() as error:
+        remedy = "truncated? copy it again"
+        if _COMPRESSION in str(error) and "upported" in str(error):
+            remedy = "write it again with another: `rosbag decompress` for ROS 1, `ros2 bag convert` for ROS 2"
+        raise InputError(path, f"cannot be read as a ROS bag ({error}); {remedy}") from error
     empty = [topic for topic, rows in found.items() if not rows]
     if empty:
         raise InputError(path, f"no messages on {empty}; the bag has {known}; correct the mapping file")
     return found
+
+
+def _unreadable() -> tuple[type[Exception], ...]:
+    """What reading a damaged bag may raise; the zstd module has no other name for its own error."""
+    from rosbags.highlevel import AnyReaderError
+    from rosbags.rosbag1 import ReaderError as One
+    from rosbags.rosbag2 import ReaderError as Two
+    from rosbags.rosbag2.reader import zstd
+
+    damaged = OSError, EOFError, ValueError, KeyError, AssertionError, RuntimeError
+    return AnyReaderError, One, Two, zstd.ZstdError, *damaged
 
 
 def _states(path: Path, layout: BagLayout, messages: dict[str, list[Any]]) -> Joints:
