@@ -18,12 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.clock import Clock, TrialLag, fit_clock
+from calibration.clock_influence import lag_and_drift, without_nuisances
 from calibration.clock_samples import Samples, read_samples
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel, nominal_hand
 from calibration.hand_fit import fit
 from calibration.inverse_dynamics import JointMotion
-from calibration.lag import MEMORY, Lag, long_run_covariance
+from calibration.lag import Lag
 from calibration.parameters import geometry_parameters, play_floor, play_start
 from calibration.postures import Postures, read_passing, read_postures
 from calibration.recording import Trial
@@ -34,7 +35,6 @@ from calibration.se3 import inverse, rotation_vector
 _SPACING, _PASSED = 0.5, 250  # [s] between postures passed through, at least; so many of them, about
 _MOVES = 0.05  # [rad, m] a joint must move to count as moving
 _LOADED, _TORQUE = 0.1, 0.3  # a joint is loaded while |tau| exceeds this share of its largest, and this [N.m, N]
-_FEWEST = 0.2  # [-] share of the degrees of freedom that is left at least
 _FREE = 0.02  # [rad, m] random error of a joint that is not loaded: more than any gear's play
 _log = logging.getLogger(__name__)
 
@@ -114,7 +114,7 @@ def link_angles(robot: Provisional, description: Description, trial: Trial, cloc
 
 
 def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> TrialLag:
-    """Least squares for lag and drift with the nuisances eliminated, their covariance allowing for autocorrelation."""
+    """Lag and drift of one trial around an approximate clock, the nuisances eliminated."""
     hand, columns = robot.hand, robot.hand.chain.columns
     q, v, tau = x.q[:, columns], x.v[:, columns], _gravity_torques(hand, x.q)
     held = np.abs(tau) > np.maximum(_TORQUE, _LOADED * robot.largest)
@@ -134,8 +134,8 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     middle = float(np.average(x.t, weights=(slope**2).sum(axis=1)))
     r = W @ _residuals(x.T, at.T)[..., None]
     S = np.stack([slope, slope * (x.t - middle)[:, None]], axis=2).reshape(-1, 2)
-    y, taken = _orthogonal_to(A, B, np.column_stack([r.ravel(), S]))
-    return _told(Reduced(y, taken, x.t, middle), trial_id, clock)
+    reduced = without_nuisances(A, B, r.ravel(), S, x.t)
+    return _told(*lag_and_drift(reduced), x.t, middle, trial_id, clock)
 
 
 def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
@@ -143,53 +143,16 @@ def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
     return np.nanmedian(np.where(held | ~held.any(axis=0), q, np.nan), axis=0)
 
 
-@dataclass(frozen=True)
-class Reduced:
-    """The problem without its nuisances.
-
-    Attributes:
-        y: Whitened residuals, and their derivatives by lag and drift (6 n + b, 3).
-        taken: Degrees of freedom the nuisances took of the first 6 n rows.
-        t: (n,) [s, mocap clock].
-        middle: t0 [s, mocap clock].
-    """
-
-    y: np.ndarray
-    taken: float
-    t: np.ndarray
-    middle: float
-
-
-def _told(x: Reduced, trial_id: str, clock: Clock) -> TrialLag:
-    """Lag and drift, at the instant where they are uncorrelated; a residual stays alike for `MEMORY`."""
-    r, S, n, dt = x.y[:, 0], x.y[:, 1:], len(x.t), float(np.median(np.diff(x.t)))
-    scale = np.linalg.norm(S, axis=0)
-    inverse_information = np.linalg.inv(S.T @ S / np.outer(scale, scale)) / np.outer(scale, scale)
-    change = inverse_information @ (S.T @ r)
-    psi, independent = (r - S @ change)[:, None] * (S @ inverse_information), 6 * n * dt / MEMORY
-    in_time, prior = psi[: 6 * n].reshape(n, 6, 2).sum(axis=1), psi[6 * n :]
-    lost = independent / max(independent - x.taken, _FEWEST * independent)
-    C = lost * long_run_covariance(in_time, 1.0 / dt) + prior.T @ prior
-    shift = float(np.clip(-C[0, 1] / C[1, 1], x.t[0] - x.middle, x.t[-1] - x.middle))
-    at = x.middle + shift
+def _told(  # noqa: PLR0913  the parts of one line
+    change: np.ndarray, C: np.ndarray, t: np.ndarray, middle: float, trial_id: str, clock: Clock
+) -> TrialLag:
+    """Lag and drift at the instant where they are uncorrelated, from those at `middle` with covariance C."""
+    shift = float(np.clip(-C[0, 1] / C[1, 1], t[0] - middle, t[-1] - middle))
+    at = middle + shift
     s = float(clock.from_mocap(np.array([at]))[0])
     sigma = float(np.sqrt(C[0, 0] + 2 * shift * C[0, 1] + shift**2 * C[1, 1]))
     lag = Lag(at - s + float(change[0] + shift * change[1]), sigma, 1.0)
-    return TrialLag(trial_id, s, lag, clock.drift + float(change[1]), float(np.sqrt(C[1, 1])), float(x.t[-1] - x.t[0]))
-
-
-def _orthogonal_to(A: np.ndarray, B: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
-    """Columns y (m, c) without what columns A, free, and B, with coefficients N(0, 1), explain: (m + b, c).
-
-    Also how many degrees of freedom of the m rows that takes: the trace of the projector there.
-    """
-    size, b = np.linalg.norm(A, axis=0), B.shape[1]
-    A = A[:, size > 0.0] / size[size > 0.0]
-    D = np.block([[A, B], [np.zeros((b, A.shape[1])), np.eye(b)]])
-    U, values, _ = np.linalg.svd(D, full_matrices=False)
-    U = U[:, values > 1e-8 * values[0]]
-    y = np.concatenate([y, np.zeros((b, y.shape[1]))])
-    return y - U @ (U.T @ y), float((U[: len(A)] ** 2).sum())
+    return TrialLag(trial_id, s, lag, clock.drift + float(change[1]), float(np.sqrt(C[1, 1])), float(t[-1] - t[0]))
 
 
 def _residuals(T_measured: np.ndarray, T: np.ndarray) -> np.ndarray:
