@@ -58,7 +58,8 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
 
 
 def recording(scenario: "Scenario", plan: "Plan") -> "Scenario":
-    """The scenario with the postures of a plan as its calibration postures."""
+    """The scenario with the postures of a plan as its calibration postures, each reached from the side it says."""
     given: Any = tuple(p.q for p in plan.postures)
-    changed = replace(scenario.twin.campaign, given_postures=given)
+    sides: Any = tuple(p.approach for p in plan.postures)
+    changed = replace(scenario.twin.campaign, given_postures=given, given_approaches=sides)
     return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)})

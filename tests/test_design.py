@@ -19,6 +19,7 @@ from calibration.shapes import shapes_of
 from calibration.sight import in_sight, visible
 from scenarios import load, yaml_file
 from scenarios.design import design, recording
+from scenarios.errors import ScenarioError
 from tests.calibration import matched
 from twin.declare import declaration
 from twin.motions import RATE
@@ -200,3 +201,17 @@ def test_designed_postures_are_recorded_where_they_were_chosen(found, tmp_path):
     motion = schedule(config.campaign, mjcf.spec().compile(), 0)[0]
     rests = [motion.command[round(0.5 * (a + b) * RATE)] for a, b in motion.dwells]
     np.testing.assert_allclose(rests, [p.q for p in found.postures], atol=1e-12)
+    sides = np.array([p.approach for p in found.postures])
+    np.testing.assert_array_equal(motion.approach[sides != 0], sides[sides != 0])
+    for (start, _), side in zip(motion.dwells, sides, strict=True):
+        before = motion.command[round(start * RATE) - 20 : round(start * RATE) + 1]
+        assert (side * np.diff(before, axis=0) >= -1e-12).all() and (side * np.ptp(before, axis=0))[side != 0].any()
+
+
+def test_approaches_that_are_not_one_a_posture_are_refused():
+    given = "[[0.1,1,0,-1,1,0,0,0],[0.1,1,0,-1,1,0.5,0,0]]"
+    with pytest.raises(ScenarioError, match="1 approaches for 2 given_postures"):
+        load(
+            "humanoids2024",
+            [f"twin.campaign.given_postures={given}", "twin.campaign.given_approaches=[[0,1,1,1,1,1,1,1]]"],
+        )

@@ -18,6 +18,7 @@ JOINTS = ("torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8)))
 RATE = 100.0  # [Hz] of the set-points
 SETTLE = 2.0  # [s] before a recording starts, not recorded
 TAU = 2.0 * np.pi
+BEYOND = np.array([5e-3, *7 * [5e-2]])  # how far off a joint turns to approach from a given side [m, rad]
 
 
 @dataclass(frozen=True)
@@ -116,17 +117,30 @@ def _no_dwells() -> tuple[np.ndarray, np.ndarray]:
     return np.empty((0, 2)), np.empty((0, len(JOINTS)), dtype=np.int8)
 
 
-def postures(id: str, role: Role, through: np.ndarray, campaign: Campaign) -> Motion:
-    """Rests in postures (n, 8), the first of them at the start, with straight moves in joint space between."""
+def postures(
+    id: str, role: Role, through: np.ndarray, campaign: Campaign, sides: np.ndarray | None = None
+) -> Motion:
+    """Rests in postures (n, 8), the first of them at the start, with straight moves in joint space between.
+
+    Where `sides` (n - 1, 8) of -1, 0, 1 are given, each posture is reached by way of a point BEYOND * side before it.
+    """
     pieces, dwells, clock = [np.repeat(through[:1], round(campaign.rest * RATE) + 1, axis=0)], [], campaign.rest
-    for a, b in zip(through[:-1], through[1:], strict=True):
-        move = float(np.ceil(RATE * max(0.5, np.abs(b - a)[1:].max() / campaign.speed)) / RATE) + campaign.ramp
-        s = path_time(_times(move)[1:], move, campaign.ramp) / (move - min(campaign.ramp, move / 2.0))
-        pieces += [a + s[:, None] * (b - a), np.repeat(b[None], round(campaign.dwell * RATE), axis=0)]
-        clock += move + campaign.dwell
+    via = through[1:] - (0.0 if sides is None else BEYOND * sides)
+    for a, v, b in zip(through[:-1], via, through[1:], strict=True):
+        moves = [_straight(a, b, campaign)] if (v == b).all() else [_straight(a, v, campaign), _straight(v, b, campaign)]
+        pieces += [*moves, np.repeat(b[None], round(campaign.dwell * RATE), axis=0)]
+        clock += sum(map(len, moves)) / RATE + campaign.dwell
         dwells.append((clock - campaign.dwell, clock))
-    approach = np.sign(np.round(np.diff(through, axis=0), 6)).astype(np.int8)
+    last = np.where(through[1:] == via, through[1:] - through[:-1], through[1:] - via)
+    approach = np.sign(np.round(last, 6)).astype(np.int8)
     return Motion(id, role, "static", id, np.concatenate(pieces), np.array(dwells), approach)
+
+
+def _straight(a: np.ndarray, b: np.ndarray, campaign: Campaign) -> np.ndarray:
+    """Set-points (n, 8) of a move, its start left out."""
+    move = float(np.ceil(RATE * max(0.5, np.abs(b - a)[1:].max() / campaign.speed)) / RATE) + campaign.ramp
+    s = path_time(_times(move)[1:], move, campaign.ramp) / (move - min(campaign.ramp, move / 2.0))
+    return np.asarray(a + s[:, None] * (b - a))
 
 
 # arm_1 = 1.5: arm forward, 0.3: to the right. arm_2 > 0 lifts the upper arm, arm_3 = -1.57 turns the elbow outwards.

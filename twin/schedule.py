@@ -55,7 +55,8 @@ def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign
     if not campaign.given_postures:
         return _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign)
     q = np.array([campaign.given_postures[0], *campaign.given_postures])
-    return (motions.postures("postures", "calibration", q, campaign),)
+    sides = np.array(campaign.given_approaches) if campaign.given_approaches else None
+    return (motions.postures("postures", "calibration", q, campaign, sides),)
 
 
 def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
