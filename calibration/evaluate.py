@@ -23,14 +23,16 @@ from calibration.estimate import Estimate
 from calibration.evaluation_checks import moved_in_trials, no_better
 from calibration.joint_regimes import Explained, on_repetitions, on_validation
 from calibration.markers import hand_body
-from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics
+from calibration.means import PostureMeans
+from calibration.metrics import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics, turned
+from calibration.point_body import is_point, places, point_of
 from calibration.point_rows import PointRow, point_rows
 from calibration.postures import dwell_windows
 from calibration.predict import REFERENCE, Prediction, Predictor, predictor
 from calibration.protocols import protocol_rows
 from calibration.recording import Trial
 from calibration.reregistration import registration_trials, reregistered
-from calibration.schema import Role, TrialEntry
+from calibration.schema import Body, Role, TrialEntry
 from calibration.verdict import Verdict
 
 Trials = Literal["dynamic", "static", "all"]
@@ -166,8 +168,7 @@ def _traces(
             progress(f"evaluating {entry.id}", k / len(entries))
         if dataset.has_means(entry):
             means = dataset.read_means(entry)
-            T_measured = means.poses_of(body).T
-            traces += [_means_trace(p, pose_errors(p.T_lab_hand, T_measured)) for p in predict.of_means(entry, means)]
+            traces += [_means_trace(p, _means_errors(p, body, means)) for p in predict.of_means(entry, means)]
             continue
         trial = dataset.read(entry)
         T_measured = poses_of(body, trial).T
@@ -214,7 +215,7 @@ def ladder(traces: list[Trace], against: str) -> Iterator[Row]:
 
 def row_entry(row: Row) -> dict[str, Any]:
     """A row as evaluation.json and score.json have it."""
-    figures = asdict(row.metrics)
+    figures = asdict(row.metrics) | turned(row.metrics)
     figures["per_axis_mm"] = dict(zip("xyz", row.metrics.per_axis_mm, strict=True))
     names = {"model": row.model, "trials": row.trials, "base": row.base, "encoder": row.encoder}
     return names | {"against": row.against} | figures
@@ -230,13 +231,21 @@ def trial_entry(trace: Trace) -> dict[str, Any]:
         "encoder": trace.encoder,
         "n": m.n,
         "position_rmse_component_mm": m.position_rmse_component_mm,
-        "orientation_rmse_deg": m.orientation_rmse_deg,
+        "orientation_rmse_deg": turned(m)["orientation_rmse_deg"],
     }
 
 
 def _trace(p: Prediction, trial: Trial, errors: PoseErrors) -> Trace:
     scored = scored_errors(p.t, errors, trial, p.kind == "static")
     return Trace(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
+
+
+def _means_errors(p: Prediction, body: Body, means: PostureMeans) -> PoseErrors:
+    """Errors of the pose, or of the place of the point that is seen of the hand: its rotations are NaN."""
+    if not is_point(body):
+        return pose_errors(p.T_lab_hand, means.poses_of(body).T)
+    e = places(p.T_lab_hand, point_of(body)) - means.point_of(body)[0]
+    return PoseErrors(e, np.full(e.shape, np.nan))
 
 
 def _means_trace(p: Prediction, errors: PoseErrors) -> Trace:

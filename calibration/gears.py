@@ -29,7 +29,8 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
     """The model `full`; a verdict `refused` says that it must not be used."""
     parameters = gear_parameters(chain, description, chain.gravity_torques(postures.q))
     play = play_start(chain, description)
-    found = fit_robustly(chain, parameters, postures, Errors(play, 1e-2 * play, _HAND))
+    errors = Errors(play, 1e-2 * play, _HAND[: postures.components // 3])
+    found = fit_robustly(chain, parameters, postures, errors)
     known = identifiability(found.fit.J_white, parameters)
     refused = [Verdict(STAGE, "refused", m) for m in unusable_fit(chain, parameters, found, known, len(postures))]
     model = model_of("full", chain, parameters, with_gears_averaged(found.fit, parameters))

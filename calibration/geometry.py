@@ -31,7 +31,7 @@ from calibration.verdict import Verdict
 
 STAGE = "geometry"
 _APART = 0.05  # [rad, a tenth of it in m] postures closer than this in every joint are one
-_CONDITION = 2e4  # scaled; 200 to 900 for postures spread over the workspace [-]
+_CONDITION = {6: 2e4, 3: 1e6}  # scaled, of poses and of points; 200 to 900 for poses all over the workspace [-]
 _OFFSET = 0.5  # largest believable zero of a reading [rad, a tenth of it in m]
 _TOLERANCES = 10.0  # largest believable deviation from nominal, and play, in datasheet tolerances [-]
 _CHI2 = 3.0  # largest believable squared whitened residual per degree of freedom [-]
@@ -44,9 +44,13 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     robust = fit_robustly(chain, parameters, postures, Errors(np.maximum(start, floor), floor, np.zeros(0)))
     found = robust.fit
     known = identifiability(found.J_white, parameters)
-    frames = registration_start(chain.poses(postures.q), postures.T_base_hand, True)
-    refused = [*unusable_data(chain, postures.q, frames, 6)]
-    refused = refused or [*_too_little(known), *_implausible(parameters, found, start, chain)]
+    oriented = postures.components == 6
+    frames = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
+    refused = [*unusable_data(chain, postures.q, frames, postures.components)]
+    refused = refused or [
+        *_too_little(known, _CONDITION[postures.components]),
+        *_implausible(parameters, found, start, chain),
+    ]
     verdicts = [Verdict(STAGE, "refused", message) for message in refused]
     verdicts += left_out(postures, robust)
     still = [name for name, span in zip(chain.joints, _spans(chain, postures), strict=True) if span < _APART]
@@ -58,6 +62,9 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
         used = int(robust.kept.sum())
         message = f"{known.rank} combinations of {len(parameters)} parameters from {used} postures"
         verdicts.append(Verdict(STAGE, "ok", f"{message}, condition {known.condition:.0f}"))
+    if not oriented:
+        message = "a point of the hand was seen: its place is calibrated, which way the hand is turned is as drawn"
+        verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
     return model_of("model_2", chain, parameters, found), tuple(verdicts)
 
 
@@ -68,7 +75,7 @@ def fit_robustly(chain: Chain, parameters: ParameterSet, postures: Postures, err
     found = robust_fit(
         lambda some: hand_problem(nominal, parameters, postures.rows(rigid[some]), errors),
         len(rigid),
-        6,
+        postures.components,
         parameters.nominal,
     )
     kept, distance = np.zeros(n, dtype=bool), np.full(n, np.inf)
@@ -91,9 +98,9 @@ def _spans(chain: Chain, postures: Postures) -> np.ndarray:
     return np.ptp(postures.q[:, chain.columns], axis=0) / joint_lengths(chain)
 
 
-def _too_little(known: Identifiability) -> Iterator[str]:
+def _too_little(known: Identifiability, limit: float) -> Iterator[str]:
     """Why the postures cannot carry the model."""
-    if not known.clear or known.condition > _CONDITION:
+    if not known.clear or known.condition > limit:
         yield (
             f"the postures do not excite the model (rank {known.rank}, gap {known.gap:.0f}, condition "
             f"{known.condition:.1e}); spread them over all joints' ranges"

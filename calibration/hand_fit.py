@@ -1,7 +1,7 @@
 """The hand model fitted to static postures: residuals, sources of random errors, priors.
 
     r_i = log6(T_measured_i^-1 T_B_H(q_i, theta))       local twist [m, rad], where the hand's pose was measured
-    r_i = p_B_H(q_i, theta) - p_measured_i              [m, base body's axes], where its position alone was
+    r_i = p_B_c(q_i, theta) - p_measured_i              [m, base body's axes], where a point c of it was
 
 Random errors: each joint's reading along its lever arms, the hand's position and rotation where asked for, the markers.
 """
@@ -15,6 +15,7 @@ from calibration.hand import HandModel
 from calibration.linearised import Linearised
 from calibration.map_fit import Fit, Problem, solve
 from calibration.parameters import ParameterSet
+from calibration.point_body import moved, places
 from calibration.postures import Postures
 from calibration.se3 import inverse
 from calibration.twists import jlog6, log6
@@ -87,9 +88,10 @@ def fit_weighted(model: HandModel, parameters: ParameterSet, postures: Postures,
 def linearised(model: HandModel, theta: np.ndarray, postures: Postures, tau: np.ndarray | None = None) -> Linearised:
     """Residuals and derivatives by theta, the first (p,) of the model's parameters; tau as the model takes it."""
     found = model.with_theta(theta).poses_and_derivatives(postures.q, tau, len(theta))
-    if postures.covariance.shape[1] == 3:
-        R, r = found.T[:, :3, :3], found.T[:, :3, 3] - postures.T_base_hand[:, :3, 3]
-        return Linearised(theta, r, R @ found.J[:, :3], R @ found.J_joint[:, :3])
+    if postures.components == 3:
+        R, c = found.T[:, :3, :3], postures.point
+        r = places(found.T, c) - postures.T_base_hand[:, :3, 3]
+        return Linearised(theta, r, moved(R, found.J, c), moved(R, found.J_joint, c))
     r = log6(inverse(postures.T_base_hand) @ found.T)
     J_log = jlog6(r)
     return Linearised(theta, r, J_log @ found.J, J_log @ found.J_joint)

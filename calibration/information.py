@@ -18,6 +18,7 @@ from calibration.bodies import body_poses
 from calibration.hand import HandModel, HandPoses
 from calibration.markers import base_body, hand_body
 from calibration.parameters import ParameterSet
+from calibration.point_body import is_point, moved, point_of
 from calibration.schema import Body, Description
 from calibration.se3 import adjoint, inverse
 
@@ -99,8 +100,8 @@ def _whitened(
     """W (n, d, d), derivatives by parameters and by joints of what a dwell measures: a pose, or lone markers' place."""
     S, J, J_joint = dwell_noise(found.T, description), found.J, found.J_joint
     if S.shape[1] == 3:
-        R = found.T[:, :3, :3]
-        J, J_joint = R @ J[:, :3], R @ J_joint[:, :3]
+        R, c = found.T[:, :3, :3], point_of(hand_body(description))
+        J, J_joint = moved(R, J, c), moved(R, J_joint, c)
     return np.linalg.inv(np.linalg.cholesky(S + (J_joint * play**2) @ np.swapaxes(J_joint, 1, 2))), J, J_joint
 
 
@@ -108,7 +109,7 @@ def dwell_noise(T: np.ndarray, description: Description) -> np.ndarray:
     """Covariance (n, 6, 6) of a dwell's hand poses T (n, 4, 4) by the markers; (n, 3, 3) of a point's place."""
     hand, Ad = hand_body(description), adjoint(inverse(T))
     S = Ad @ _cluster(base_body(description), description) @ np.swapaxes(Ad, 1, 2)
-    if not 0 < len(hand.markers) < 3:
+    if not is_point(hand):
         return np.asarray(S + _cluster(hand, description))
     R, n = T[:, :3, :3], SAMPLES * len(hand.markers)
     return np.asarray(R @ S[:, :3, :3] @ np.swapaxes(R, 1, 2) + description.sigmas.marker**2 / n * np.eye(3))

@@ -77,6 +77,19 @@ class PostureMeans:
         variance = np.nanmean(self.marker_position_std[:, columns] ** 2, axis=(1, 2))
         return replace(found, covariance=found.covariance * variance[:, None, None])
 
+    def point_of(self, body: Body) -> tuple[np.ndarray, np.ndarray]:
+        """Mean place (n, 3) [m] of a body's markers, NaN unless all are seen, and its variance per axis (n,) [m2].
+
+        Raises:
+            NotEnoughData: One of them is not in the file.
+        """
+        missing = [m.name for m in body.markers if m.name not in self.marker]
+        if missing:
+            raise NotEnoughData(f"{self.id}: markers {missing} of body {body.name!r} are not in the file")
+        columns = [self.marker.index(m.name) for m in body.markers]
+        squares = self.marker_position_std[:, columns] ** 2
+        return self.marker_position[:, columns].mean(axis=1), squares.mean(axis=(1, 2)) / len(columns)
+
 
 def holds_means(path: Path) -> bool:
     """Whether a trial's file holds posture means instead of a continuous recording; False where it cannot be read."""

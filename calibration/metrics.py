@@ -6,7 +6,7 @@ RMSE per component is sqrt(mean of the 3 N squared components), the published co
 larger. Orientation is the geodesic |phi|, never a difference of Euler angles.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from calibration.se3 import rotation_vector
 
 @dataclass(frozen=True)
 class PoseErrors:
-    """Errors of n poses; rows with NaN are poses that could not be predicted or seen.
+    """Errors of n poses; rows with NaN are poses that could not be predicted or seen, all rotations where a point was.
 
     Attributes:
         position: (n, 3) [m, lab].
@@ -32,7 +32,8 @@ class PoseErrors:
     @property
     def complete(self) -> "PoseErrors":
         """Without the rows that have NaN."""
-        good = np.isfinite(self.position).all(axis=1) & np.isfinite(self.rotation).all(axis=1)
+        seen = np.isfinite(self.rotation).all(axis=1)
+        good = np.isfinite(self.position).all(axis=1) & (seen | ~seen.any())
         return PoseErrors(self.position[good], self.rotation[good])
 
 
@@ -61,6 +62,12 @@ class RowMetrics:
     orientation_rmse_component_deg: float
     orientation_max_deg: float
     per_axis_mm: tuple[float, float, float]
+
+
+def turned(metrics: RowMetrics) -> dict[str, float | None]:
+    """Its figures of orientation by name, None where only a point was seen."""
+    figures = {name: value for name, value in asdict(metrics).items() if name.startswith("orientation")}
+    return {name: value if np.isfinite(value) else None for name, value in figures.items()}
 
 
 def pose_errors(T_predicted: np.ndarray, T_reference: np.ndarray) -> PoseErrors:

@@ -20,9 +20,10 @@ from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.markers import base_body, hand_body
 from calibration.means import PostureMeans
+from calibration.point_body import is_point, point_of
 from calibration.recording import Trial
 from calibration.schema import Body, Description
-from calibration.se3 import adjoint, inverse, to_vector
+from calibration.se3 import adjoint, compose, inverse, skew, to_vector
 from calibration.signals import GAP
 
 _MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
@@ -40,9 +41,10 @@ class Postures:
         T_base_hand: (n, 4, 4) measured pose of the hand body in the base body; its rotation means nothing where only a
             point of the hand was seen.
         covariance: (n, 6, 6) of its local twist [m, rad]; (n, 3, 3) of its position in the base body's axes where only
-            a point was seen.
+            a point was seen; `T_base_hand` then has that point's place.
         misfit: (n,) rms distance of markers from their nominal places in their cluster [m].
         label: (n,) trial and number, counted from 0; empty where they have no name.
+        point: (3,) the point that was seen, in the hand's frame [m].
     """
 
     q: np.ndarray
@@ -50,19 +52,27 @@ class Postures:
     covariance: np.ndarray
     misfit: np.ndarray
     label: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=str))
+    point: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __len__(self) -> int:
         return len(self.q)
 
+    @property
+    def components(self) -> int:
+        """Of what is measured a posture: 6 of a pose, 3 of a point."""
+        return int(self.covariance.shape[1])
+
     def rows(self, chosen: np.ndarray) -> "Postures":
         """Some of the postures."""
         label = self.label[chosen] if len(self.label) else self.label
-        return Postures(self.q[chosen], self.T_base_hand[chosen], self.covariance[chosen], self.misfit[chosen], label)
+        T, S = self.T_base_hand[chosen], self.covariance[chosen]
+        return Postures(self.q[chosen], T, S, self.misfit[chosen], label, self.point)
 
     def joined(self, other: "Postures") -> "Postures":
         """These postures, then the other ones."""
-        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
-        return Postures(*(np.concatenate(pair) for pair in pairs))
+        names = [f.name for f in fields(self) if f.name != "point"]
+        both = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in names}
+        return replace(self, **both)
 
 
 def dwell_windows(trial: Trial) -> np.ndarray:
@@ -89,14 +99,33 @@ def read_postures(description: Description, trials: Iterable[Trial], robot: Cloc
 
 def mean_postures(description: Description, means: PostureMeans) -> Postures:
     """Postures of a file that only has means, those that show base and hand; their covariance is the file's own."""
-    base, hand = (means.poses_of(body(description)) for body in (base_body, hand_body))
+    body = hand_body(description)
+    seen = _points if is_point(body) else _poses
+    T, S, squares = seen(means.poses_of(base_body(description)), means, body)
+    good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(means.q_motor).all(axis=1)
+    label = np.array([f"{means.id} {k}" for k in np.flatnonzero(good)], dtype=str)
+    misfit = np.sqrt(np.nanmean(squares[good], axis=1)) if squares.shape[1] else np.zeros(int(good.sum()))
+    point = point_of(body) if is_point(body) else np.zeros(3)
+    return Postures(means.q_motor[good], T[good], S[good], misfit, label, point)
+
+
+def _poses(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """T_base_hand (n, 4, 4), covariance (n, 6, 6) of its local twist, squared distances (n, m) of markers [m2]."""
+    hand = means.poses_of(body)
     T = inverse(base.T) @ hand.T
     Ad = adjoint(inverse(T))
     S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
-    squares = (np.concatenate([base.residual, hand.residual], axis=1) ** 2).sum(axis=2)
-    good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(means.q_motor).all(axis=1)
-    label = np.array([f"{means.id} {k}" for k in np.flatnonzero(good)], dtype=str)
-    return Postures(means.q_motor[good], T[good], S[good], np.sqrt(np.nanmean(squares[good], axis=1)), label)
+    return T, S, (np.concatenate([base.residual, hand.residual], axis=1) ** 2).sum(axis=2)
+
+
+def _points(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same where a point of the hand is seen: its place, and that place's covariance (n, 3, 3), base's axes."""
+    p, variance = means.point_of(body)
+    R = np.swapaxes(base.T[:, :3, :3], 1, 2)
+    p = (R @ (p - base.T[:, :3, 3])[..., None])[..., 0]
+    G = np.concatenate([np.broadcast_to(-np.eye(3), (len(p), 3, 3)), skew(p)], axis=2)
+    S = variance[:, None, None] * np.eye(3) + G @ base.covariance @ np.swapaxes(G, 1, 2)
+    return compose(np.tile(np.eye(3), (len(p), 1, 1)), p), S, (base.residual**2).sum(axis=2)
 
 
 def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:

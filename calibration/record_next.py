@@ -32,6 +32,7 @@ STAGE, FILE = "geometry", "record_next.yaml"
 N = 5
 _UNTOLD = 0.9  # of a direction's prior variance, left of it [-]
 _FALLS = 0.7  # sigma after over before, of parameters worth naming [-]
+_NEVER = 0.99  # sigma after over before, of parameters that no posture tells [-]
 _NAMED = 12
 _PROBES = 120  # postures anywhere inside the limits, for what could be told at all
 _SEED = 0  # the same data get the same suggestion
@@ -129,9 +130,12 @@ def _remedy(found: Plan, known: Known, lost: tuple[str, ...]) -> Remedy:
     most = sorted((s for s in whole if s.after < _FALLS * s.before), key=lambda s: s.after / s.before)[:_NAMED]
     named = {s.name for s in most} | set(lost)
     why = f"{known.untold} of {_directions(found)} combinations are told by the datasheet's tolerances alone"
-    if lost:
-        why += f"; not identifiable: {', '.join(lost)}"
-    told = (Sigma("hand.position", "m", *hand), *(s for s in whole if s.name in named))
+    never = [s.name for s in whole if s.name in lost and s.after > _NEVER * s.before]
+    if set(lost) - set(never):
+        why += f"; not identifiable: {', '.join(name for name in lost if name not in never)}"
+    if never:
+        why += f"; no posture tells {', '.join(never)}"
+    told = (Sigma("hand.position", "m", *hand), *(s for s in whole if s.name in named and s.name not in never))
     return replace(found.remedy(STAGE, why), sigma=told)
 
 

@@ -9,6 +9,8 @@ With the arm alone moving, all twelve are identifiable once it turns about two d
 lab is not asked.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from calibration.estimate import Model
@@ -26,19 +28,21 @@ STAGE = "registration"
 
 def register(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
     """The two frames, and what is to be said of them."""
-    parameters = registration_parameters(chain, description)
-    tol = description.tolerances
-    W = np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3))
+    parameters, tol = registration_parameters(chain, description), description.tolerances
+    told = 6 + postures.components  # a point does not show how the hand is turned: that stays as drawn
+    drawn = np.where(np.arange(12) < told, parameters.tolerance, tol.body_rotation)
+    parameters = replace(parameters, tolerance=drawn)
+    W = np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)[: postures.components])
     found = fit_weighted(
         nominal_hand(chain, parameters.nominal), parameters, postures, np.tile(W, (len(postures), 1, 1))
     )
     model = model_of(STAGE, chain, parameters, found)
     if not found.converged:
         return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not come to rest"),)
-    if model.rank < len(parameters):
+    if model.rank < told:
         message = (
-            f"{len(parameters) - model.rank} of 12 directions are not identified: the arm turned about one direction "
-            "only, so a turn of both frames about it cannot be told apart; move another joint"
+            f"{told - model.rank} of {told} directions are not identified: the arm turned about one direction only, "
+            "so a turn of both frames about it cannot be told apart; move another joint"
         )
         return model, (Verdict(STAGE, "warning", message),)
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])

@@ -140,7 +140,8 @@ def _errors(title: str, rows: Sequence[dict[str, Any]]) -> Table:
     for row in rows:
         position = (f"{row[key]:.2f}" for key in ("position_rmse_component_mm", "position_rmse_norm_mm"))
         names = (str(row[key]) for key in ("model", "base", "encoder", "trials"))
-        table.add_row(*names, *position, f"{row['orientation_rmse_deg']:.3f}")
+        turned = row["orientation_rmse_deg"]
+        table.add_row(*names, *position, "-" if turned is None else f"{turned:.3f}")
     return table
 
 

@@ -8,7 +8,7 @@ any value that is given as a distribution (`twin.uncertain`).
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, field_validator
 from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
@@ -22,6 +22,8 @@ from twin.config_values import (
     Count,
     FixedNonNegative,
     FixedPositive,
+    GivenApproaches,
+    GivenPosture,
     NonNegative,
     Point,
     Positive,
@@ -201,11 +203,6 @@ class Instruments:
     wrist: WristSensor | None = field(default_factory=WristSensor)
 
 
-GivenPosture = tuple[float, float, float, float, float, float, float, float]
-Side = Literal[-1, 0, 1]
-GivenApproach = tuple[Side, Side, Side, Side, Side, Side, Side, Side]
-
-
 @dataclass(frozen=True, config=STRICT)
 class Campaign:
     """How much is recorded.
@@ -219,8 +216,8 @@ class Campaign:
         validation_postures: Number of.
         given_postures: Calibration postures [m, rad] as `tiago-twin design` chooses them, the lift first, instead of
             `calibration_postures` drawn ones.
-        given_approaches: For each of them the sign of each joint's last motion before it rests, 0 where it does not
-            matter: the joint passes a point 0.05 rad (the lift 5 mm) to that side first. Empty: straight from the last.
+        given_approaches: For each of them the sign of each joint's last motion before it rests, by way of a point
+            0.05 rad (the lift 5 mm) before it; 0: it does not matter. Empty: straight from the last.
         sweep: Duration of each one-joint sweep [s]; 0: no sweeps.
         calibration_swing: Duration of each calibration swing [s]; 0: none.
         validation_swing: Duration of each validation swing [s]; 0: none.
@@ -250,16 +247,7 @@ class Campaign:
     carried: bool = False
     only: tuple[TrialName, ...] = ()
     given_postures: tuple[GivenPosture, ...] = ()
-    given_approaches: tuple[GivenApproach, ...] = ()
-
-    @field_validator("given_approaches")
-    @classmethod
-    def _one_each(cls, approaches: tuple[GivenApproach, ...], given: ValidationInfo) -> tuple[GivenApproach, ...]:
-        """One for each given posture, or none at all."""
-        n = len(given.data.get("given_postures", ()))
-        if approaches and len(approaches) != n:
-            raise ValueError(f"{len(approaches)} approaches for {n} given_postures; give one each, or none")
-        return approaches
+    given_approaches: GivenApproaches = ()
 
 
 @dataclass(frozen=True, config=STRICT)

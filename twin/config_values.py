@@ -4,9 +4,9 @@ What describes the robot or its instruments may be uncertain (`twin.uncertain`);
 campaign and the datasheet, is `Fixed`.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo
 
 from twin.uncertain import DRAWN
 
@@ -21,3 +21,17 @@ Count = Annotated[int, Field(ge=1)]
 Vector3 = tuple[float, float, float]
 Point = tuple[Value, Value, Value]
 Twist = tuple[Value, Value, Value, Value, Value, Value]
+GivenPosture = tuple[float, float, float, float, float, float, float, float]
+Side = Literal[-1, 0, 1]
+GivenApproach = tuple[Side, Side, Side, Side, Side, Side, Side, Side]
+
+
+def _one_each(approaches: tuple[GivenApproach, ...], given: ValidationInfo) -> tuple[GivenApproach, ...]:
+    """One for each of the `given_postures` beside them, or none at all."""
+    n = len(given.data.get("given_postures", ()))
+    if approaches and len(approaches) != n:
+        raise ValueError(f"{len(approaches)} approaches for {n} given_postures; give one each, or none")
+    return approaches
+
+
+GivenApproaches = Annotated[tuple[GivenApproach, ...], AfterValidator(_one_each)]

@@ -7,6 +7,7 @@ Short ramps start and stop a swing abruptly, as on the real robot, whatever the 
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -117,9 +118,7 @@ def _no_dwells() -> tuple[np.ndarray, np.ndarray]:
     return np.empty((0, 2)), np.empty((0, len(JOINTS)), dtype=np.int8)
 
 
-def postures(
-    id: str, role: Role, through: np.ndarray, campaign: Campaign, sides: np.ndarray | None = None
-) -> Motion:
+def postures(id: str, role: Role, through: np.ndarray, campaign: Campaign, sides: np.ndarray | None = None) -> Motion:
     """Rests in postures (n, 8), the first of them at the start, with straight moves in joint space between.
 
     Where `sides` (n - 1, 8) of -1, 0, 1 are given, each posture is reached by way of a point BEYOND * side before it.
@@ -127,7 +126,8 @@ def postures(
     pieces, dwells, clock = [np.repeat(through[:1], round(campaign.rest * RATE) + 1, axis=0)], [], campaign.rest
     via = through[1:] - (0.0 if sides is None else BEYOND * sides)
     for a, v, b in zip(through[:-1], via, through[1:], strict=True):
-        moves = [_straight(a, b, campaign)] if (v == b).all() else [_straight(a, v, campaign), _straight(v, b, campaign)]
+        stops = (b,) if (v == b).all() else (v, b)
+        moves = [_straight(*ends, campaign) for ends in pairwise((a, *stops))]
         pieces += [*moves, np.repeat(b[None], round(campaign.dwell * RATE), axis=0)]
         clock += sum(map(len, moves)) / RATE + campaign.dwell
         dwells.append((clock - campaign.dwell, clock))

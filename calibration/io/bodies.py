@@ -11,11 +11,14 @@ from calibration.io.mapping import MappedBody, MappingFile
 from calibration.io.place_bodies import hand_eye, mean_shape, standing_shape
 from calibration.io.recorded import Recorded
 from calibration.markers import BASE, HAND
+from calibration.point_body import is_point
+from calibration.registration_start import registration_start
 from calibration.robot import Chain
 from calibration.schema import Body, Marker
-from calibration.se3 import inverse, to_vector
+from calibration.se3 import compose, inverse, to_vector
 
 _REST = 1.0  # [s]
+_FEWEST = 6  # postures that place a point
 
 
 def placed_bodies(mapping: MappingFile, chain: Chain, calibration: Sequence[Recorded]) -> tuple[Body, ...]:
@@ -72,18 +75,39 @@ def _fitted(
         place, why = ("bodies", f"no {missing[0]!r}") if missing else ("trials", "no calibration file of postures")
         raise mapping.error(place, f"{why}; a fitted body is placed by base and hand in static postures")
     base, hand = bodies[BASE], bodies[HAND]
-    A, B = [], []
-    for r in postures:
-        q = in_order(r, chain.measured)
-        A.append(inverse(chain.poses(q, base.link)) @ chain.poses(q, hand.link))
-        B.append(inverse(_poses(base, r)) @ _poses(hand, r))
+    readings = [in_order(r, chain.measured) for r in postures]
+    A = np.concatenate([inverse(chain.poses(q, base.link)) @ chain.poses(q, hand.link) for q in readings])
+    placed = _pointed if is_point(hand) else _posed
+    found = dict(zip((BASE, HAND), placed(mapping, bodies, A, postures), strict=True))
+    fitted = [b.name for b in mapping.content.bodies if b.fitted and b.name in found]
+    return {n: bodies[n].model_copy(update={"placement": tuple(map(float, found[n]))}) for n in fitted}
+
+
+def _posed(
+    mapping: MappingFile, bodies: Lookup[str, Body], A: np.ndarray, postures: Sequence[Recorded]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Placements (6,) of base and hand from nominal poses A (n, 4, 4) of hand's link in the base's."""
+    B = np.concatenate([inverse(_poses(bodies[BASE], r)) @ _poses(bodies[HAND], r) for r in postures])
     try:
-        X, Y = hand_eye(np.concatenate(A), np.concatenate(B))
+        X, Y = hand_eye(A, B)
     except NotEnoughData as error:
         raise InputError(postures[0].file, str(error)) from error
-    fitted = {b.name for b in mapping.content.bodies if b.fitted}
-    T = {BASE: inverse(X), HAND: Y}
-    return {n: bodies[n].model_copy(update={"placement": _six(T[n])}) for n in (BASE, HAND) if n in fitted}
+    return to_vector(inverse(X)), to_vector(Y)
+
+
+def _pointed(
+    mapping: MappingFile, bodies: Lookup[str, Body], A: np.ndarray, postures: Sequence[Recorded]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Placements of base and hand where one marker of the hand is seen: its place, the hand not turned."""
+    names = [m.name for m in bodies[HAND].markers]
+    if len(names) > 1 or bodies[BASE].markers:
+        raise mapping.error("bodies", "a hand of fewer than three markers is fitted by one, in the base's own frame")
+    y = np.concatenate([_positions(r, names)[:, 0] for r in postures])
+    good = np.isfinite(y).all(axis=1)
+    if good.sum() < _FEWEST:
+        raise InputError(postures[0].file, f"{good.sum()} postures show the hand; {_FEWEST} are needed to place it")
+    frames = registration_start(A[good], compose(np.tile(np.eye(3), (int(good.sum()), 1, 1)), y[good]), False).frames
+    return frames[:6], frames[6:]
 
 
 def in_order(recorded: Recorded, joints: Sequence[str]) -> np.ndarray:
@@ -107,7 +131,3 @@ def _poses(body: Body, recorded: Recorded) -> np.ndarray:
     if not body.markers:
         return np.eye(4)[None]
     return body_poses(np.array([m.xyz for m in body.markers]), _positions(recorded, [m.name for m in body.markers])).T
-
-
-def _six(T: np.ndarray) -> tuple[float, ...]:
-    return tuple(map(float, to_vector(T)))

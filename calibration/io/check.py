@@ -19,6 +19,7 @@ from calibration.parameters import nominal_frames
 from calibration.plausibility import implausible_inputs
 from calibration.postures import mean_postures
 from calibration.recording import Trial
+from calibration.registration_start import registration_start
 from calibration.robot import Chain
 from calibration.schema import Body, Description
 
@@ -165,11 +166,13 @@ def _hand(means: PostureMeans, description: Description, chain: Chain) -> Iterat
     postures = mean_postures(description, means)
     if len(postures) < 4:
         return
-    hand = nominal_hand(chain, nominal_frames(chain, description))
-    predicted = hand.poses(postures.q)
-    X, Y = hand_eye(predicted, postures.T_base_hand)
-    error = (X @ predicted @ Y)[:, :3, 3] - postures.T_base_hand[:, :3, 3]
-    off = float(np.median(np.linalg.norm(error, axis=1)))
+    predicted = nominal_hand(chain, nominal_frames(chain, description)).poses(postures.q)
+    if postures.components == 3:
+        off = float(np.median(registration_start(predicted, postures.T_base_hand, False).residual))
+    else:
+        X, Y = hand_eye(predicted, postures.T_base_hand)
+        error = (X @ predicted @ Y)[:, :3, 3] - postures.T_base_hand[:, :3, 3]
+        off = float(np.median(np.linalg.norm(error, axis=1)))
     if off > _HAND:
         yield (
             f"the hand is {1e3 * off:.0f} mm (median) from where the readings put it, its frames fitted: columns of "

@@ -31,6 +31,10 @@ def mean_shape(positions: np.ndarray) -> np.ndarray:
     whole = positions[np.isfinite(positions).all(axis=(1, 2))]
     if not len(whole):
         raise NotEnoughData("no sample shows all of its markers together, so its shape is not known")
+    if whole.shape[1] == 1:
+        return np.zeros((1, 3))
+    if whole.shape[1] == 2:
+        raise NotEnoughData("two markers show no frame of a body: give one of them alone, three, or both drawn")
     shape = cluster(whole).xyz
     return np.asarray(shape - shape.mean(axis=0))
 

@@ -30,8 +30,8 @@ class Row(Entry):
     position_rmse_norm_mm: float
     position_p95_norm_mm: float
     position_max_norm_mm: float
-    orientation_rmse_deg: float
-    orientation_max_deg: float
+    orientation_rmse_deg: float | None
+    orientation_max_deg: float | None
     per_axis_mm: AxisErrors
     skill: float | None = None
 
@@ -108,7 +108,7 @@ class TrialErrors(Entry):
     encoder: str
     n: int
     position_rmse_component_mm: float
-    orientation_rmse_deg: float
+    orientation_rmse_deg: float | None
 
 
 class Evaluation(Entry):

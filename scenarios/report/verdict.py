@@ -131,4 +131,5 @@ def _better(ours: Row, theirs: Row) -> bool:
 
 def _figures(row: Row) -> str:
     component, norm = error(row.position_rmse_component_mm), error(row.position_rmse_norm_mm)
-    return f"{component}{_NBSP}mm per component ({norm}{_NBSP}mm norm) and {error(row.orientation_rmse_deg)}°"
+    turned = "" if row.orientation_rmse_deg is None else f" and {error(row.orientation_rmse_deg)}°"
+    return f"{component}{_NBSP}mm per component ({norm}{_NBSP}mm norm){turned}"

@@ -1,11 +1,13 @@
 """Public recordings of a real robot beside the checkout: one documented command each, then calibrate."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from calibration import calibrate, evaluate, load
+from calibration.errors import InputError
 from scenarios import exchange
 
 ROOT = Path(__file__).parents[3]
@@ -53,6 +55,45 @@ def test_a_second_file_is_predicted_within_its_band(tmp_path):
     assert row.model == "full" and row.n == 48
     assert norm["full"] < norm["model_2"] < 0.7 * norm["registration"]
     assert row.rmse_norm_mm < 3.2 and row.inside >= 0.75 and row.band_95_mm < 9.0
+
+
+def one_marker(tmp_path, names: str = "BL") -> Path:
+    text = (ROOT / "docs/mappings/qualisys_two_days.yaml").read_text()
+    text = text.replace("undrawn: [BL, BR, TR, TL]", f"undrawn: [{names}]").replace(
+        "TR: [x3, y3, z3], TL: [x4, y4, z4]", ""
+    )
+    if names == "BL":
+        text = text.replace("BR: [x2, y2, z2], ", "")
+    (tmp_path / "one.yaml").write_text(text)
+    return tmp_path / "one.yaml"
+
+
+def test_one_marker_on_the_hand_is_a_place_and_no_pose(tmp_path):
+    head, rows = real_rows()
+    order = np.random.default_rng(0).permutation(len(rows))
+    files = [written(tmp_path / f"day{k + 1}.csv", head, rows[part]) for k, part in enumerate((order[:30], order[30:]))]
+    exchange.import_files("csv", files, one_marker(tmp_path), tmp_path / "dataset")
+    dataset = load(tmp_path / "dataset")
+    estimate = calibrate(dataset)
+    said = " ".join(v.message for v in estimate.verdicts)
+    assert estimate.calibrated and estimate.model("model_2").rank == 33
+    assert "which way the hand is turned is as drawn" in said and "no posture tells frame.tool.hand.rx" in said
+    turn = {p.name: p for p in estimate.model("full").parameters}["frame.tool.hand.rx"]
+    assert turn.status == "not_identifiable" and turn.sigma == pytest.approx(0.1)
+    found = evaluate(estimate, dataset)
+    norm = {r.model: r.metrics.position_rmse_norm_mm for r in found.rows if r.trials == "static"}
+    assert norm["full"] < 0.85 * norm["registration"] and norm["full"] < 3.5
+    found.save(tmp_path / "result")
+    entries = json.loads((tmp_path / "result/evaluation.json").read_text())["rows"]
+    assert {e["orientation_rmse_deg"] for e in entries} == {None}
+    assert {p.marker: p for p in found.points}["all"].inside >= 0.75
+
+
+def test_two_undrawn_markers_are_refused(tmp_path):
+    head, rows = real_rows()
+    files = [written(tmp_path / f"day{k + 1}.csv", head, part) for k, part in enumerate(np.array_split(rows, 2))]
+    with pytest.raises(InputError, match="two markers show no frame of a body"):
+        exchange.import_files("csv", files, one_marker(tmp_path, "BL, BR"), tmp_path / "dataset")
 
 
 @pytest.mark.parametrize("kind", [0.02, 0.05, 0.3, "labels"])
