@@ -20,6 +20,7 @@ RATE = 100.0  # [Hz] of the set-points
 SETTLE = 2.0  # [s] before a recording starts, not recorded
 TAU = 2.0 * np.pi
 BEYOND = np.array([5e-3, *7 * [5e-2]])  # how far off a joint turns to approach from a given side [m, rad]
+_SWEEP_SPEED = 0.2 * np.pi  # [rad/s]
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,10 @@ VALIDATION_SWINGS = {
 
 
 def sweep_path(joint: str, duration: float) -> Swing:
-    """One joint back and forth twice about a posture in which gravity loads most of the arm."""
-    index = JOINTS.index(joint)
-    amplitudes = tuple(0.6 if i == index else 0.0 for i in range(len(JOINTS)))
+    """One joint back and forth twice about a posture in which gravity loads most of the arm.
+
+    It starts and stops at its highest speed, 0.6 rad / s: faster, and arm_1 pushes the base away.
+    """
+    index, amplitude = JOINTS.index(joint), min(0.6, _SWEEP_SPEED * duration / (2.0 * TAU))
+    amplitudes = tuple(amplitude if i == index else 0.0 for i in range(len(JOINTS)))
     return _one(2.0 / duration, _FORWARD, amplitudes)

@@ -7,6 +7,7 @@ from twin import motions, postures
 from twin.errors import Unreachable
 from twin.motions import RATE
 from twin.schedule import schedule
+from twin.simulate import simulate
 
 
 def test_path_time_ramps_cruises_and_stops():
@@ -62,3 +63,19 @@ def test_a_soft_start_is_soft(config):
         return np.abs(np.diff(q, 2, axis=0)).max() * RATE**2
 
     assert first_step(1.5) < 0.2 * first_step(0.12)
+
+
+@pytest.mark.parametrize(("duration", "amplitude"), [(3.0, 0.15), (6.0, 0.3), (12.0, 0.6), (20.0, 0.6)])
+def test_a_short_sweep_is_smaller_rather_than_faster(duration, amplitude):
+    path = motions.sweep_path("arm_1_joint", duration)
+    assert max(path.amplitude) == pytest.approx(amplitude)
+    t = np.linspace(0.0, duration, 1000)
+    assert np.abs(np.gradient(path.at(t), t, axis=0)).max() < 0.63
+
+
+def test_the_sweep_of_a_quick_campaign_leaves_the_base_where_it_was(lab):
+    path = motions.sweep_path("arm_1_joint", 3.0)
+    motion = motions.swing("s", "calibration", "sweep", path, 3.0, lab.config.campaign)
+    base = simulate(lab.twin, motion, lab.T_lab_base).poses["base_footprint"]
+    moved = np.linalg.inv(base[0]) @ base[-1]
+    assert np.linalg.norm(moved[:3, 3]) < 1e-3 and abs(np.arctan2(moved[1, 0], moved[0, 0])) < 2e-3
