@@ -1,7 +1,7 @@
-"""Pose of a rigid marker cluster: weighted Kabsch, one SVD for all times.
+"""Pose of a rigid marker cluster by least squares, all times at once.
 
-    minimise sum_m w_m |p_m - (R x_m + t)|^2        p measured [m, lab], x nominal [m, body]
-    R = V diag(1, 1, det) U'   of   sum_m w_m (x_m - x0)(p_m - p0)' = U S V'
+    minimise sum_m w_m |p_m - (R x_m + t)|^2        p measured [m, lab], x nominal [m, body], w 1 where seen
+    R  the rotation nearest to   sum_m w_m (p_m - p0)(x_m - x0)',     t = p0 - R x0
 
 With noise sigma per axis and marker, the local twist (linear, angular) of the pose has covariance
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.errors import NotEnoughData, ShapeError
+from calibration.nearest_rotation import nearest_rotations
 from calibration.recording import Trial
 from calibration.schema import Body
 from calibration.se3 import compose, skew
@@ -46,16 +47,11 @@ def body_poses(xyz: np.ndarray, positions: np.ndarray) -> BodyPoses:
     count = np.maximum(w.sum(axis=1), 1.0)
     p = np.where(seen[..., None], positions, 0.0)
     x0, p0 = (w * xyz).sum(axis=1) / count, p.sum(axis=1) / count
-    x_c, p_c = w * (xyz - x0[:, None]), w * (p - p0[:, None])
-    U, _, Vt = np.linalg.svd(np.swapaxes(x_c, 1, 2) @ p_c)
-    V, Ut = np.swapaxes(Vt, 1, 2), np.swapaxes(U, 1, 2)
-    sign = np.ones((len(p), 3))
-    sign[:, 2] = np.linalg.det(V @ Ut)
-    R = (V * sign[:, None]) @ Ut
-    T = compose(R, p0 - np.einsum("nij,nj->ni", R, x0))
+    R = nearest_rotations(np.swapaxes(w * (p - p0[:, None]), 1, 2) @ (xyz - x0[:, None]))
+    T = compose(R, p0 - (R @ x0[..., None])[..., 0])
     covariance, usable = _covariances(xyz, seen)
     T[~usable] = np.nan
-    fitted = np.einsum("nij,mj->nmi", T[:, :3, :3], xyz) + T[:, None, :3, 3]
+    fitted = (T[:, :3, :3] @ xyz.T + T[:, :3, 3:]).swapaxes(1, 2)
     return BodyPoses(T, np.where(seen[..., None], positions, np.nan) - fitted, covariance)
 
 
@@ -82,8 +78,11 @@ def still_poses(n: int) -> BodyPoses:
 
 def _covariances(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit covariance (n, 6, 6) and whether the visible markers fix a pose (n,), once per visibility pattern."""
-    _, first, which = np.unique(np.packbits(seen, axis=1), axis=0, return_index=True, return_inverse=True)
-    patterns, which = seen[first], which.reshape(len(seen))
+    if len(seen) and seen.all():
+        patterns, which = seen[:1], np.zeros(len(seen), dtype=int)
+    else:
+        _, first, which = np.unique(np.packbits(seen, axis=1), axis=0, return_index=True, return_inverse=True)
+        patterns, which = seen[first], which.reshape(len(seen))
     covariance = np.full((len(patterns), 6, 6), np.nan)
     for k, pattern in enumerate(patterns):
         x = xyz[pattern]

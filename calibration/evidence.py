@@ -12,12 +12,13 @@ References: MacKay, Neural Computation 1992; Patterson, Thompson, Biometrika 197
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from calibration.linearised import Linearised, Prior
 
 _HELD = 20.0
 _STEPS = 30
+_UNDAMPED = 1e-3  # of a step's curvature: too little to tell
 _LARGEST = 1.0  # of a standard deviation [rad, m]: data that ask for more do not belong to the model
 _NEGLIGIBLE = 10.0  # standard deviations below this many floors need not stand still
 
@@ -80,16 +81,18 @@ class Evidence:
 
 def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: float) -> Widths:
     """Widths of highest evidence for the linearised problem, to a change of their logarithms below `same`."""
-    damping, now = 1e-3, evidence(at, noise, prior, widths)
+    damping, now = _UNDAMPED, evidence(at, noise, prior, widths)
     for _ in range(_STEPS):
         f = _prior_factors(prior, now, widths.prior)
         v = _scored(now, noise, widths.noise, damping)
+        moved = max(moved_by(widths.noise, v, _NEGLIGIBLE * noise.floor), moved_by(widths.prior, f, 1e-12) / 2.0)
+        if moved < same and damping <= _UNDAMPED:
+            return Widths(v, f)
         trial = evidence(at, noise, prior, Widths(v, f))
         if trial.value > now.value + 1e-9 * abs(now.value) and damping < 1e6:
             damping = max(10.0 * damping, 1e-2)
             continue
         damping = 0.1 * damping
-        moved = max(moved_by(widths.noise, v, _NEGLIGIBLE * noise.floor), moved_by(widths.prior, f, 1e-12) / 2.0)
         widths, now = Widths(v, f), trial
         if moved < same:
             break
@@ -102,7 +105,10 @@ def moved_by(old: np.ndarray, new: np.ndarray, least: np.ndarray | float) -> flo
 
 
 def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evidence:
-    """Evaluate; the slope is by variance, the information that of the postures taken one by one."""
+    """Evaluate; the slope is by variance, the information that of the postures taken one by one.
+
+    Both are zero for groups that are not free.
+    """
     root, scale = noise.roots(widths.noise), prior.scale
     n, d, p = at.J.shape
     some = np.sqrt(noise.weight)[:, None]
@@ -110,19 +116,19 @@ def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evid
     r = (root @ at.r[..., None])[..., 0] * some
     flat, precision = A.reshape(n * d, p), prior.precision(widths.prior) * scale**2
     off = (at.theta - prior.nominal) / scale
-    covariance, log_det = inverse_and_log_det(flat.T @ flat + np.diag(precision))
-    step = covariance @ (flat.T @ r.ravel() + precision * off)
+    spread, log_det = root_and_log_det(flat.T @ flat + np.diag(precision))
+    step = spread @ (spread.T @ (flat.T @ r.ravel() + precision * off))
     rest, off = r - (flat @ step).reshape(n, d), off - step
-    K = root @ noise.B
-    known = ((flat @ covariance).reshape(n, d, p) @ np.swapaxes(A, 1, 2)) @ K
-    trace = (K * (K - known)).sum(axis=(0, 1))
+    free = noise.free[noise.group]
+    K, known = root @ noise.B[:, :, free], times_upper(flat, spread).reshape(n, d, p)
+    trace = (K * (K - known @ (np.swapaxes(known, 1, 2) @ K))).sum(axis=(0, 1))
     slope = 0.5 * (trace - ((K * rest[..., None]).sum(axis=1) ** 2).sum(axis=0))
     together = 0.5 * ((np.swapaxes(K, 1, 2) @ K) ** 2).sum(axis=0)
-    groups = np.eye(len(noise.floor))[noise.group]
+    groups = np.eye(len(noise.floor))[noise.group[free]]
     value = log_det - 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
     value += float((rest**2).sum() + (precision * off**2).sum()) + prior.held(widths.prior, _HELD)
     return Evidence(
-        0.5 * value, groups.T @ slope, groups.T @ together @ groups, off * scale, np.diag(covariance) * scale**2
+        0.5 * value, groups.T @ slope, groups.T @ together @ groups, off * scale, (spread**2).sum(axis=1) * scale**2
     )
 
 
@@ -152,12 +158,26 @@ def _prior_factors(prior: Prior, now: Evidence, f: np.ndarray) -> np.ndarray:
 
 def inverse_and_log_det(information: np.ndarray) -> tuple[np.ndarray, float]:
     """Inverse and log determinant of a symmetric matrix; directions without information get a huge variance."""
+    root, log_det = root_and_log_det(information)
+    return root @ root.T, log_det
+
+
+def root_and_log_det(information: np.ndarray) -> tuple[np.ndarray, float]:
+    """Upper triangular R with R R' the inverse of a symmetric matrix, and its log determinant.
+
+    Directions without information get a huge variance.
+    """
     factor, failed = lapack.dpotrf(information, lower=True)
     if not failed:
         diagonal = np.diagonal(factor)
         if diagonal.min() > 1e-7 * diagonal.max():
-            inverse = lapack.dpotri(factor, lower=True)[0]
-            return inverse + np.tril(inverse, -1).T, 2.0 * float(np.log(diagonal).sum())
+            return lapack.dtrtri(factor, lower=True)[0].T, 2.0 * float(np.log(diagonal).sum())
     values, vectors = np.linalg.eigh(information)
     values = np.maximum(values, 1e-15 * values[-1])
-    return (vectors / values) @ vectors.T, float(np.log(values).sum())
+    _, upper = np.linalg.qr((vectors / np.sqrt(values)).T[:, ::-1])
+    return upper[::-1, ::-1].T, float(np.log(values).sum())
+
+
+def times_upper(A: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """A R of A (m, p) and an upper triangular R (p, p), in half the operations."""
+    return blas.dtrmm(1.0, R, A.T, trans_a=1).T

@@ -17,7 +17,7 @@ from calibration.geometry_guards import joint_lengths, unusable_data, unusable_f
 from calibration.hand import HandModel, nominal_hand
 from calibration.hand_fit import Errors, hand_problem
 from calibration.identifiability import Identifiability, identifiability
-from calibration.map_fit import Fit
+from calibration.map_fit import Fit, spread
 from calibration.marker_shape import Cluster, cluster, in_line
 from calibration.parameters import (
     COMPLIANCES,
@@ -39,7 +39,7 @@ from calibration.verdict import Verdict
 _STAGE = "geometry"
 _LEAST = 1e-6  # [m, rad] smallest noise of a measured pose
 _FIXED = 1e-6  # [rad]
-_SPREAD = 120  # postures from which rank and combinations are told
+_SPREAD = 720  # components from which rank and combinations are told
 
 
 @dataclass(frozen=True)
@@ -136,17 +136,19 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     start = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
     if refused := list(unusable_data(chain, postures.q, start, 6 if oriented else 3)):
         raise NotCalibrated(refused)
-    parameters = _parameters(chain, start, widths, postures, oriented)
+    tau = chain.gravity_torques(postures.q)
+    parameters = _parameters(chain, start, widths, tau, oriented)
     nominal, reading = nominal_hand(chain, start.frames), widths.reading * joint_lengths(chain)
     pose = np.array([widths.position, widths.orientation][: 1 + oriented])
     errors = Errors(reading, 1e-2 * reading, pose)
     found = robust_fit(
-        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors),
+        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors, tau[some]),
         len(postures),
         3 + 3 * oriented,
         parameters.nominal,
     )
-    known = identifiability(found.fit.J_white[: 6 * _SPREAD], parameters)
+    some = spread(len(found.fit.at.r), 3 + 3 * oriented, _SPREAD)
+    known = identifiability(found.fit.rows_white(some), parameters)
     if refused := list(unusable_fit(chain, parameters, found, known, len(postures))):
         raise NotCalibrated(refused)
     fit = with_gears_averaged(found.fit, parameters)
@@ -182,10 +184,10 @@ def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarra
     return Postures(q[usable], body.T[usable], covariance, np.zeros(int(usable.sum()))), body.xyz, usable
 
 
-def _parameters(chain: Chain, start: Start, widths: Widths, postures: Postures, oriented: bool) -> ParameterSet:
+def _parameters(chain: Chain, start: Start, widths: Widths, tau: np.ndarray, oriented: bool) -> ParameterSet:
     """Everything, frames without a prior; what a single point cannot tell of the hand's rotation stays at zero."""
     k, lengths = len(chain.joints), joint_lengths(chain)
-    gears = gear_tolerances(chain, chain.gravity_torques(postures.q), widths.deflection)
+    gears = gear_tolerances(chain, tau, widths.deflection)
     frames = np.full(12, np.inf)
     frames[9:] = np.inf if oriented else _FIXED
     placement = [widths.translation] * 3 + [widths.rotation] * 3

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibration.kinematics import Path, along, joints_to_end
+from calibration.kinematics import Path
 from calibration.robot import Chain
 from calibration.se3 import adjoint, from_vector, inverse, local_twist
 
@@ -101,12 +101,13 @@ class HandModel:
             yields = self.compliance.any() or p > 12 + 7 * k
             tau = self.chain.gravity_torques(q) if yields else np.zeros((len(q), k))
         placed = self._path.placed(q[:, self.chain.columns] - self.offset - self.compliance * tau)
-        A, L = placed.to_end()
-        J, J_joint = np.empty((len(q), 6, p)), joints_to_end(A, L, self.chain.path.twists)
-        J[:, :, :6], J[:, :, 6:12] = along(A[0], L[0], -local_twist(self.base)), local_twist(self.hand)
+        twists = self.chain.twists.copy()
+        twists[0, :, :6] = -local_twist(self.base)
+        found, J = placed.end_twists(twists), np.empty((len(q), 6, p))
+        J_joint = found[:, :, 1:, 6]
+        J[:, :, :6], J[:, :, 6:12] = found[:, :, 0, :6], local_twist(self.hand)
         if p > 12:
-            for i, M in enumerate(self.chain.slopes, start=1):
-                J[:, :, 6 + 6 * i : 12 + 6 * i] = along(A[i], L[i], M)
+            J[:, :, 12 : 12 + 6 * k] = found[:, :, 1:, :6].reshape(len(q), 6, 6 * k)
             J[:, :, 12 + 6 * k : 12 + 7 * k] = -J_joint
         if p > 12 + 7 * k:
             J[:, :, 12 + 7 * k :] = -tau[:, None, :] * J_joint

@@ -51,9 +51,11 @@ def fit(model: HandModel, parameters: ParameterSet, postures: Postures, play: np
     return solve(problem, problem.linearise(parameters.nominal))
 
 
-def hand_problem(model: HandModel, parameters: ParameterSet, postures: Postures, errors: Errors) -> Problem:
-    """The problem of `fit`, with the hand's own random errors where they are given."""
-    tau = model.chain.gravity_torques(postures.q)
+def hand_problem(
+    model: HandModel, parameters: ParameterSet, postures: Postures, errors: Errors, tau: np.ndarray | None = None
+) -> Problem:
+    """The problem of `fit`, with the hand's own random errors where they are given; tau as the model takes it."""
+    tau = model.chain.gravity_torques(postures.q) if tau is None else tau
     roots = np.linalg.cholesky(postures.covariance)
     k, n_pose = len(errors.play), len(errors.pose)
     pose = np.repeat(np.arange(n_pose), 3)

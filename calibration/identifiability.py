@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from calibration.parameters import ParameterSet
 
@@ -91,13 +92,14 @@ def identifiability(J: np.ndarray, parameters: ParameterSet) -> Identifiability:
     A = J * scale
     if len(A) > A.shape[1]:
         A = np.linalg.qr(A, mode="r")  # the same lengths and angles between columns, fewer rows
-    values = np.linalg.svd(A, compute_uv=False)
+    _, values, Vt = np.linalg.svd(A, full_matrices=len(A) < A.shape[1])
     values = np.concatenate([values, np.zeros(max(0, len(scale) - len(values)))])
     rank = int((values > _CLIFF * values[0]).sum())
     tiny = np.finfo(float).eps * values[0]
     gap = float(values[rank - 1] / max(values[rank], tiny)) if rank < len(values) else float("inf")
     base = _base_columns(A, scan_order(parameters.names), rank)
-    B = np.linalg.lstsq(A[:, base], A, rcond=None)[0]
+    Q, R = np.linalg.qr(A[:, base])
+    B = solve_triangular(R, Q.T @ A)
     B[:, base] = np.eye(len(base))
     return Identifiability(
         rank,
@@ -106,7 +108,7 @@ def identifiability(J: np.ndarray, parameters: ParameterSet) -> Identifiability:
         float(values[0] / values[rank - 1]),
         tuple(base),
         B * scale[base][:, None] / scale,
-        _statuses(A, rank),
+        _statuses(Vt, rank),
     )
 
 
@@ -137,9 +139,11 @@ def _base_columns(A: np.ndarray, order: list[int], rank: int) -> list[int]:
     return chosen
 
 
-def _statuses(A: np.ndarray, rank: int) -> tuple[Status, ...]:
-    """By each parameter's share in the null space of A: none, estimated; all, not identifiable; else combined."""
-    _, _, Vt = np.linalg.svd(A, full_matrices=len(A) < A.shape[1])
+def _statuses(Vt: np.ndarray, rank: int) -> tuple[Status, ...]:
+    """By each parameter's share in the null space: none, estimated; all, not identifiable; else combined.
+
+    Vt (p, p): right singular vectors, one a row.
+    """
     known = np.sqrt((Vt[:rank] ** 2).sum(axis=0))
     lost = np.sqrt((Vt[rank:] ** 2).sum(axis=0))
     return tuple(

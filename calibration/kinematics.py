@@ -7,10 +7,12 @@ Moving a frame P on the way by the local twist x moves the end by the local twis
 
     G_P x,    G_P = [[A, A x u], [0, A]],    A = R_end' R_P,   u = R_end' (p_end - p_P)        [m, rad]
 
-(column by column). All products are of constants with stacked rows, or element by element; Pinocchio is not called.
+(column by column); A x u is R_end' (R_P x (p_end - p_P)). All products are of constants with stacked rows, or element
+by element; Pinocchio is not called.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -24,25 +26,34 @@ class Placed:
 
     Attributes:
         T: (n, 4, 4) pose of the end.
-        R: (n, 3, 3 k) orientations of the frames before each joint, side by side.
-        p: (n, 3, k) their origins [m].
+        R: (3, n, k, 3) orientations of the frames before each joint, rows first.
+        p: (3, n, k) their origins [m].
     """
 
     T: np.ndarray
     R: np.ndarray
     p: np.ndarray
 
-    def to_end(self) -> tuple[np.ndarray, np.ndarray]:
-        """A and A x u of the start and of the frame before each joint, both (k + 1, n, 3, 3)."""
-        n, _, k = self.p.shape
-        R_end, p_end = self.T[:, :3, :3], self.T[:, :3, 3:]
-        columns = np.concatenate([np.broadcast_to(np.eye(3), (n, 3, 3)), self.R, p_end, p_end - self.p], axis=2)
-        turned = np.swapaxes(R_end, 1, 2) @ columns
-        A = np.ascontiguousarray(turned[:, :, : 3 * (k + 1)].reshape(n, 3, k + 1, 3).transpose(2, 0, 1, 3))
-        u, L = turned[:, :, 3 * (k + 1) :].transpose(2, 0, 1)[..., None], np.empty_like(A)
+    def end_twists(self, twists: np.ndarray) -> np.ndarray:
+        """Local twists of the end (n, 6, k + 1, c) when frames on the way move by constant local `twists`.
+
+        Args:
+            twists: (k + 1, 6, c), of the frame the path starts from, then of the frame before each joint [m, rad].
+        """
+        (_, n, k), c = self.p.shape, twists.shape[2]
+        columns, lever = np.empty((3, n, 2, k + 1, 3)), np.empty((3, n, k + 1, 1))
+        columns[:, :, 0, 0], columns[:, :, 0, 1:] = np.eye(3)[:, None], self.R
+        lever[:, :, 0, 0] = self.T[:, :3, 3].T
+        lever[:, :, 1:, 0] = lever[:, :, 0] - self.p
         for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            L[:, :, i] = A[:, :, j] * u[:, :, l] - A[:, :, l] * u[:, :, j]
-        return A, L
+            columns[i, :, 1] = columns[j, :, 0] * lever[l] - columns[l, :, 0] * lever[j]
+        turned = np.swapaxes(self.T[:, :3, :3], 1, 2) @ columns.reshape(3, n, -1).transpose(1, 0, 2)
+        A, L = turned.reshape(3 * n, 2, k + 1, 3).transpose(1, 2, 0, 3)
+        linear, angular = twists[:, :3], twists[:, 3:]
+        out = np.empty((n, 6, k + 1, c))
+        out[:, :3] = (A @ linear + L @ angular).reshape(k + 1, n, 3, c).transpose(1, 2, 0, 3)
+        out[:, 3:] = (A @ angular).reshape(k + 1, n, 3, c).transpose(1, 2, 0, 3)
+        return out
 
 
 @dataclass(frozen=True)
@@ -59,7 +70,7 @@ class Path:
     axis: np.ndarray
     prismatic: np.ndarray
 
-    @property
+    @cached_property
     def twists(self) -> np.ndarray:
         """Unit twist S of each joint, (k, 6)."""
         S = np.zeros((len(self.axis), 6))
@@ -74,13 +85,13 @@ class Path:
         """Frames at joint positions q (n, k) [rad, m]."""
         n, k = q.shape
         R, p = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
-        frames, origins = np.empty((n, 3, 3 * k)), np.empty((n, 3, k))
+        frames, origins = np.empty((3, n, k, 3)), np.empty((3, n, k))
         for i in range(k + 1):
             p = p + (R.reshape(-1, 3) @ self.fixed[i, :3, 3]).reshape(n, 3)
             R = (R.reshape(-1, 3) @ self.fixed[i, :3, :3]).reshape(n, 3, 3)
             if i == k:
                 break
-            frames[:, :, 3 * i : 3 * i + 3], origins[:, :, i] = R, p
+            frames[:, :, i], origins[:, :, i] = R.transpose(1, 0, 2), p.T
             if self.prismatic[i]:
                 p = p + (R.reshape(-1, 3) @ self.axis[i]).reshape(n, 3) * q[:, i : i + 1]
             else:
@@ -94,21 +105,6 @@ def _turned(R: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
     rows = R.reshape(-1, 3)
     first, second = (rows @ W).reshape(R.shape), (rows @ (W @ W)).reshape(R.shape)
     return R + np.sin(angle)[:, None, None] * first + (1.0 - np.cos(angle))[:, None, None] * second
-
-
-def along(A: np.ndarray, L: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """G M (n, 6, c) of one frame's A and L (n, 3, 3) and constant local twists M (6, c)."""
-    n, c = len(A), M.shape[1]
-    J = np.empty((n, 6, c))
-    J[:, :3] = (A.reshape(-1, 3) @ M[:3] + L.reshape(-1, 3) @ M[3:]).reshape(n, 3, c)
-    J[:, 3:] = (A.reshape(-1, 3) @ M[3:]).reshape(n, 3, c)
-    return J
-
-
-def joints_to_end(A: np.ndarray, L: np.ndarray, twists: np.ndarray) -> np.ndarray:
-    """Local twists of the end (n, 6, k) at unit joint velocities, A and L as `Placed.to_end` gives them."""
-    v, w = twists[:, None, :3, None], twists[:, None, 3:, None]
-    return np.concatenate([(A[1:] @ v + L[1:] @ w)[..., 0], (A[1:] @ w)[..., 0]], axis=2).transpose(1, 2, 0)
 
 
 def path_of(model: pin.Model, start: int, end: int) -> Path:

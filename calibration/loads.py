@@ -42,13 +42,14 @@ def loads_of(model: pin.Model, joints: tuple[str, ...], base_frame: str) -> Load
 
 def gravity_torques(path: Path, loads: Loads, q: np.ndarray) -> np.ndarray:
     """Torques (n, k) [N.m, N] that hold the joints at positions q (n, k) [rad, m]."""
-    placed, (n, k) = path.placed(q), q.shape
-    after = np.concatenate([placed.R.reshape(n, 3, k, 3)[:, :, 1:], placed.T[:, :3, None, :3]], axis=2)
-    moved = np.swapaxes(after, 1, 2) @ np.swapaxes(path.fixed[1:, :3, :3], 1, 2)  # joint frames after their motion
-    origin, axis = np.moveaxis(placed.p, 1, 2), (moved @ path.axis[..., None])[..., 0]
-    moment = origin + (moved @ loads.centre[..., None])[..., 0] + np.where(path.prismatic, q, 0.0)[..., None] * axis
+    placed, axes = path.placed(q), path.axis
+    after = np.concatenate([placed.R[:, :, 1:], placed.T[:, :3, None, :3].transpose(1, 0, 2, 3)], axis=2)
+    centre = (path.fixed[1:, :3, :3].swapaxes(1, 2) @ loads.centre[..., None])[..., 0]  # seen from the next joint
+    axis = (placed.R * axes).sum(axis=3)
+    moment = placed.p + (after * centre).sum(axis=3) + np.where(path.prismatic, q, 0.0) * axis
     carried = np.cumsum(loads.mass[::-1])[::-1]
-    lever = np.cumsum((loads.mass[:, None] * moment)[:, ::-1], axis=1)[:, ::-1] - carried[:, None] * origin
+    lever = np.cumsum((loads.mass * moment)[..., ::-1], axis=2)[..., ::-1] - carried * placed.p
     # -g . (a x lever) = (g x a) . (-lever)
-    turning = -(lever * (axis @ skew(loads.gravity).T)).sum(axis=2)
-    return np.where(path.prismatic, -(axis @ loads.gravity) * carried, turning)
+    turning = -(lever * (skew(loads.gravity) @ axis.reshape(3, -1)).reshape(axis.shape)).sum(axis=0)
+    sliding = -(loads.gravity @ axis.reshape(3, -1)).reshape(q.shape) * carried
+    return np.where(path.prismatic, sliding, turning)

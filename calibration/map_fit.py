@@ -23,9 +23,9 @@ from calibration.linearised import Linearised, Prior
 from calibration.parsimony import without_needless
 
 _OUTER = 15
-_PROMISE = 1e-7  # the last Gauss-Newton step promises a smaller decrease of the cost [-]: 3e-4 sigma
+_PROMISE = 1e-3  # the last Gauss-Newton step promises a smaller decrease of the cost [-], the one after it 1e-7
 _SAME = 1e-2  # outer iterations stop below this change of log s [-], a fraction of what 160 postures tell
-_HASTY = 0.1
+_HASTY, _HASTY_PROMISE = 0.1, 1.0
 _MANY = 960  # components the evidence is asked with: standard deviations to 4 %
 _LEVERAGE = 20.0  # components per parameter above which a posture hardly moves its own prediction
 _ALIKE = 1e-5  # smallest over largest pivot of the normal equations [-]
@@ -87,7 +87,11 @@ class Fit:
     @property
     def J_white(self) -> np.ndarray:
         """Whitened Jacobian (d n, p)."""
-        return (self.whitener @ self.at.J).reshape(-1, len(self.theta))
+        return self.rows_white(np.arange(len(self.at.r)))
+
+    def rows_white(self, chosen: np.ndarray) -> np.ndarray:
+        """That of some postures."""
+        return (self.whitener[chosen] @ self.at.J[chosen]).reshape(-1, len(self.theta))
 
     @property
     def r_white(self) -> np.ndarray:
@@ -114,16 +118,17 @@ def solve(
         problem: What is to be fitted.
         at: The problem where to start.
         weigh: Weights (n,) from squared distances (n,) as `distances` gives them; one where it is not given.
-        hasty: Be content with widths to a tenth and theta to a third of a sigma.
+        hasty: Be content with widths to a tenth and theta to a sigma, as a start for all postures.
     """
-    same, promise = (_HASTY, _HASTY) if hasty else (_SAME, _PROMISE)
+    same, promise = (_HASTY, _HASTY_PROMISE) if hasty else (_SAME, _PROMISE)
     widths, noise = problem.widths, problem.sources(at)
     some = spread(len(at.r), at.r.shape[1], _MANY)
     change = np.inf
     for round_ in range(_OUTER):
         settled = change < same
         old = widths
-        widths = old if settled else refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
+        if not settled:
+            widths = refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
         if round_ == 0 and not hasty and len(some) == len(at.r):
             noise, widths = without_needless(at, noise, problem.prior, widths)
         W = noise.whitener(widths.noise)
@@ -132,12 +137,12 @@ def solve(
             change = max(moved_by(old.noise, widths.noise, 10.0 * noise.floor), moved_by(old.prior, widths.prior, 0.0))
         if weigh is not None and not settled:
             noise, before = (
-                replace(noise, weight=weigh(distances(at, noise, widths, step.covariance, step.change))),
+                replace(noise, weight=weigh(distances(at.moved(step.change), noise, widths, step.covariance))),
                 noise,
             )
             change = max(change, float(np.abs(noise.weight - before.weight).max()))
         still = step.promise < promise
-        if still and settled:
+        if still and change < same:
             return Fit(at.moved(step.change), noise, widths, step.covariance, W, True)
         lower = at if still else _descended(problem, at, W, widths, step)
         if lower is None:
@@ -151,13 +156,13 @@ def spread(n: int, d: int, components: int) -> np.ndarray:
     return np.unique(np.linspace(0, n - 1, components // d).astype(int))
 
 
-def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Squared Mahalanobis distance (n,) of each posture from what all others predict, theta moved by `change` [-].
+def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarray) -> np.ndarray:
+    """Squared Mahalanobis distance (n,) of each posture from what all others predict [-].
 
     r' (I - w M)^-1 (I - w M + M)^-1 r,     M = W J covariance J' W'
     """
     root, (n, d, p) = noise.roots(widths.noise), at.J.shape
-    r = (root @ (at.r + at.J @ change)[..., None])[..., 0]
+    r = (root @ at.r[..., None])[..., 0]
     if n * d > _LEVERAGE * p:
         return (r**2).sum(axis=1)
     A = root @ at.J
@@ -171,19 +176,19 @@ def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarr
 def _step(prior: Prior, at: Linearised, W: np.ndarray, widths: Widths) -> _Step:
     """From the normal equations; by orthogonal factors where data and priors differ too much for those."""
     scale, (n, d, p) = prior.scale, at.J.shape
-    A, r = (W @ at.J).reshape(n * d, p) * scale, (W @ at.r[..., None]).ravel()
+    A, r = (W @ at.J).reshape(n * d, p), (W @ at.r[..., None]).ravel()
     root = np.sqrt(prior.precision(widths.prior)) * scale
     off = root * (at.theta - prior.nominal) / scale
     cost = float(r @ r + off @ off)
-    information = A.T @ A + np.diag(root**2)
+    information = (A.T @ A) * scale * scale[:, None] + np.diag(root**2)
     factor, failed = lapack.dpotrf(information, lower=True)
     diagonal = np.diagonal(factor)
     if failed or diagonal.min() < _ALIKE * diagonal.max():
-        stacked = np.vstack([A, np.diag(root)])
+        stacked = np.vstack([A * scale, np.diag(root)])
         change = -np.linalg.lstsq(stacked, np.concatenate([r, off]), rcond=None)[0]
         promise, covariance = float(((stacked @ change) ** 2).sum()), inverse_and_log_det(information)[0]
     else:
-        gradient = A.T @ r + root * off
+        gradient = scale * (A.T @ r) + root * off
         change = -lapack.dpotrs(factor, gradient, lower=True)[0]
         promise, covariance = float(-gradient @ change), inverse_and_log_det(information)[0]
     return _Step(scale * change, promise, covariance * scale * scale[:, None], cost)

@@ -15,6 +15,7 @@ from calibration.se3 import compose, inverse, mean, to_vector
 
 _MANY = 100  # postures that are enough for a start
 _ROUNDS = 8  # of weighing by the inverse of the distance left: the sum of distances is minimised, not of squares
+_FLAT = 1e-12  # eigenvalues of the normal equations below this share of the largest are zero [-]
 _TRIMMED = 4.0  # distances beyond this many medians are left out in the end
 
 
@@ -41,8 +42,10 @@ def registration_start(T_tool: np.ndarray, T_lab_hand: np.ndarray, oriented: boo
     blocks = [T_tool[:, :3, :3], -np.einsum("ab,nc->nabc", np.eye(3), y).reshape(n, 3, 9)]
     A = np.concatenate([*blocks, np.broadcast_to(-np.eye(3), (n, 3, 3))], axis=2)
     b, w = -T_tool[:, :3, 3], np.ones(n)
+    squares = (np.swapaxes(A, 1, 2) @ np.concatenate([A, b[..., None]], axis=2)).reshape(n, 240)
     for _ in range(_ROUNDS):
-        x = np.linalg.lstsq((w[:, None, None] * A).reshape(-1, 15), (w[:, None] * b).ravel(), rcond=1e-9)[0]
+        normal = (w**2 @ squares).reshape(15, 16)
+        x = np.linalg.pinv(normal[:, :15], rcond=_FLAT, hermitian=True) @ normal[:, 15]
         residual = np.linalg.norm(A @ x - b, axis=1)
         w = 1.0 / np.sqrt(np.maximum(residual, max(0.1 * np.median(residual), 1e-12)))
     rows = residual <= _TRIMMED * max(np.median(residual), 1e-12)

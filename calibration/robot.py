@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from calibration.errors import InputError, NoSuchElement, ShapeError
-from calibration.kinematics import Path, along, joints_to_end, path_of
+from calibration.kinematics import Path, path_of
 from calibration.loads import Loads, gravity_torques, loads_of
 from calibration.schema import Description
 from calibration.twists import exp6, jexp6
@@ -79,9 +79,14 @@ class Chain:
         return self.drawn.moved(np.concatenate([exp6(self.xi), np.eye(4)[None]]))
 
     @cached_property
-    def slopes(self) -> np.ndarray:
-        """Local twist of each placement by its placement twist (k, 6, 6): exp6's right derivative."""
-        return jexp6(self.xi)
+    def twists(self) -> np.ndarray:
+        """Local twists by placement twist and joint position (k + 1, 6, 7) of the frame before each joint.
+
+        The first is the base's, which none of them moves.
+        """
+        out = np.zeros((len(self.joints) + 1, 6, 7))
+        out[1:, :, :6], out[1:, :, 6] = jexp6(self.xi), self.drawn.twists
+        return out
 
     def with_placements(self, xi: np.ndarray) -> "Chain":
         """The chain with placement twists `xi` (k, 6) [m, rad] instead of those it has."""
@@ -103,14 +108,13 @@ class Chain:
         """Poses of the tool frame with d(pose)/d(xi) and d(pose)/dq, at q (n, n_measured) [rad, m]."""
         self._check(q)
         placed = self.path.placed(q[:, self.columns])
-        A, L = placed.to_end()
-        J = [along(A[i], L[i], M) for i, M in enumerate(self.slopes, start=1)]
-        return ChainPoses(placed.T, np.concatenate(J, axis=2), joints_to_end(A, L, self.path.twists))
+        J = placed.end_twists(self.twists)[:, :, 1:]
+        return ChainPoses(placed.T, J[..., :6].reshape(len(q), 6, 6 * len(self.joints)), J[..., 6])
 
     def joint_jacobians(self, q: np.ndarray) -> np.ndarray:
         """Derivatives of the tool's pose by joint position (n, 6, k), local twists, at q (n, n_measured)."""
         self._check(q)
-        return joints_to_end(*self.path.placed(q[:, self.columns]).to_end(), self.path.twists)
+        return self.path.placed(q[:, self.columns]).end_twists(self.twists[:, :, 6:])[:, :, 1:, 0]
 
     def gravity_torques(self, q: np.ndarray) -> np.ndarray:
         """Torques (n, k) [N.m, N] that hold the chain's joints at q (n, n_measured), nominal geometry and masses."""

@@ -54,7 +54,7 @@ def robust_fit(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: 
         good = everything if kept.all() else problem(kept)
         found = solve(replace(good, widths=found.widths), at.rows(kept))
         if kept.all():
-            distance = distances(found.at, found.noise, found.widths, found.covariance, np.zeros(len(theta)))
+            distance = distances(found.at, found.noise, found.widths, found.covariance)
         else:
             at, distance = _judged(everything, found, kept.astype(float))
         if np.array_equal(_near(distance, limit), kept):
@@ -72,4 +72,4 @@ def _judged(problem: Problem, found: Fit, weight: np.ndarray) -> tuple[Linearise
     """The problem at what was found, and the squared distance (n,) of every posture."""
     at = problem.linearise(found.theta)
     noise = replace(problem.sources(at), weight=weight)
-    return at, distances(at, noise, found.widths, found.covariance, np.zeros(len(found.theta)))
+    return at, distances(at, noise, found.widths, found.covariance)

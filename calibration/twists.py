@@ -13,15 +13,25 @@ import numpy as np
 from calibration.se3 import compose, rotation_vector, skew
 
 _SMALL = 0.25  # t^2 below which series are used [rad^2]
-_D = np.array([1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600])
-_INVERSE_FACTORIALS = 1.0 / np.cumprod(np.maximum(np.arange(22.0), 1.0))
+_D = np.array([1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600, 0.0])
+_TERMS = len(_D)
+_INVERSE_FACTORIALS = 1.0 / np.cumprod(np.maximum(np.arange(2.0 * _TERMS + 2.0), 1.0))
+_ALTERNATING = (-1.0) ** np.arange(_TERMS)
+_SERIES = np.stack(  # of sin t / t, (1 - cos t) / t^2, (t - sin t) / t^3, d and its slope, by powers of t^2
+    [
+        *(_ALTERNATING * _INVERSE_FACTORIALS[k : k + 2 * _TERMS : 2] for k in (1, 2, 3)),
+        _D,
+        np.append(2.0 * (np.arange(_TERMS) * _D)[1:], 0.0),
+    ],
+    axis=1,
+)
 _NEAR_PI = 3.0  # rotations beyond this angle [rad] have no reliable axis in R - R'
 
 
 def exp6(twist: np.ndarray) -> np.ndarray:
     """Transforms (..., 4, 4) of twists (..., 6) [m, rad]."""
     w = twist[..., 3:]
-    sin, b, c = _sines((w * w).sum(axis=-1))
+    sin, b, c, _, _ = _coefficients((w * w).sum(axis=-1))
     W = skew(w)
     W2, eye = W @ W, np.eye(3)
     V = eye + b * W + c * W2
@@ -31,7 +41,7 @@ def exp6(twist: np.ndarray) -> np.ndarray:
 def log6(T: np.ndarray) -> np.ndarray:
     """Twists (..., 6) of transforms (..., 4, 4) that turn by less than pi."""
     w, p = log3(T[..., :3, :3]), T[..., :3, 3]
-    d, _ = _d_and_slope((w * w).sum(axis=-1, keepdims=True))
+    d = _coefficients((w * w).sum(axis=-1))[3][..., 0]
     wp = _cross(w, p)
     return np.concatenate([p - 0.5 * wp + d * _cross(w, wp), w], axis=-1)
 
@@ -59,9 +69,7 @@ def jexp6(twist: np.ndarray) -> np.ndarray:
 def jlog6(twist: np.ndarray) -> np.ndarray:
     """Right derivatives of log6 (..., 6, 6) at the transforms whose logarithms are `twist` (..., 6)."""
     v, w = twist[..., :3], twist[..., 3:]
-    t2 = (w * w).sum(axis=-1, keepdims=True)
-    d, slope = (x[..., None] for x in _d_and_slope(t2))
-    _, b, c = _sines(t2[..., 0])
+    _, b, c, d, slope = _coefficients((w * w).sum(axis=-1))
     W, eye = skew(w), np.eye(3)
     W2 = W @ W
     J3 = eye + 0.5 * W + d * W2
@@ -76,35 +84,30 @@ def jlog6(twist: np.ndarray) -> np.ndarray:
     return J
 
 
-def _sines(t2: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """sin t / t, (1 - cos t) / t^2, (t - sin t) / t^3 of squared angles, with two axes appended."""
+def _coefficients(t2: np.ndarray) -> tuple[np.ndarray, ...]:
+    """sin t / t, (1 - cos t) / t^2, (t - sin t) / t^3, d of V^-1 and its derivative by t over t.
+
+    Of squared angles (...,), with two axes appended.
+    """
     small = t2 < _SMALL
-    x = np.where(small, 1.0, t2)
-    t = np.sqrt(x)
-    closed = np.sin(t) / t, (1.0 - np.cos(t)) / x, (t - np.sin(t)) / (x * t)
     y = np.where(small, t2, 0.0)
-    series = [np.zeros_like(y) for _ in range(3)]
-    for n in range(9, -1, -1):
-        for k in range(3):
-            series[k] = _INVERSE_FACTORIALS[2 * n + 1 + k] - y * series[k]
-    a, b, c = (np.where(small, s, f)[..., None, None] for s, f in zip(series, closed, strict=True))
-    return a, b, c
+    powers = np.empty((*t2.shape, _TERMS))
+    powers[..., 0] = 1.0
+    powers[..., 1:] = y[..., None]
+    table = np.multiply.accumulate(powers, axis=-1, out=powers) @ _SERIES
+    if not small.all():
+        table[~small] = _closed(t2[~small])
+    return tuple(np.moveaxis(table, -1, 0)[..., None, None])
 
 
-def _d_and_slope(t2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The d of V^-1 and its derivative by t over t, of squared angles."""
-    small = t2 < _SMALL
-    x = np.where(small, 1.0, t2)
-    t = np.sqrt(x)
-    half = 0.5 * t
+def _closed(t2: np.ndarray) -> np.ndarray:
+    """The coefficients (n, 5) of squared angles (n,) that are not small."""
+    t = np.sqrt(t2)
+    half, sin, cos = 0.5 * t, np.sin(t), np.cos(t)
     cot = 1.0 / np.tan(half)
-    d = (1.0 - half * cot) / x
-    slope = ((half / np.sin(half) ** 2 - cot) * 0.5 / t - 2.0 * d) / x
-    y = np.where(small, t2, 0.0)
-    powers = np.arange(len(_D))
-    d_series = np.polynomial.polynomial.polyval(y, _D)
-    slope_series = np.polynomial.polynomial.polyval(y, 2.0 * (powers * _D)[1:])
-    return np.where(small, d_series, d), np.where(small, slope_series, slope)
+    d = (1.0 - half * cot) / t2
+    slope = ((half / np.sin(half) ** 2 - cot) * 0.5 / t - 2.0 * d) / t2
+    return np.stack([sin / t, (1.0 - cos) / t2, (t - sin) / (t2 * t), d, slope], axis=1)
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
