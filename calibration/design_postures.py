@@ -4,19 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.departures import Departures, departures_of
 from calibration.design import Criterion
 from calibration.design_pool import Room, room_of
-from calibration.design_search import Design, search
+from calibration.design_search import Design, Sample, search
 from calibration.design_sides import Sides, sides
 from calibration.design_tour import Tour, tour
 from calibration.hand import HandModel, nominal_hand
-from calibration.information import Prospect, prospect
-from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
+from calibration.information import Prospect, departing, prospect
+from calibration.parameters import ParameterSet, gear_parameters, geometry_parameters, play_floor, play_start
 from calibration.remedy import Posture, Remedy, Sigma
 from calibration.robot import chain_of
 from calibration.schema import Description
 from calibration.shapes import shapes_of
 
+_ANYWHERE = 200  # postures from which largest torques are told
 _RANDOM = 100  # sets of random postures the design is compared with
 _FRESH = 300  # postures the comparison predicts the hand at
 
@@ -31,6 +33,8 @@ class Task:
         parameters: To be found, with tolerances.
         play: (k,) random error of each joint's reading [rad, m].
         known: (p, p) covariance of the scaled parameters by what is recorded already; None: nothing is.
+        departures: What the robot does and no parameter stands for; None: nothing.
+        work: Draws postures like those the robot works in; None: anywhere in its room.
     """
 
     room: Room
@@ -38,10 +42,19 @@ class Task:
     parameters: ParameterSet
     play: np.ndarray
     known: np.ndarray | None = None
+    departures: Departures | None = None
+    work: Sample | None = None
 
     def prospect(self, q: np.ndarray, at: np.ndarray) -> Prospect:
         """What candidates q tell of the hand at other postures."""
-        return prospect(self.model, self.parameters, self.room.description, self.play, q, at, self.known)
+        told = prospect(self.model, self.parameters, self.room.description, self.play, q, at, self.known)
+        if self.departures is None:
+            return told
+        return departing(told, self.model, self.room.description, self.play, self.departures, at)
+
+    def sample(self, n: int, rng: np.random.Generator) -> np.ndarray:
+        """Postures (n, n_measured) like those the robot works in."""
+        return (self.work or self.room.pool)(n, rng)
 
 
 @dataclass(frozen=True)
@@ -50,7 +63,7 @@ class Comparison:
 
     Attributes:
         designed: After the design.
-        random: (m,) after as many random postures of the same room.
+        random: (m,) after as many random postures, drawn like those.
     """
 
     designed: float
@@ -88,13 +101,28 @@ class Plan:
         return Remedy(stage, why, self.postures, sigma=told)
 
 
-def nominal_task(urdf: str, description: Description, rng: np.random.Generator) -> Task:
-    """The geometry of a robot of which only the datasheet is known."""
+def nominal_task(
+    urdf: str, description: Description, rng: np.random.Generator, work: Sample | None = None, gears: bool = False
+) -> Task:
+    """The geometry of a robot of which only the datasheet is known, and its gears' compliance where that is asked for.
+
+    Args:
+        urdf: Of the robot.
+        description: Of the laboratory.
+        rng: For what is drawn.
+        work: Draws postures like those the robot works in.
+        gears: Whether the postures alone are to tell the gears, as they are where no motion is recorded.
+    """
     chain = chain_of(urdf, description)
-    parameters = geometry_parameters(chain, description)
     play = np.maximum(play_start(chain, description), play_floor(chain, description))
     room = room_of(shapes_of(urdf, chain, description), description, rng)
-    return Task(room, nominal_hand(chain, parameters.nominal[:12]), parameters, play)
+    anywhere = room.sample(_ANYWHERE, rng)
+    parameters = geometry_parameters(chain, description)
+    if gears:
+        parameters = gear_parameters(chain, description, chain.gravity_torques(anywhere))
+    departures = departures_of(chain, play, anywhere)
+    hand = nominal_hand(chain, parameters.nominal[:12])
+    return Task(room, hand, parameters, play, departures=departures, work=work)
 
 
 def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> Plan:
@@ -103,16 +131,15 @@ def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> 
     Raises:
         NotEnoughData: The robot has hardly any posture clear of itself and in sight.
     """
-    found = search(task.room, task.prospect, n, criterion, rng)
+    found = search(task.room, task.prospect, n, criterion, rng, task.work)
     return Plan(task, found, sides(found.prospect, found.chosen, task.play, rng), tour(found.q, task.room.shapes))
 
 
 def compared(found: Plan, rng: np.random.Generator) -> Comparison:
-    """The design against random postures of its room, the hand predicted at postures new to both."""
+    """The design against random postures like those the robot works in, the hand predicted at others, new to both."""
     task, n = found.task, len(found.design.chosen)
-    drawn = task.room.pool(_FRESH + 4 * n, rng)
-    q = np.concatenate([drawn[_FRESH:], found.design.q])
-    p = task.prospect(q, drawn[:_FRESH])
+    drawn = task.sample(_FRESH + 4 * n, rng)
+    p = task.prospect(np.concatenate([drawn[_FRESH:], found.design.q]), drawn[:_FRESH])
     sets = [rng.choice(4 * n, n, replace=False) for _ in range(_RANDOM)]
-    random = np.array([p.hand(p.after(rows)).max() for rows in sets])
-    return Comparison(float(p.hand(p.after(4 * n + np.arange(n))).max()), random)
+    *random, designed = (p.hand(p.after(x), p.pulled(x)).max() for x in (*sets, 4 * n + np.arange(n)))
+    return Comparison(float(designed), np.array(random))

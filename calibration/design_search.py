@@ -13,6 +13,9 @@ from calibration.design import Criterion, choose
 from calibration.design_pool import Room
 from calibration.information import Prospect
 
+Sample = Callable[[int, np.random.Generator], np.ndarray]
+"""So many postures (n, n_measured), drawn."""
+
 _POOL = 500
 _WIDTHS = (0.12, 0.05)  # of a joint's range, of the neighbours of the second and third choice [-]
 _NEIGHBOURS = 400
@@ -48,15 +51,21 @@ def search(
     n: int,
     criterion: Criterion,
     rng: np.random.Generator,
+    work: Sample | None = None,
 ) -> Design:
     """Choose n postures in a room; `prospect_at(q, at)` says what candidates tell of the hand at other postures.
+
+    Those are drawn by `work`, anywhere in the room where it is not given; candidates from both.
 
     Raises:
         NotEnoughData: The room has hardly any postures.
     """
     size = max(_POOL, 5 * n)
-    drawn = room.pool(size + _AT, rng)
-    at, pool = drawn[:_AT], drawn[_AT:]
+    if work is None:
+        drawn = room.pool(size + _AT, rng)
+        at, pool = drawn[:_AT], drawn[_AT:]
+    else:
+        at, pool = work(_AT, rng), np.concatenate([room.pool(size // 2, rng), room.admits(work(size // 2, rng))])
     prospect = prospect_at(pool, at)
     chosen = choose(prospect, n, criterion)
     for width in _WIDTHS:

@@ -6,15 +6,20 @@
 W_i whitens the posture's noise: markers, and each joint's play along its lever arms. V spans what the candidates tell
 at all (singular values above a cliff); `rest`, the gauge, no posture tells, and it does not move the hand.
 The hand's position at posture e then has the standard deviation sqrt(trace(P_e C P_e')), P_e = J_e T V: what
-calibration leaves, the joints' own random errors apart.
+calibration leaves, the joints' own random errors apart. With nuisances z (`departures`) it is the root of
+
+    trace(P_e C P_e') + |P_e C m - Z_e|^2,     m = sum_i B_i' H_i,     H_i = W_i G_i,  Z_e = G_e for the position
+
+since a fit that does not ask for z is off by C m z.
 Reference: Pukelsheim, Optimal Design of Experiments, 2006.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.bodies import body_poses
+from calibration.departures import Departures
 from calibration.hand import HandModel, HandPoses
 from calibration.markers import base_body, hand_body
 from calibration.parameters import ParameterSet
@@ -38,6 +43,8 @@ class Prospect:
         scale: (p,) tolerances [m, rad].
         J_joint: (n, d, k) whitened, by joint position: the errors of flanks.
         C: (r, r) covariance of x by what is recorded already.
+        H: (n, d, z) what each nuisance does to each candidate, whitened [-].
+        Z: (e, 3, z) and to the hand at those other postures [m].
     """
 
     q: np.ndarray
@@ -47,11 +54,18 @@ class Prospect:
     scale: np.ndarray
     J_joint: np.ndarray
     C: np.ndarray
+    H: np.ndarray
+    Z: np.ndarray
 
     def after(self, chosen: np.ndarray) -> np.ndarray:
         """Covariance (r, r) of x with the chosen candidates recorded too."""
         flat = self.B[chosen].reshape(-1, self.B.shape[2])
         return np.asarray(np.linalg.inv(np.linalg.inv(self.C) + flat.T @ flat))
+
+    def pulled(self, chosen: np.ndarray) -> np.ndarray:
+        """m (r, z): how the nuisances pull at x in the chosen candidates."""
+        rows, z = len(chosen) * self.H.shape[1], self.H.shape[2]
+        return np.asarray(self.B[chosen].reshape(rows, self.B.shape[2]).T @ self.H[chosen].reshape(rows, z))
 
     def sigma(self, C: np.ndarray) -> np.ndarray:
         """(p,) standard deviations of the parameters at covariance C of x [m, rad]."""
@@ -59,9 +73,12 @@ class Prospect:
         untold = 1.0 - (self.V**2).sum(axis=1)
         return np.asarray(self.scale * np.sqrt(np.maximum(told + untold, 0.0)))
 
-    def hand(self, C: np.ndarray) -> np.ndarray:
-        """(e,) standard deviation of the hand's position at covariance C of x [m]."""
-        return np.asarray(np.sqrt(np.einsum("eij,jk,eik->e", self.P, C, self.P)))
+    def hand(self, C: np.ndarray, m: np.ndarray | None = None) -> np.ndarray:
+        """(e,) root mean square error of the hand's position at covariance C of x, nuisances pulling by m [m]."""
+        noise = np.einsum("eij,jk,eik->e", self.P, C, self.P)
+        if m is None:
+            return np.asarray(np.sqrt(noise))
+        return np.asarray(np.sqrt(noise + ((self.P @ (C @ m) - self.Z) ** 2).sum(axis=(1, 2))))
 
 
 def prospect(
@@ -91,7 +108,21 @@ def prospect(
     V = told_directions(A) if known is None else np.eye(p)
     P = model.poses_and_derivatives(at, n_parameters=p).J[:, :3] * parameters.scale @ V
     C = np.eye(V.shape[1]) if known is None else known
-    return Prospect(q, A @ V, P, V, parameters.scale, W @ J_joint, C)
+    none = np.zeros((*A.shape[:2], 0)), np.zeros((*P.shape[:2], 0))
+    return Prospect(q, A @ V, P, V, parameters.scale, W @ J_joint, C, *none)
+
+
+def departing(
+    told: Prospect, model: HandModel, description: Description, play: np.ndarray, departures: Departures, at: np.ndarray
+) -> Prospect:
+    """A prospect of the hand at postures `at`, with nuisances that its fit does not ask for."""
+    p = 12 + 7 * len(play)
+    found, there = (model.poses_and_derivatives(x, n_parameters=p) for x in (told.q, at))
+    W, *_ = _whitened(found, description, play)
+    G = departures.effects(model, told.q, found)
+    if W.shape[1] == 3:
+        G = moved(found.T[:, :3, :3], G, point_of(hand_body(description)))
+    return replace(told, H=W @ G, Z=departures.effects(model, at, there)[:, :3])
 
 
 def _whitened(

@@ -42,6 +42,26 @@ def loads_of(model: pin.Model, joints: tuple[str, ...], base_frame: str) -> Load
 
 def gravity_torques(path: Path, loads: Loads, q: np.ndarray) -> np.ndarray:
     """Torques (n, k) [N.m, N] that hold the joints at positions q (n, k) [rad, m]."""
+    axis, lever, carried, _ = _carried(path, loads, q)
+    # -g . (a x lever) = (g x a) . (-lever)
+    turning = -(lever * (skew(loads.gravity) @ axis.reshape(3, -1)).reshape(axis.shape)).sum(axis=0)
+    sliding = -(loads.gravity @ axis.reshape(3, -1)).reshape(q.shape) * carried
+    return np.where(path.prismatic, sliding, turning)
+
+
+def gravity_moments(path: Path, loads: Loads, q: np.ndarray) -> np.ndarray:
+    """Moments (n, k, 3) [N.m] across each joint's axis, about all axes where it slides, in the joint's frame at rest.
+
+    R_j' (I - a a') (g x lever_j)
+    """
+    axis, lever, _, R = _carried(path, loads, q)
+    M = (skew(loads.gravity) @ lever.reshape(3, -1)).reshape(lever.shape)
+    M = M - np.where(path.prismatic, 0.0, (M * axis).sum(axis=0) * axis)
+    return np.asarray((M[..., None] * R).sum(axis=0))
+
+
+def _carried(path: Path, loads: Loads, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Axes (3, n, k), mass times lever of all they carry (3, n, k) [kg.m], mass (k,), rotations (3, n, k, 3)."""
     placed, axes = path.placed(q), path.axis
     after = np.concatenate([placed.R[:, :, 1:], placed.T[:, :3, None, :3].transpose(1, 0, 2, 3)], axis=2)
     centre = (path.fixed[1:, :3, :3].swapaxes(1, 2) @ loads.centre[..., None])[..., 0]  # seen from the next joint
@@ -49,7 +69,4 @@ def gravity_torques(path: Path, loads: Loads, q: np.ndarray) -> np.ndarray:
     moment = placed.p + (after * centre).sum(axis=3) + np.where(path.prismatic, q, 0.0) * axis
     carried = np.cumsum(loads.mass[::-1])[::-1]
     lever = np.cumsum((loads.mass * moment)[..., ::-1], axis=2)[..., ::-1] - carried * placed.p
-    # -g . (a x lever) = (g x a) . (-lever)
-    turning = -(lever * (skew(loads.gravity) @ axis.reshape(3, -1)).reshape(axis.shape)).sum(axis=0)
-    sliding = -(loads.gravity @ axis.reshape(3, -1)).reshape(q.shape) * carried
-    return np.where(path.prismatic, sliding, turning)
+    return axis, lever, carried, placed.R

@@ -147,7 +147,8 @@ def _calibrate_geometry(work: Work) -> Work:
     refused = any(v.verdict == "refused" for v in said)
     suggested = record_next(work.dataset.urdf, chain, description, postures, model, refused)
     work = work.with_model(model, said).suggesting(*suggested)
-    if work.clock("robot") is not None or refused:
+    moving = any(entry.kind in ("sweep", "swing") for entry in work.dataset.entries("calibration"))
+    if moving or refused:
         return work
     soft, more = calibrate_gears(chain, description, postures)
     return work.with_model(soft, [v for v in more if v not in said])

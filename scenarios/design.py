@@ -14,6 +14,7 @@ from scenarios import folder
 if TYPE_CHECKING:
     from calibration.design import Criterion
     from calibration.design_postures import Comparison, Plan
+    from calibration.design_search import Sample
     from scenarios.schema import Scenario
 
 
@@ -41,7 +42,9 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
 
     description = declaration(scenario.twin, ())
     rng = generator(scenario.seed, "design")
-    found = plan(nominal_task(mjcf.urdf(), description, rng), n, criterion, rng)
+    campaign_ = scenario.twin.campaign
+    still = campaign_.sweep == 0.0 and campaign_.calibration_swing == 0.0
+    found = plan(nominal_task(mjcf.urdf(), description, rng, _work(), still), n, criterion, rng)
     against = compared(found, rng)
     worst, usual = 1e3 * against.designed, 1e3 * float(np.median(against.random))
     why = (
@@ -55,6 +58,19 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
         with folder.updating(campaign.parent, [campaign.name]) as new:
             yaml_file.write(new / campaign.name, recording(scenario, found))
     return Designed(found, against)
+
+
+def _work() -> "Sample":
+    """Draws postures as the twin's campaigns do: in front of the robot, the hand in sight."""
+    import mjcf
+    from twin import postures
+
+    nominal = mjcf.spec().compile()
+
+    def draw(n: int, rng: np.random.Generator) -> np.ndarray:
+        return rng.permutation(postures.draw(nominal, n, rng))
+
+    return draw
 
 
 def recording(scenario: "Scenario", plan: "Plan") -> "Scenario":
