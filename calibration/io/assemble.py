@@ -12,6 +12,7 @@ from calibration.dataset import Dataset
 from calibration.errors import InputError, InputErrors, NoSuchElement
 from calibration.io.bodies import in_order, placed_bodies, unmatched
 from calibration.io.check import check, check_order
+from calibration.io.hand_check import check_columns
 from calibration.io.mapping import MappedTrial, MappingFile
 from calibration.io.recorded import Joints, Markers, Plates, Recorded
 from calibration.means import PostureMeans, write_means
@@ -65,6 +66,9 @@ def import_files(
     if problems:
         raise InputErrors(problems)
     check_order(mapping, [trial for _, trial in found])
+    for session in (("calibration", "validation"), ("confirmation",)):
+        some = [(recorded[entry.id].file, trial) for entry, trial in found if entry.role in session]
+        check_columns(description, chain, some)
     _write(out, mapping.urdf, description, found)
     return tuple(dict.fromkeys(note for r in recorded.values() for note in r.notes))
 

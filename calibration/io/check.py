@@ -1,8 +1,8 @@
 """What cannot be true of an imported trial, told by file and channel before anything is written.
 
 Units show in sizes: a body of markers against its drawing, a reading against its joint's limits, the plate's load
-against the robot's weight. Swapped or mislabelled columns show in bodies that are not rigid and, in static postures, in
-a hand that is not where the nominal robot has it.
+against the robot's weight. Swapped or mislabelled columns show in bodies that are not rigid; those of joints, see
+`hand_check`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,15 +11,10 @@ from itertools import pairwise
 import numpy as np
 
 from calibration.errors import InputError
-from calibration.hand import nominal_hand
 from calibration.io.mapping import MappingFile
-from calibration.io.place_bodies import hand_eye
 from calibration.means import PostureMeans
-from calibration.parameters import nominal_frames
 from calibration.plausibility import implausible_inputs
-from calibration.postures import mean_postures
 from calibration.recording import Trial
-from calibration.registration_start import registration_start
 from calibration.robot import Chain
 from calibration.schema import Body, Description
 
@@ -29,7 +24,6 @@ _SIZE = (0.02, 2.0)  # [m] believable largest distance within a body of markers
 _FLEX = 0.01  # [m] a distance within a body may scatter by this much
 _DRAWN = 0.03  # [m] a distance within a body may be off its drawing by this much
 _LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or its inverse
-_HAND = 0.05  # [m] median distance between the hand and the nominal robot's, their frames fitted
 
 
 def check(file: str, trial: Trial | PostureMeans, description: Description, chain: Chain, mass: float) -> None:
@@ -50,8 +44,6 @@ def check(file: str, trial: Trial | PostureMeans, description: Description, chai
     found += [] if found else [*_rigid(trial, description)]
     if isinstance(trial, Trial):
         found += [*_clocks(trial), *_load(trial, mass * float(np.linalg.norm(description.gravity)))]
-    elif not found:
-        found += [*_hand(trial, description, chain)]
     if found:
         raise InputError(file, "; ".join(found))
 
@@ -160,21 +152,3 @@ def _rigid(trial: Trial | PostureMeans, description: Description) -> Iterator[st
 def _scatter(d: np.ndarray) -> float:
     """Standard deviation of most of the distances d (n,); a few wrong postures are for the calibration to name."""
     return float(1.4826 * np.nanmedian(np.abs(d - np.nanmedian(d))))
-
-
-def _hand(means: PostureMeans, description: Description, chain: Chain) -> Iterator[str]:
-    postures = mean_postures(description, means)
-    if len(postures) < 4:
-        return
-    predicted = nominal_hand(chain, nominal_frames(chain, description)).poses(postures.q)
-    if postures.components == 3:
-        off = float(np.median(registration_start(predicted, postures.T_base_hand, False).residual))
-    else:
-        X, Y = hand_eye(predicted, postures.T_base_hand)
-        error = (X @ predicted @ Y)[:, :3, 3] - postures.T_base_hand[:, :3, 3]
-        off = float(np.median(np.linalg.norm(error, axis=1)))
-    if off > _HAND:
-        yield (
-            f"the hand is {1e3 * off:.0f} mm (median) from where the readings put it, its frames fitted: columns of "
-            "joints or markers are swapped, signs reversed, or this is another robot's URDF"
-        )

@@ -23,8 +23,14 @@ def mapping_of(
     """The mapping of exported trials; it reads them from any of the formats, the robot beside it in `nominal.urdf`."""
     setup = Setup.model_validate({name: getattr(description, name) for name in Setup.model_fields})
     names = [m.name for b in description.bodies for m in b.markers]
-    plates = {p.name: C3dPlateMap(number=k + 1, convention="reaction") for k, p in enumerate(description.plates)}
+    standing = {name for _, trial in trials if isinstance(trial, Trial) for name in trial.plate}
+    numbers = {p.name: k + 1 for k, p in enumerate(description.plates) if p.name in standing}
+    plates = {name: C3dPlateMap(number=k, convention="reaction") for name, k in numbers.items()}
     wrist = any(isinstance(trial, Trial) and np.isfinite(trial.wrist_wrench).any() for _, trial in trials)
+    linked, commanded = (
+        any(isinstance(trial, Trial) and np.isfinite(getattr(trial, side)).any() for _, trial in trials)
+        for side in ("q_link", "q_command")
+    )
     static = any(isinstance(trial, Trial) and len(trial.dwell_start) for _, trial in trials)
     return Mapping(
         urdf="nominal.urdf",
@@ -38,7 +44,8 @@ def mapping_of(
             markers={n: n for n in names}, plates=plates, dwell_events=DWELL_EVENTS if static else None
         ),
         bag=BagLayout(
-            source="joint_states", motor=MOTOR, link=ABSOLUTE, command=COMMAND,
+            source="joint_states", motor=MOTOR,
+            link=ABSOLUTE if linked else None, command=COMMAND if commanded else None,
             joints={j: j for j in description.joint_names},
             wrist=WRIST if wrist else None, wrist_convention="action" if wrist else None,
         ),

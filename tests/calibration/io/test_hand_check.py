@@ -1,0 +1,123 @@
+"""Columns of joints swapped, reversed or in degrees, beside the hand's markers: told by name, nothing written."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration import load
+from calibration.errors import InputError
+from calibration.io import hand_check
+from calibration.io.hand_check import check_columns
+from calibration.recording import Trial
+from calibration.robot import chain_of_frames
+from scenarios import cli
+from tests.calibration import geared, matched
+
+A, B = (matched.JOINTS.index(f"arm_{i}_joint") for i in (5, 6))
+
+
+def trials() -> list[tuple[str, str, str, Trial]]:
+    """A swing and a sweep of a robot with a real one's zeros (0.1 rad at arm_5), seconds off the markers' clock."""
+    rng, truth, found, start = np.random.default_rng(3), matched.defects(3), [], 20.0
+    for name, motor in (("swing", geared.swing(rng, 12.0)), ("sweep", geared.sweep(4, 6.0))):
+        found.append((name, "calibration", "swing", geared.record(truth, geared.gears(rng), motor, start, rng, 1e-3)))
+        start += len(motor) / geared.GRID + 5.0
+    return found
+
+
+def swapped(q):
+    out = q.copy()
+    out[:, [A, B]] = q[:, [B, A]]
+    return out
+
+
+def reversed_(q):
+    out = q.copy()
+    out[:, B] = -q[:, B]
+    return out
+
+
+def degrees(q):
+    return np.column_stack([q[:, 0], np.degrees(q[:, 1:])])
+
+
+WRONG = {
+    "swapped": (swapped, "joints arm_5_joint and arm_6_joint are swapped"),
+    "reversed": (reversed_, "joint arm_6_joint is reversed"),
+    "degrees": (degrees, "(recorded in degrees?)"),
+}
+
+
+def with_readings(change):
+    return [(n, r, k, replace(t, q_motor=change(t.q_motor))) for n, r, k, t in trials()]
+
+
+def run(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as exit:
+        cli.main([str(a) for a in arguments])
+    return exit.value.code
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.iterdir() if p.name not in ("mapping.yaml", "nominal.urdf"))
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_columns_of_csv_files_are_told_by_name(tmp_path, capsys, name):
+    change, words = WRONG[name]
+    source, csv = matched.write(tmp_path / "source", with_readings(change)), tmp_path / "csv"
+    assert run("export", "csv", source, "--out", csv) == 0
+    assert run("import", "csv", *files(csv), "--map", csv / "mapping.yaml", "--out", tmp_path / "out") == 2
+    said = capsys.readouterr().err
+    assert words in said and ".csv" in said and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_columns_of_bags_added_to_c3d_files_are_told_by_name(tmp_path, capsys, name):
+    change, words = WRONG[name]
+    source = matched.write(tmp_path / "source", with_readings(change))
+    for kind in ("c3d", "bag"):
+        assert run("export", kind, source, "--out", tmp_path / kind) == 0
+    c3d, bag, first, out = (tmp_path / n for n in ("c3d", "bag", "first", "out"))
+    assert run("import", "c3d", *files(c3d), "--map", c3d / "mapping.yaml", "--out", first) == 0
+    assert run("import", "bag", *files(bag), "--map", bag / "mapping.yaml", "--add-to", first, "--out", out) == 2
+    said = capsys.readouterr().err
+    assert words in said and ".bag" in said and not out.exists()
+
+
+def test_right_columns_are_imported(tmp_path):
+    source, csv = matched.write(tmp_path / "source", trials()), tmp_path / "csv"
+    assert run("export", "csv", source, "--out", csv) == 0
+    assert run("import", "csv", *files(csv), "--map", csv / "mapping.yaml", "--out", tmp_path / "out") == 0
+    assert len(load(tmp_path / "out").description.trials) == 2
+
+
+D = matched.described()
+CHAIN = chain_of_frames(mjcf.urdf(), D.joint_names, D.base_frame, D.tool_frame)
+
+
+@pytest.mark.parametrize("reading", list(hand_check._readings(CHAIN))[::7], ids=lambda r: r.said)
+def test_every_reading_is_recognised(reading):
+    wrong = [(n, replace(t, q_motor=reading.of(t.q_motor))) for n, _, _, t in trials()]
+    with pytest.raises(InputError, match=f"^swing and 1 more: {reading.said}: .* correct the mapping file"):
+        check_columns(D, CHAIN, wrong)
+
+
+def test_columns_in_quite_another_order_are_refused_though_not_explained():
+    wrong = [
+        (n, replace(t, q_motor=np.column_stack([t.q_motor[:, 0], t.q_motor[:, :0:-1]]))) for n, _, _, t in trials()
+    ]
+    with pytest.raises(InputError, match="no two swapped explain it"):
+        check_columns(D, CHAIN, wrong)
+
+
+def test_a_joint_that_hardly_moves_and_a_trial_without_markers_are_no_alarm():
+    (_, _, _, swing), (_, _, _, sweep) = trials()
+    still = swing.q_motor.copy()
+    none = replace(sweep, marker=(), marker_body=(), marker_position=np.zeros((len(sweep.t_mocap), 0, 3)))
+    check_columns(D, CHAIN, [("sweep", sweep)])  # one joint only: the frames are not told
+    check_columns(D, CHAIN, [("swing", replace(swing, q_motor=still)), ("none", none)])
+    check_columns(D, CHAIN, [("none", none)])
