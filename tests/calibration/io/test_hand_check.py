@@ -10,7 +10,8 @@ import mjcf
 from calibration import load
 from calibration.errors import InputError
 from calibration.io import hand_check
-from calibration.io.hand_check import check_columns
+from calibration.io.hand_check import _shown, check_columns
+from calibration.means import PostureMeans
 from calibration.recording import Trial
 from calibration.robot import chain_of_frames
 from scenarios import cli
@@ -121,3 +122,28 @@ def test_a_joint_that_hardly_moves_and_a_trial_without_markers_are_no_alarm():
     check_columns(D, CHAIN, [("sweep", sweep)])  # one joint only: the frames are not told
     check_columns(D, CHAIN, [("swing", replace(swing, q_motor=still)), ("none", none)])
     check_columns(D, CHAIN, [("none", none)])
+
+
+def test_one_marker_on_the_hand_tells_swapped_columns_of_postures():
+    truth, rng = matched.defects(3), np.random.default_rng(0)
+    q = matched.near_postures(rng, 30)
+    base, hand = (np.array(x) for _, x in matched.BODIES.values())
+    at_hand = matched.positions(matched.hand_in_base(truth, q), hand[:1])
+    p = np.concatenate([np.broadcast_to(base, (30, *base.shape)), at_hand], axis=1)
+    labels = [f"base{i}" for i in range(4)] + ["gripper0"]
+    owner = tuple(label[:-1] for label in labels)
+
+    def means(q):
+        return PostureMeans("m", matched.JOINTS, q, tuple(labels), owner, p, np.full(p.shape, 1e-4), np.zeros(q.shape))
+
+    one = D.model_copy(
+        update={
+            "bodies": tuple(
+                b.model_copy(update={"markers": b.markers[:1]}) if b.name == "gripper" else b for b in D.bodies
+            )
+        }
+    )
+    assert _shown(one, "m", means(q)).oriented is False
+    check_columns(one, CHAIN, [("m", means(q + truth.offset))])
+    with pytest.raises(InputError, match="^m: joints arm_5_joint and arm_6_joint are swapped"):
+        check_columns(one, CHAIN, [("m", means(swapped(q + truth.offset)))])
