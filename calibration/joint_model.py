@@ -71,6 +71,7 @@ class JointModel:
         zero: Motor minus link reading, mean over the static calibration postures, taken off before the fit [rad].
         covariance: (1 + 2 k, 1 + 2 k) of rho, A, B; empty where there is none.
         quality: What it explains.
+        blocks: Stretches of its samples that counted as independent for the covariance; 0: not known.
     """
 
     joint: str
@@ -85,6 +86,7 @@ class JointModel:
     zero: float
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     quality: Quality = field(default_factory=Quality)
+    blocks: int = 0
 
     def __post_init__(self) -> None:
         for name, value in (("A", self.A), ("B", self.B)):

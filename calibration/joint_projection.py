@@ -8,7 +8,6 @@ encoder's quantum chooses it.
 References: Golub, Pereyra, SIAM J. Numer. Anal. 1973; Kaufman, BIT 1975.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -109,14 +108,3 @@ def limit_of(rho: float) -> Limit | None:
     highest the flanks change between two readings: A and B are told, rho is not.
     """
     return "lowest" if rho < 1.01 * RHO[0] else "highest" if rho > 0.99 * RHO[1] else None
-
-
-def clustered_covariance(J: np.ndarray, r: np.ndarray, groups: Sequence[slice]) -> np.ndarray:
-    """Covariance (p, p) of a least-squares fit whose residuals r (n,) hang together within groups, not between them.
-
-    H^-1 (sum_g J_g' r_g r_g' J_g) H^-1 G / (G - 1),  H = J' J.  Reference: Liang, Zeger, Biometrika 1986.
-    """
-    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
-    pinv = np.linalg.pinv(J / scale, rcond=RANK)
-    scores = np.array([pinv[:, g] @ r[g] for g in groups])
-    return (scores.T @ scores) * len(groups) / max(1, len(groups) - 1) / scale / scale[:, None]

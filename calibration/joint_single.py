@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from calibration.block_covariance import BlockCovariance, block_covariance
 from calibration.joint_basis import basis_of, not_zero
 from calibration.joint_model import JointModel, Quality, Terms, exponents
-from calibration.joint_projection import RHO, Problem, Projection, clustered_covariance, limit_of, search
+from calibration.joint_projection import RHO, Problem, Projection, limit_of, search
 from calibration.joint_samples import Samples, box, pooled
 from calibration.joint_selection import HIGHEST, Candidate
 
@@ -24,7 +25,7 @@ def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms,
     found = search(problem)
     if not found.full_rank:
         return none
-    C = _covariance(problem, found, np.cumsum([0, *(len(s) for s in samples)]))
+    C, by_block = _covariance(problem, found, np.cumsum([0, *(len(s) for s in samples)]))
     to_printed = np.eye(1 + 2 * k)
     to_printed[1 : 1 + k, 1 : 1 + k] = to_printed[1 + k :, 1 + k :] = basis.to_printed()
     values = to_printed @ np.append(found.rho, found.x)
@@ -38,23 +39,26 @@ def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms,
         A=values[1 : 1 + k],
         B=values[1 + k :],
         covariance=to_printed @ C @ to_printed.T,
+        blocks=by_block.blocks,
         quality=_quality(whole.y, found.r, missed),
     )
 
 
-def _covariance(problem: Problem, found: Projection, stops: np.ndarray) -> np.ndarray:
-    """Covariance (1 + 2 k, 1 + 2 k) of rho, a, b, samples of a trial between two stops.
+def _covariance(problem: Problem, found: Projection, stops: np.ndarray) -> tuple[np.ndarray, BlockCovariance]:
+    """Covariance (1 + 2 k, 1 + 2 k) of rho, a, b, samples of a trial between two stops, and how it was found.
 
     At a limit of its search rho is no estimate: given, its variance that of a rho anywhere between the limits.
     """
-    groups = [slice(a, b) for a, b in pairwise(stops)]
-    M = problem.design(found.rho)
-    if limit_of(found.rho) is None:
-        return clustered_covariance(np.column_stack([problem.design_slope(found.rho) @ found.x, M]), found.r, groups)
+    M, inside = problem.design(found.rho), limit_of(found.rho) is None
+    J = np.column_stack([problem.design_slope(found.rho) @ found.x, M]) if inside else M
+    trials = [slice(a, b) for a, b in pairwise(stops)]
+    by_block = block_covariance([J[k, None] for k in trials], [found.r[k, None] for k in trials])
+    if inside:
+        return by_block.covariance, by_block
     C = np.zeros((1 + M.shape[1], 1 + M.shape[1]))
     C[0, 0] = (RHO[1] - RHO[0]) ** 2 / 12.0
-    C[1:, 1:] = clustered_covariance(M, found.r, groups)
-    return C
+    C[1:, 1:] = by_block.covariance
+    return C, by_block
 
 
 def no_correction(joint: str, samples: Sequence[Samples], zero: float, terms: Terms) -> JointModel:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from calibration.block_covariance import ENOUGH
 from calibration.joint_model import JointModel
 from calibration.joint_projection import RHO, limit_of
 from calibration.verdict import Verdict
@@ -31,6 +32,7 @@ def verdicts(
     if used:
         yield Verdict(STAGE, "ok", f"{used[0].terms} terms; {'; '.join(_told(m) for m in used)}")
         yield from _at_limits(used)
+        yield from _few_blocks(used)
     if worse:
         yield Verdict(STAGE, "ok", f"not corrected, since the hand comes no nearer to its markers: {', '.join(worse)}")
     if unexcited:
@@ -58,6 +60,17 @@ def _at_limits(used: Sequence[JointModel]) -> Iterator[Verdict]:
             yield Verdict(
                 STAGE, "warning", f"rho at its {limit} limit, {rho:g} s/rad, in {', '.join(found)}: {meaning}"
             )
+
+
+def _few_blocks(used: Sequence[JointModel]) -> Iterator[Verdict]:
+    """Whose uncertainty rests on few stretches of motion."""
+    few = [m for m in used if 0 < m.blocks < ENOUGH]
+    if few:
+        message = (
+            f"uncertainty of {', '.join(m.joint for m in few)} rests on {min(m.blocks for m in few)} stretches of "
+        )
+        message += f"motion that count as independent, fewer than {ENOUGH}: its intervals are wide; record longer"
+        yield Verdict(STAGE, "ok", message)
 
 
 def _told(model: JointModel) -> str:
