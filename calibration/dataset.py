@@ -127,6 +127,7 @@ def _read_urdf(path: Path, description: Description) -> str:
     for kind, names, known in (
         ("joint", description.joint_names, joints),
         ("frame", (description.base_frame, description.tool_frame, *(b.link for b in description.bodies)), frames),
+        ("frame", () if description.wrist_link is None else (description.wrist_link,), frames),
     ):
         for name in names:
             if name not in known:

@@ -15,10 +15,11 @@ from calibration.base_motion import MOVES, read_stations
 from calibration.clocks import synchronise
 from calibration.dataset import Dataset
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
-from calibration.estimate import Estimate, RobotNames
+from calibration.estimate import Estimate, Model, RobotNames
 from calibration.estimate_parts import joints_model, suspension_model
 from calibration.gears import calibrate_gears
 from calibration.geometry import calibrate_geometry
+from calibration.hand_payload_stage import weighed
 from calibration.joint_fit import fit_joint_models
 from calibration.options import Options
 from calibration.parameters import nominal_frames
@@ -147,11 +148,20 @@ def _calibrate_geometry(work: Work) -> Work:
     refused = any(v.verdict == "refused" for v in said)
     suggested = record_next(work.dataset.urdf, chain, description, postures, model, refused)
     work = work.with_model(model, said).suggesting(*suggested)
+    work = work.saying(*_weighed(work, model))
     moving = any(entry.kind in ("sweep", "swing") for entry in work.dataset.entries("calibration"))
     if moving or refused:
         return work
     soft, more = calibrate_gears(chain, description, postures)
     return work.with_model(soft, [v for v in more if v not in said])
+
+
+def _weighed(work: Work, model: Model) -> tuple[Verdict, ...]:
+    """What hangs on the wrist's sensor in the trials with the declared payload."""
+    declared = {entry.id for entry in work.dataset.entries("calibration") if entry.payload is None}
+    trials = [trial for trial in work.trials if trial.id in declared]
+    hand = model.hand(work.chain, nominal_frames(work.chain, work.description))
+    return weighed(work.dataset.urdf, work.description, trials, work.clock("robot"), hand)
 
 
 def _calibrate_joints(work: Work) -> Work:

@@ -145,6 +145,7 @@ class Setup(Declaration):
     `marker_frame` is the frame of the marker positions: `lab`, or the name of a marker body without markers, for files
     whose positions were already brought into a frame fixed on that body (the base's motion removed).
     `mocap_clock` names the instruments whose times are the motion capture's own, sampled together by one machine.
+    `wrist_link` is the frame of the wrist's force-torque sensor, whose axes and origin `wrist_wrench` has.
     """
 
     robot: str
@@ -157,6 +158,7 @@ class Setup(Declaration):
     gravity: Vector3 = (0.0, 0.0, -9.81)
     marker_frame: str = "lab"
     mocap_clock: tuple[Literal["robot", "plate"], ...] = ()
+    wrist_link: str | None = None
     sigmas: Sigmas
     tolerances: Tolerances
 

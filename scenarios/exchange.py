@@ -36,8 +36,10 @@ def import_files(
     """
     from calibration.dataset import load
     from calibration.io.assemble import import_files as write
+    from calibration.io.foreign import refuse_foreign
     from calibration.io.mapping import Mapping, MappingFile
 
+    refuse_foreign(kind, files)
     described = yaml_file.read(mapping, Mapping)
     source = MappingFile(mapping, described, _urdf(described, mapping))
     before = None if add_to is None else load(add_to)

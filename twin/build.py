@@ -14,6 +14,9 @@ _WRENCH = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
 HAND = "gripper_grasping_frame"
 FLANGE = "wrist_ft_tool_link"
 """What hangs on the wrist's force-torque sensor, whose link is its parent."""
+
+WRIST_SENSOR = "wrist_ft_link"
+"""In whose axes it reads."""
 PUSH = ("push.x", "push.y", "push.z")
 _HELD = ("wheel", "caster", "head", "gripper")
 

@@ -13,6 +13,7 @@ from calibration.schema import (
     TrialEntry,
     Wheel,
 )
+from twin.build import WRIST_SENSOR
 from twin.config import TwinConfig
 from twin.draw import BASE, TOOL, TORSO
 from twin.instruments.tiles import Tiles
@@ -38,6 +39,7 @@ def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Descripti
         wheels=tuple(Wheel(name=w.name, type=w.type, centre=w.centre, contact=w.contact) for w in mjcf.wheels()),
         plates=_plates(Tiles(i.plate_grid)),
         payload=_payload(config),
+        wrist_link=None if i.wrist is None else WRIST_SENSOR,
         sigmas=Sigmas(
             marker=i.marker_noise, encoder=finest, plate_force=i.plate_force_noise, plate_moment=i.plate_moment_noise
         ),

@@ -76,7 +76,10 @@ def import_files(
 def _chain(mapping: MappingFile) -> Chain:
     s = mapping.content.setup
     try:
-        return chain_of_frames(mapping.urdf, s.joint_names, s.base_frame, s.tool_frame)
+        chain = chain_of_frames(mapping.urdf, s.joint_names, s.base_frame, s.tool_frame)
+        if s.wrist_link is not None:
+            chain.poses(np.zeros((1, len(s.joint_names))), s.wrist_link)
+        return chain
     except NoSuchElement as error:
         raise mapping.error("setup", str(error)) from error
 

@@ -1,0 +1,125 @@
+"""What hangs on the wrist's force-torque sensor, weighed by it in static postures.
+
+    f = m a + f_0        tau = h x a + tau_0        a = R_base_sensor(q)' g,   h = m c
+
+f, tau: ACTION of what hangs there on the sensor, its axes, about its origin; m its mass [kg], c its centre [m], f_0 and
+tau_0 the sensor's zeros. Linear in (m, f_0) and in (h, tau_0); standard deviations from the residuals. A gain of the
+sensor's passes for mass: a sensor that is 1 % off weighs 1 % wrong. The base is taken to stand level.
+Nominal: all links of the drawing beyond the sensor, and the declared payload where it hangs there.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from calibration.errors import NotEnoughData, ShapeError
+from calibration.schema import Description
+from calibration.se3 import skew
+
+_FEWEST = 6  # postures
+_SPREAD = 0.1  # of gravity: smallest spread of its direction over the sensor's axes that tells all of a centre [-]
+
+
+@dataclass(frozen=True)
+class Hanging:
+    """Mass and first moment of something, and how well they are known.
+
+    Attributes:
+        mass: m [kg].
+        moment: h = m c (3,) [kg.m], in the sensor's axes from its origin.
+        covariance: (4, 4) of (m, h).
+    """
+
+    mass: float
+    moment: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Standard deviations (4,) of m [kg] and h [kg.m]."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def centre(self) -> np.ndarray:
+        """c (3,) [m]."""
+        return np.asarray(self.moment / self.mass)
+
+    def less(self, other: "Hanging") -> "Hanging":
+        """What hangs there besides `other`."""
+        return Hanging(self.mass - other.mass, self.moment - other.moment, self.covariance + other.covariance)
+
+
+def weigh(R: np.ndarray, wrench: np.ndarray, gravity: np.ndarray) -> Hanging:
+    """What hangs on the sensor.
+
+    Args:
+        R: R_base_sensor (n, 3, 3) at static postures.
+        wrench: Mean readings (n, 6) [N, N.m] there.
+        gravity: (3,) in the base [m/s2].
+
+    Raises:
+        NotEnoughData: Too few postures, or gravity hardly turns in the sensor's axes.
+    """
+    if wrench.shape != (len(R), 6):
+        raise ShapeError("wrench", wrench.shape, (len(R), 6))
+    a = np.swapaxes(R, 1, 2) @ gravity
+    if len(a) < _FEWEST or np.sqrt(np.linalg.eigvalsh(np.cov(a.T))[0]) < _SPREAD * np.linalg.norm(gravity):
+        raise NotEnoughData(
+            f"{len(a)} postures do not turn the wrist's sensor enough against gravity to weigh what hangs on it; "
+            "record some with the hand up, down and on its side"
+        )
+    zero = np.broadcast_to(np.eye(3), (len(a), 3, 3))
+    m, C_m = _least_squares(np.concatenate([a[:, :, None], zero], axis=2), wrench[:, :3])
+    h, C_h = _least_squares(np.concatenate([-skew(a), zero], axis=2), wrench[:, 3:])
+    covariance = np.zeros((4, 4))
+    covariance[0, 0], covariance[1:, 1:] = C_m[0, 0], C_h[:3, :3]
+    return Hanging(float(m[0]), h[:3], covariance)
+
+
+def _least_squares(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solution and covariance for blocks A (n, 3, p) and y (n, 3), whose rows of one posture share their errors."""
+    J = A.reshape(-1, A.shape[2])
+    G = np.linalg.inv(J.T @ J)
+    x = G @ (J.T @ y.ravel())
+    H = np.eye(3) - A @ G @ np.swapaxes(A, 1, 2)  # what a posture leaves of its own error
+    psi = np.einsum("pq,nkq,nk->np", G, A, np.linalg.solve(H, (y - A @ x)[..., None])[..., 0])
+    return x, psi.T @ psi
+
+
+def drawn(urdf: str, description: Description, link: str) -> Hanging:
+    """What hangs on the sensor at `link` by the drawing and the declared payload, as wide as their tolerances."""
+    model = pin.buildModelFromXML(urdf)
+    data, sensor = model.createData(), model.getFrameId(link)
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    tolerance, payload = description.tolerances, description.payload
+    parts = [(b.mass, p, tolerance.link_mass * b.mass, tolerance.link_com) for b, p in _bodies(model, data, sensor)]
+    if payload is not None and _hangs(model, model.getFrameId(payload.link), sensor):
+        at = data.oMf[model.getFrameId(payload.link)].act(np.array(payload.com))
+        parts.append((payload.mass, at, payload.tolerance, 0.0))
+    masses, widths, off = (np.array([part[k] for part in parts]) for k in (0, 2, 3))
+    c = np.array([data.oMf[sensor].actInv(part[1]) for part in parts]).reshape(-1, 3)
+    J = np.column_stack([np.ones(len(c)), c])
+    covariance = J.T @ (widths[:, None] ** 2 * J)
+    covariance[1:, 1:] += np.eye(3) * float(((masses * off) ** 2).sum())
+    return Hanging(float(masses.sum()), masses @ c, covariance)
+
+
+def _hangs(model: pin.Model, frame: int, sensor: int) -> bool:
+    """Whether a frame is the sensor's or hangs on it."""
+    while frame not in (0, sensor):
+        frame = model.frames[frame].parentFrame
+    return frame == sensor
+
+
+def _bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[tuple[pin.Inertia, np.ndarray]]:
+    """Inertia and centre in the world of everything beyond the sensor: rigid parts, and those behind further joints."""
+    for k, frame in enumerate(model.frames):
+        if k == sensor or not _hangs(model, k, sensor):
+            continue
+        if frame.type == pin.FrameType.JOINT:
+            inertia = model.inertias[frame.parentJoint]
+            yield inertia, data.oMi[frame.parentJoint].act(inertia.lever)
+        elif frame.parentJoint == model.frames[sensor].parentJoint:
+            yield frame.inertia, data.oMf[k].act(frame.inertia.lever)

@@ -1,0 +1,78 @@
+"""What the wrist's sensor says hangs on it, held against the drawing and the declared payload."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from calibration.clock import Clock
+from calibration.errors import NotEnoughData
+from calibration.hand import HandModel
+from calibration.hand_payload import Hanging, drawn, weigh
+from calibration.postures import dwell_windows
+from calibration.recording import Trial
+from calibration.schema import Description
+from calibration.verdict import Verdict
+
+_STAGE = "geometry"
+_CLEAR = 3.0  # standard deviations
+_FEW = 5  # samples of a dwell
+
+
+def weighed(
+    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock | None, hand: HandModel
+) -> tuple[Verdict, ...]:
+    """What is to be said of the load of the hand; nothing where no wrist was recorded.
+
+    Args:
+        urdf: Of the nominal robot.
+        description: Of the dataset, its payload that of these trials.
+        trials: Continuous ones; their dwells count.
+        robot: The robot's clock.
+        hand: The calibrated robot.
+    """
+    recorded = [trial for trial in trials if np.isfinite(trial.wrist_wrench).any()]
+    if not recorded or robot is None:
+        return ()
+    link = description.wrist_link
+    if link is None:
+        return (Verdict(_STAGE, "missing", "wrist_wrench is recorded, but wrist_link does not say where: not used"),)
+    rows = list(_means(recorded, robot))
+    if not rows:
+        return (Verdict(_STAGE, "missing", "wrist_wrench is recorded, but in no static posture: not used"),)
+    q, w = (np.array(x) for x in zip(*rows, strict=True))
+    R = hand.chain.poses(hand.angles(q), link)[:, :3, :3]
+    try:
+        found = weigh(R, w, np.array(description.gravity))
+    except NotEnoughData as error:
+        return (Verdict(_STAGE, "missing", str(error)),)
+    return (_judged(found, drawn(urdf, description, link), link, len(q)),)
+
+
+def _means(trials: Sequence[Trial], robot: Clock) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Mean readings (n_joints,) and wrench (6,) of each dwell."""
+    for trial in trials:
+        t, known = robot.to_mocap(trial.t_robot), np.isfinite(trial.wrist_wrench).all(axis=1)
+        for start, stop in dwell_windows(trial):
+            rows = (t >= start) & (t <= stop) & known
+            if rows.sum() >= _FEW:
+                yield trial.q_motor[rows].mean(axis=0), trial.wrist_wrench[rows].mean(axis=0)
+
+
+def _judged(found: Hanging, expected: Hanging, link: str, n: int) -> Verdict:
+    message = (
+        f"wrist: {found.mass:.3f} +- {found.sigma[0]:.3f} kg hang on {link}, centre {_millimetres(found.centre)} mm, "
+        f"{n} postures; drawing and declared payload: {expected.mass:.3f} +- {expected.sigma[0]:.3f} kg"
+    )
+    more = found.less(expected)
+    if abs(more.mass) <= _CLEAR * more.sigma[0]:
+        return Verdict(_STAGE, "ok", message)
+    if more.mass > 0.0:
+        at = _millimetres(more.centre)
+        remedy = f"declare the other {more.mass:.3f} kg, at {at} mm in its axes, as payload, or weigh the tool"
+    else:
+        remedy = "is the declared payload in the hand, the sensor in newton?"
+    return Verdict(_STAGE, "warning", f"{message}: {remedy}")
+
+
+def _millimetres(x: np.ndarray) -> str:
+    return "(" + ", ".join(f"{1e3 * v:.0f}" for v in x) + ")"
