@@ -3,7 +3,8 @@
 Robots with 3 mm and 10 mrad on every placement, markers with 0.3 mm of noise, 200 held-out postures each. The peer runs
 its methods in its own environment (.venv-peer) through `../shared/bench/figaroh_bench.py`; ours is given the arrays.
 Smaller runs: PEER_N=30,100 PEER_MARKERS=1,4 PEER_DRAWS=3 PEER_METHODS=structural,map make bench-peer
-The whole table takes hours, all of them the peer's. Writes runs/bench_peer.json.
+The whole table takes hours, all of them the peer's: what it found is kept in runs/peer/, and the same command goes on
+where it was stopped. Writes runs/bench_peer.json.
 """
 
 import json
@@ -28,6 +29,7 @@ JOINTS = ("torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8)))
 TOOL = "wrist_ft_tool_link"
 TIPS = np.array([[0.05, 0.04, 0.06], [-0.06, 0.03, 0.05], [-0.04, -0.06, 0.09], [0.06, -0.05, 0.12]])
 NOISE, HELD_OUT = 3e-4, 200
+KEPT = ROOT / "runs/peer"
 
 
 @dataclass(frozen=True)
@@ -82,15 +84,23 @@ def ours(q: np.ndarray, p: np.ndarray, n: int) -> tuple[float, float]:
     return 1e3 * float(np.sqrt((error**2).sum(axis=2).mean())), float(np.median(seconds))
 
 
-def peer(folder: Path, method: str) -> tuple[float, float]:
-    """The same of the peer's."""
-    out = folder / f"{method}.json"
+def peer(folder: Path, kept: Path, method: str) -> tuple[float, float]:
+    """The same of the peer's; from `kept` where an earlier run of this bench got that far."""
+    if not kept.is_file():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        beside = kept.with_suffix(".partial")
+        compute(folder, method, beside)
+        beside.replace(kept)
+    found = json.loads(kept.read_text())
+    return found["sets"]["test.csv"]["after_mm"], found["seconds_total_min"]
+
+
+def compute(folder: Path, method: str, out: Path) -> None:
+    """One method of the peer's, in its own environment."""
     command = [str(PEER), str(SCRIPT), "--urdf", str(folder / "nominal.urdf"), "--data", str(folder / "train.csv")]
     command += ["--test", str(folder / "test.csv"), "--estimation", method, "--repeat", "1", "--json", str(out)]
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     subprocess.run(command, check=True, capture_output=True, env=environment, cwd=folder)
-    found = json.loads(out.read_text())
-    return found["sets"]["test.csv"]["after_mm"], found["seconds_total_min"]
 
 
 def drawn(folder: Path, n: int, m: int, seed: int, methods: list[str]) -> Draw:
@@ -101,7 +111,7 @@ def drawn(folder: Path, n: int, m: int, seed: int, methods: list[str]) -> Draw:
     write_csv(folder / "train.csv", q[:n], p[:n])
     write_csv(folder / "test.csv", q[n:], p[n:])
     mm, seconds = ours(q, p, n)
-    theirs = {method: peer(folder, method) for method in methods}
+    theirs = {method: peer(folder, KEPT / f"{n}x{m}_{seed}_{method}.json", method) for method in methods}
     return Draw(n, m, seed, mm, seconds, {k: v[0] for k, v in theirs.items()}, {k: v[1] for k, v in theirs.items()})
 
 

@@ -19,7 +19,10 @@ from twin.defects.contact import Contact, TurnsLate
 
 Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
-_SHARED = 3, 1e-6  # friction shared by wheels of one rigid body is not unique: iterated to the end, it drifts
+# Solver tolerance, iterations against slip and their tolerance. The wheels of one rigid body share its load and friction in
+# more than one way; iterated to the end, friction drifts. Where each has a spring, those iterations decide how exact a step is.
+_OWN = 1e-6, 20, 1e-9
+_SHARED = 1e-10, 3, 1e-6
 _LATE = 0.1  # torsional damping times step over inertia of the wheel [-]
 
 
@@ -66,9 +69,10 @@ class Wheel(Defect):
             torsion = None if self.bushing is None else np.array(self.bushing.torsion)
             self.footing.tune(model, self.name, self.contact_geom, torsion)
             self._check_torsion(model)
-            if self.bushing is None:
-                model.opt.noslip_iterations, model.opt.noslip_tolerance = _SHARED
-            else:
+            option = model.opt
+            solver = _SHARED if self.bushing is None else _OWN
+            option.tolerance, option.noslip_iterations, option.noslip_tolerance = solver
+            if self.bushing is not None:
                 self.bushing.tune_held(model, self.name, self.body_name, self.contact_geom)
 
     def _check_torsion(self, model: mujoco.MjModel) -> None:
