@@ -5,7 +5,7 @@ where each comes from. Everything else here is read from the model they compile 
 """
 
 from .export import NotAUrdfTree, urdf
-from .nominal import ROOT, scene_path, spec
+from .nominal import ROOT, model, scene_path, spec
 from .rotations import matrix_from_rpy, rpy_from_matrix
 from .wheels import Wheel, wheels
 
@@ -14,6 +14,7 @@ __all__ = [
     "NotAUrdfTree",
     "Wheel",
     "matrix_from_rpy",
+    "model",
     "rpy_from_matrix",
     "scene_path",
     "spec",

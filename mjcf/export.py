@@ -12,11 +12,13 @@ name in MJCF: it is called after its child. Floats are written by `repr`, which 
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from functools import cache
 
 import mujoco
 import numpy as np
 
-from .nominal import ROOT, spec
+from .nominal import ROOT
+from .nominal import model as nominal
 from .rotations import rpy_from_matrix
 from .shapes import collisions
 
@@ -40,7 +42,15 @@ def urdf(model: mujoco.MjModel | None = None) -> str:
     Raises:
         NotAUrdfTree: a body has several joints, a ball joint, or a joint away from its frame's origin.
     """
-    model = spec().compile() if model is None else model
+    return _nominal() if model is None else _urdf(model)
+
+
+@cache
+def _nominal() -> str:
+    return _urdf(nominal())
+
+
+def _urdf(model: mujoco.MjModel) -> str:
     root_id = model.body(ROOT).id
     robot = ET.Element("robot", name="tiago")
     for body_id in _subtree(model, root_id):

@@ -1,5 +1,6 @@
 """The nominal robot on its floor, read from the MJCF files of this package."""
 
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -20,3 +21,9 @@ def spec() -> mujoco.MjSpec:
     axes): no other form has to be handled by whoever edits it.
     """
     return mujoco.MjSpec.from_file(str(scene_path()))
+
+
+@cache
+def model() -> mujoco.MjModel:
+    """Return the compiled nominal robot, one for all who read it; who wants to change it compiles `spec()`."""
+    return spec().compile()

@@ -5,12 +5,14 @@ a swivel joint, a drive wheel's on the base itself.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import mujoco
 import numpy as np
 
-from .nominal import ROOT, spec
+from .nominal import ROOT
+from .nominal import model as nominal
 
 _SUFFIX = "_contact"
 
@@ -38,9 +40,10 @@ class Wheel:
     contact: Vector
 
 
+@cache
 def wheels() -> tuple[Wheel, ...]:
     """Return the wheels of the nominal robot, drive wheels first."""
-    model = spec().compile()
+    model = nominal()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     geoms = [i for i in range(model.ngeom) if model.geom(i).name.endswith(_SUFFIX)]

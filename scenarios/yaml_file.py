@@ -76,12 +76,17 @@ def write(path: Path | str, instance: Any, beside: Mapping[str, Any] | None = No
         instance: A pydantic model or dataclass.
         beside: Further top-level keys and their values, as `read` takes them.
     """
+    Path(path).write_text(text(instance, beside), encoding="utf-8")
+
+
+def text(instance: Any, beside: Mapping[str, Any] | None = None) -> str:
+    """What `write` writes."""
     values = TypeAdapter(type(instance)).dump_python(instance, mode="json", by_alias=True)
     yaml = YAML()
     yaml.width = 10**6
     stream = io.StringIO()
     yaml.dump(_styled({**values, **(beside or {})}), stream)
-    Path(path).write_text(stream.getvalue(), encoding="utf-8")
+    return stream.getvalue()
 
 
 def _text(path: Path) -> str:

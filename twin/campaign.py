@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import mjcf
-from calibration.recording import write_trial
+from calibration.recording import Trial, write_trial
 from calibration.schema import TrialEntry
 from twin import session, truth
 from twin.build import Twin, build
@@ -40,13 +40,14 @@ from twin.stiffness import spatial_stiffness
 from twin.uncertain import drawn
 
 Progress = Callable[[str, float], None]
+Watch = Callable[[Trial], None]
 
 
 def laboratory(config: TwinConfig, seed: int) -> Laboratory:
     """Draw a robot and put it on its plate."""
-    config, spec = drawn(config, seed), mjcf.spec()
-    robot = draw(config, spec.compile(), seed)
-    twin = build(spec, robot.defects, links_seen(config, robot), config.timestep)
+    config = drawn(config, seed)
+    robot = draw(config, mjcf.model(), seed)
+    twin = build(mjcf.spec(), robot.defects, links_seen(config, robot), config.timestep)
     x, y, yaw = config.base.pose
     T_lab_base = exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, yaw]))
     T_lab_base[:2, 3] = x, y
@@ -60,7 +61,12 @@ def second_session(lab: Laboratory) -> Laboratory:
 
 
 def record(
-    config: TwinConfig, seed: int, out: Path, progress: Progress | None = None, threads: int | None = None
+    config: TwinConfig,
+    seed: int,
+    out: Path,
+    progress: Progress | None = None,
+    threads: int | None = None,
+    watch: Watch = lambda trial: None,
 ) -> None:
     """Simulate a campaign and write OUT/dataset and OUT/truth.
 
@@ -70,6 +76,7 @@ def record(
         out: Folder to write into.
         progress: Called with a text and the fraction done.
         threads: How many trials are simulated at once; None: one for each core.
+        watch: Called with each trial once it is written, by the thread that made it.
 
     Raises:
         TwinError: The simulation failed; said where.
@@ -78,12 +85,14 @@ def record(
     later = second_session(lab)
     for folder in ("dataset/trials", "truth/trials"):
         (out / folder).mkdir(parents=True, exist_ok=True)
-    motions = schedule(config.campaign, mjcf.spec().compile(), seed)
+    motions = schedule(config.campaign, mjcf.model(), seed)
     starts = EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
     entries, done, total = [], 0.0, sum(m.duration for m in motions)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         sessions = (later if m.role == CONFIRMATION else lab for m in motions)
-        jobs = [pool.submit(_one, s, m, float(t), out) for s, m, t in zip(sessions, motions, starts, strict=True)]
+        jobs = [
+            pool.submit(_one, s, m, float(t), out, watch) for s, m, t in zip(sessions, motions, starts, strict=True)
+        ]
         try:
             for motion, job in zip(motions, jobs, strict=True):
                 entries.append(job.result())
@@ -99,12 +108,13 @@ def record(
     _write_truth(lab, later if config.campaign.confirmation else None, out / "truth")
 
 
-def _one(lab: Laboratory, motion: Motion, start: float, out: Path) -> TrialEntry:
+def _one(lab: Laboratory, motion: Motion, start: float, out: Path, watch: Watch) -> TrialEntry:
     states = _states(lab, motion, start - EPOCH + motion.duration / 2.0)
     trial, true = measure(lab, motion, states, start)
     file = f"trials/{motion.id}.nc"
     digest = write_trial(out / "dataset" / file, trial)
     truth.write_trial(out / "truth" / file, true)
+    watch(trial)
     return TrialEntry(
         id=motion.id,
         role=motion.role,

@@ -70,7 +70,7 @@ def clip(lab: Laboratory, trial: TruthTrial, path: Path, options: ClipOptions) -
     """
     shown = _samples(trial, options)
     model = build(with_markers(lab), lab.robot.defects, timestep=lab.config.timestep, visual=True).model
-    view = portrait(mjcf.spec().compile(), trial.base_pose[0], options.size)
+    view = portrait(mjcf.model(), trial.base_pose[0], options.size)
     model.vis.global_.fovy = np.degrees(view.field)
     model, data = put_down(model, trial.base_pose[0])
     mujoco.mj_kinematics(model, data)

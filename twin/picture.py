@@ -32,7 +32,7 @@ def picture(config: TwinConfig, seed: int, path: Path, size: tuple[int, int] = S
         path: PNG file to write; its folder is made if there is none.
         size: Width and height [pixel].
     """
-    lab, nominal = laboratory(config, seed), mjcf.spec().compile()
+    lab, nominal = laboratory(config, seed), mjcf.model()
     model = build(with_markers(lab), lab.robot.defects, timestep=config.timestep, visual=True).model
     model, data = put_down(model, lab.T_lab_base)
     held_out = nominal.key("reach").qpos

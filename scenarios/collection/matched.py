@@ -48,7 +48,7 @@ def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     parameters = geometry_parameters(chain, description)
     theta = parameters.nominal + parameters.tolerance * rng.normal(size=len(parameters))
     true = nominal_hand(chain, parameters.nominal[:12]).with_theta(theta)
-    readings = rng.permutation(postures.draw(mjcf.spec().compile(), n + _NEW, rng))
+    readings = rng.permutation(postures.draw(mjcf.model(), n + _NEW, rng))
     moved = readings[:n] + play_start(chain, description) * rng.normal(size=(n, len(chain.joints)))
     samples = campaign.dwell * scenario.twin.instruments.mocap_rate
     seen = _measured(description, readings[:n], true.poses(moved), samples, rng)

@@ -1,19 +1,32 @@
 """What a run of a collection consists of."""
 
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenarios.collection.order import Magnitude
 from scenarios.schema import Scenario
 
+if TYPE_CHECKING:
+    from calibration.recording import Trial
+
 
 def recordings_and_truth(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     """dataset/, truth/ and the scenario with the run's own seed."""
+    text = _scenario_of_seed_0(scenario.model_copy(update={"seed": 0}).model_dump_json())
+    (out / "scenario.yaml").write_text(text.replace("\nseed: 0\n", f"\nseed: {scenario.seed}\n", 1), encoding="utf-8")
+    return _record(scenario, out)
+
+
+@lru_cache(maxsize=1)
+def _scenario_of_seed_0(scenario: str) -> str:
+    """A scenario file but for its seed, which is all that differs from run to run: YAML is slow to write."""
     from scenarios import yaml_file
 
-    yaml_file.write(out / "scenario.yaml", scenario)
-    return _record(scenario, out)
+    return yaml_file.text(Scenario.model_validate_json(scenario))
 
 
 def recordings(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
@@ -28,27 +41,41 @@ def recordings(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
 def _record(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     import twin
 
-    twin.record(scenario.twin, scenario.seed, out, threads=1)
-    return _magnitudes(out / "dataset")
+    seen: list[_Seen] = []
+    twin.record(scenario.twin, scenario.seed, out, threads=1, watch=lambda trial: seen.append(_look(trial)))
+    return _magnitudes(seen)
 
 
-def _magnitudes(dataset: Path) -> tuple[Magnitude, ...]:
-    """What a laboratory would look at first, over all trials."""
-    import calibration
+@dataclass(frozen=True)
+class _Seen:
+    """What a laboratory would look at first in a trial: its duration [s], and spans [m, N, N.m, rad]."""
 
-    opened = calibration.load(dataset)
-    trials = [opened.read(entry) for entry in opened.description.trials]
-    base = max(_span(t.marker_position[:, t.markers_of("base")].reshape(len(t.t_mocap), -1)) for t in trials)
-    force = max(_span(t.plate_wrench[:, 0, :3]) for t in trials)
-    moment = max(_span(t.plate_wrench[:, 0, 3:]) for t in trials)
-    drive = max(float(np.nanmax(np.nanstd(t.q_motor[:, 1:] - t.q_link[:, 1:], axis=0))) for t in trials)
-    duration = sum(float(np.ptp(t.t_mocap)) for t in trials)
+    duration: float
+    base: float
+    force: float
+    moment: float
+    drive: float
+
+
+def _look(trial: "Trial") -> _Seen:
+    base = trial.marker_position[:, trial.markers_of("base")]
+    return _Seen(
+        duration=float(np.ptp(trial.t_mocap)),
+        base=_span(base.reshape(len(base), -1)),
+        force=_span(trial.plate_wrench[:, 0, :3]),
+        moment=_span(trial.plate_wrench[:, 0, 3:]),
+        drive=float(np.nanmax(np.nanstd(trial.q_motor[:, 1:] - trial.q_link[:, 1:], axis=0))),
+    )
+
+
+def _magnitudes(seen: list[_Seen]) -> tuple[Magnitude, ...]:
+    """Over all trials."""
     return (
-        Magnitude("duration_s", round(duration, 6)),
-        Magnitude("base_marker_span_mm", round(1e3 * base, 6)),
-        Magnitude("plate_force_span_N", round(force, 6)),
-        Magnitude("plate_moment_span_Nm", round(moment, 6)),
-        Magnitude("motor_minus_link_std_mrad", round(1e3 * drive, 6)),
+        Magnitude("duration_s", round(sum(s.duration for s in seen), 6)),
+        Magnitude("base_marker_span_mm", round(1e3 * max(s.base for s in seen), 6)),
+        Magnitude("plate_force_span_N", round(max(s.force for s in seen), 6)),
+        Magnitude("plate_moment_span_Nm", round(max(s.moment for s in seen), 6)),
+        Magnitude("motor_minus_link_std_mrad", round(1e3 * max(s.drive for s in seen), 6)),
     )
 
 
