@@ -15,6 +15,7 @@ from twin.root import ROOT, base_poses
 _FAST = 100.0  # [m/s, rad/s] nothing of this robot moves like that
 _MIN_UPRIGHT = 0.98  # [-] cosine of the base's tilt below which the robot has tipped
 _SEAM = 0.01  # [m] a wheel nearer to a seam may touch both plates
+_EVERY = 10  # steps: who tips over or leaves the plate is still there after them
 _WHEEL = "_contact"  # ends the name of a wheel's contact geom
 
 
@@ -33,8 +34,8 @@ def check(inputs: Inputs, motion: Motion, states: np.ndarray) -> None:
     if bad.any():
         k = int(np.argmax(bad))
         raise Diverged(motion.id, k * step - SETTLE, _fastest(model, speed[max(k - 1, 0) : k + 1], late[k]))
-    T = base_poses(model, states[:, 1 : 1 + model.nq])
-    _refuse(T[:, 2, 2] < _MIN_UPRIGHT, "the robot tips over", motion, step)
+    T = base_poses(model, states[::_EVERY, 1 : 1 + model.nq])
+    _refuse(T[:, 2, 2] < _MIN_UPRIGHT, "the robot tips over", motion, _EVERY * step)
     if motion.base is None:
         _on_plate(inputs, motion, T)
 
@@ -58,10 +59,10 @@ def _on_plate(inputs: Inputs, motion: Motion, T_lab_base: np.ndarray) -> None:
             p_base = base.xmat.reshape(3, 3).T @ (data.geom_xpos[i] - base.xpos)
             p_plate = T_lab_base[:, :2, :3] @ p_base + T_lab_base[:, :2, 3] - plate.xpos[:2]
             left = (np.abs(p_plate) > half).any(axis=1)
-            _refuse(left, f"{name.removesuffix(_WHEEL)} is off the plate", motion, model.opt.timestep)
+            _refuse(left, f"{name.removesuffix(_WHEEL)} is off the plate", motion, _EVERY * model.opt.timestep)
             on_seam = (np.abs(p_plate[:, None] - _seams(model)) < _SEAM).any(axis=(1, 2))
             what = f"{name.removesuffix(_WHEEL)} stands on a seam of plate_grid and would touch both plates"
-            _refuse(on_seam, what, motion, model.opt.timestep)
+            _refuse(on_seam, what, motion, _EVERY * model.opt.timestep)
 
 
 def _seams(model: mujoco.MjModel) -> np.ndarray:

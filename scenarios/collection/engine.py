@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _TRIES = 3  # of a run that takes its worker down, before it is given up
 _AGAIN = "give the same command: what is complete stays"
 _PROBE = 4_000_000  # bytes that must still find room for a failure to be the run's own
+_QUIET = {"logging.distributed": "critical", "distributed.worker.profile.enabled": False}  # the profiler: a tenth
 _PATIENCE = "20s"  # for a scheduler to answer
 
 
@@ -143,7 +144,7 @@ def _client(workers: Workers) -> Iterator["Client"]:
     try:
         import dask
 
-        dask.config.set({"logging.distributed": "critical"})  # read when `distributed` is imported
+        dask.config.set(_QUIET)  # read when `distributed` is imported
         from distributed import Client, LocalCluster
     except ModuleNotFoundError as error:
         raise ScenarioError(

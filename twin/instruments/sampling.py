@@ -1,19 +1,27 @@
 """From dense states at the simulation's steps to samples at an instrument's times."""
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+from scipy.spatial.transform import RigidTransform, Rotation
 
 
 def interpolate(t: np.ndarray, grid: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Linear interpolation (n, ...) of dense values (m, ...) at times t; within a dt^2 / 8, 1 um at 10 m/s^2, 1 ms."""
-    i = np.clip(np.searchsorted(grid, t, side="right") - 1, 0, len(grid) - 2)
-    w = ((t - grid[i]) / (grid[i + 1] - grid[i])).reshape(-1, *(1,) * (values.ndim - 1))
+    i, w = _between(t, grid)
+    w = w.reshape(-1, *(1,) * (values.ndim - 1))
     return (1.0 - w) * values[i] + w * values[i + 1]
+
+
+def _between(t: np.ndarray, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Index (n,) of the grid's time before each t, and the share of the way to the next (n,)."""
+    i = np.clip(np.searchsorted(grid, t, side="right") - 1, 0, len(grid) - 2)
+    return i, (t - grid[i]) / (grid[i + 1] - grid[i])
 
 
 def interpolate_poses(t: np.ndarray, grid: np.ndarray, T: np.ndarray) -> np.ndarray:
     """Poses (n, 4, 4) at times t from dense poses (m, 4, 4): linear in position, great arcs in rotation."""
-    rotation = Slerp(grid, Rotation.from_matrix(T[:, :3, :3]))(np.clip(t, grid[0], grid[-1]))
+    i, w = _between(np.clip(t, grid[0], grid[-1]), grid)
+    before, after = (Rotation.from_matrix(T[k, :3, :3]) for k in (i, i + 1))
+    rotation = before * Rotation.from_rotvec(w[:, None] * (before.inv() * after).as_rotvec())
     return RigidTransform.from_components(interpolate(t, grid, T[:, :3, 3]), rotation).as_matrix()
 
 
