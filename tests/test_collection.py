@@ -298,9 +298,12 @@ def test_a_collection_is_read_lazily_with_numpy_and_xarray(recorded):
 
 
 def test_a_run_is_repeated_from_its_own_scenario(tmp_path, recorded):
-    from scenarios import steps
+    from scenarios import steps, yaml_file
 
     run = next(recorded.runs())
-    steps.simulate(load(run.folder / "scenario.yaml"), tmp_path / "again")
+    scenario = load(run.folder / "scenario.yaml")
+    yaml_file.write(tmp_path / "written.yaml", scenario)
+    assert (run.folder / "scenario.yaml").read_bytes() == (tmp_path / "written.yaml").read_bytes()
+    steps.simulate(scenario, tmp_path / "again")
     assert tree(tmp_path / "again" / "dataset") == tree(run.folder / "dataset")
     assert tree(tmp_path / "again" / "truth") == tree(run.folder / "truth")
