@@ -43,7 +43,7 @@ class Postures:
         covariance: (n, 6, 6) of its local twist [m, rad]; (n, 3, 3) of its position in the base body's axes where only
             a point was seen; `T_base_hand` then has that point's place.
         misfit: (n,) rms distance of markers from their nominal places in their cluster [m].
-        label: (n,) trial and number, counted from 0; empty where they have no name.
+        label: (n,) trial and number, counted from 0, or time; empty where they have no name.
         point: (3,) the point that was seen, in the hand's frame [m].
     """
 
@@ -131,9 +131,9 @@ def _points(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarra
 def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
     """Postures passed through every `spacing` [s] of these trials, one sample each, their first second left out."""
     found = [_passed(description, trial, robot, spacing) for trial in trials]
-    T, q, S, misfit = (np.concatenate(x) for x in zip(*found, strict=True))
+    T, q, S, misfit, label = (np.concatenate(x) for x in zip(*found, strict=True))
     good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
-    return Postures(q[good], T[good], S[good] * description.sigmas.marker**2, misfit[good])
+    return Postures(q[good], T[good], S[good] * description.sigmas.marker**2, misfit[good], label[good])
 
 
 def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
@@ -144,7 +144,9 @@ def _passed(description: Description, trial: Trial, robot: Clock, spacing: float
     T = inverse(base.T) @ hand.T
     Ad = adjoint(inverse(T))
     S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
-    return T, readings_at(trial, robot, trial.t_mocap[rows], trial.q_motor), S, np.zeros(len(rows))
+    t = trial.t_mocap[rows]
+    label = np.array([f"{trial.id} at {after:.1f} s" for after in t - trial.t_mocap[0]], dtype=str)
+    return T, readings_at(trial, robot, t, trial.q_motor), S, np.zeros(len(rows)), label
 
 
 def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray) -> np.ndarray:

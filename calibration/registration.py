@@ -5,6 +5,8 @@
 The honest baseline: what is left after it is geometry, zeros, play and the base. Those errors are millimetres where the
 markers' noise is a tenth of one, so position and rotation weigh as the datasheet's tolerance of a marker body does, and
 postures passed through in swings count beside the static ones: a baseline must not hang on where the statics lie.
+A posture much farther from the others' fit than they are, `_STRAY` times their median squared distance, is left out and
+named: a robot's own errors are much alike over its workspace. The first guess minimises distances, not their squares.
 With the arm alone moving, all twelve are identifiable once it turns about two directions; where the base stands in the
 lab is not asked.
 """
@@ -14,16 +16,21 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.estimate import Model
-from calibration.hand import nominal_hand
-from calibration.hand_fit import fit_weighted
-from calibration.parameters import registration_parameters
+from calibration.hand import HandModel, nominal_hand
+from calibration.hand_fit import fit_weighted, linearised
+from calibration.map_fit import Fit
+from calibration.parameters import ParameterSet, registration_parameters
 from calibration.postures import Postures
+from calibration.registration_start import registration_start
 from calibration.result import model_of
 from calibration.robot import Chain
 from calibration.schema import Description
 from calibration.verdict import Verdict
 
 STAGE = "registration"
+_STRAY = 16.0  # squared distance over the median one [-]; 2 to 6 is the farthest of clean recordings
+_NEAR = 1e-2  # squared distance, in tolerances, that never strays [-]
+_ROUNDS = 6
 
 
 def register(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
@@ -33,9 +40,7 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
     drawn = np.where(np.arange(12) < told, parameters.tolerance, tol.body_rotation)
     parameters = replace(parameters, tolerance=drawn)
     W = np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)[: postures.components])
-    found = fit_weighted(
-        nominal_hand(chain, parameters.nominal), parameters, postures, np.tile(W, (len(postures), 1, 1))
-    )
+    found, kept = _without_strays(nominal_hand(chain, parameters.nominal), parameters, postures, W)
     model = model_of(STAGE, chain, parameters, found)
     if not found.converged:
         return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not come to rest"),)
@@ -46,5 +51,35 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
         )
         return model, (Verdict(STAGE, "warning", message),)
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
-    message = f"marker frames from {len(postures)} postures; hand {shift:.1f} mm from its drawing"
-    return model, (Verdict(STAGE, "ok", message),)
+    message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from its drawing"
+    said = [Verdict(STAGE, "ok", message)]
+    if not kept.all():
+        odd = np.flatnonzero(~kept)
+        names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
+        message = (
+            f"{len(odd)} of {len(kept)} postures lie far from where all others put the marker frames and were left "
+        )
+        said.append(Verdict(STAGE, "warning", message + f"out, counted from 0: {names}"))
+    return model, tuple(said)
+
+
+def _without_strays(
+    hand: HandModel, parameters: ParameterSet, postures: Postures, W: np.ndarray
+) -> tuple[Fit, np.ndarray]:
+    """The fit of the postures that agree, each residual times W (d, d), and which (n,) they are."""
+
+    def distance(theta: np.ndarray) -> np.ndarray:
+        return np.asarray(((linearised(hand, theta, postures).r @ W) ** 2).sum(axis=1))
+
+    def near(distance: np.ndarray) -> np.ndarray:
+        return distance <= max(_STRAY * float(np.median(distance)), _NEAR)
+
+    start = registration_start(hand.chain.poses(postures.q), postures.T_base_hand, postures.components == 6).frames
+    kept = near(min((distance(theta) for theta in (start, parameters.nominal)), key=np.median))
+    for _ in range(_ROUNDS):
+        used = kept
+        found = fit_weighted(hand, parameters, postures.rows(used), np.tile(W, (int(used.sum()), 1, 1)))
+        kept = near(distance(found.theta))
+        if np.array_equal(kept, used):
+            break
+    return found, used

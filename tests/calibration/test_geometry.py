@@ -206,3 +206,20 @@ def test_registration_has_no_prior_and_geometry_has_the_datasheet_s(chain):
     assert tolerance["geometry.arm_1_joint.x"] == description.tolerances.joint_translation
     assert tolerance["encoder.torso_lift_joint.motor.offset"] == 0.1 * description.tolerances.encoder_offset
     assert len(parameters) == 68
+
+
+@pytest.mark.parametrize("scale, size", [(0.1, 0.05), (1.0, 0.3)])
+def test_wrong_postures_do_not_spoil_the_registration_and_are_named(chain, scale, size):
+    truth, rng = matched.defects(3, scale), np.random.default_rng(3)
+    good = matched.postures(truth, matched.near_postures(rng, 40), 1e-4)
+    rows, T = np.sort(rng.choice(40, 6, replace=False)), good.T_base_hand.copy()
+    T[rows, :3, 3] += size * np.array([1.0, 0.0, 0.0])  # all the same way: the worst for a mean
+    rest = np.setdiff1d(np.arange(40), rows)
+    clean, said = register(chain, matched.described(), good)
+    assert [v.verdict for v in said] == ["ok"]
+    wrong, said = register(chain, matched.described(), replace(good, T_base_hand=T))
+    without, _ = register(chain, matched.described(), good.rows(rest))
+    values = [np.array([p.value for p in model.parameters]) for model in (wrong, without, clean)]
+    np.testing.assert_array_equal(values[0], values[1])
+    assert said[-1].verdict == "warning" and said[-1].message.endswith(", ".join(map(str, rows)))
+    assert np.abs(values[2] - values[1]).max() > 1e-6
