@@ -4,9 +4,10 @@
 
 A rigid cluster's residual is of the size of noise and drilling, whatever its pose. Where it exceeds a tenth of the
 cluster's shortest edge, something is labelled wrongly: the permutation that fits best is taken if it is within that
-limit and no other fits nearly as well; otherwise the body's markers are masked at that instant. A single foreign
-marker is masked alone where the others are rigid without it. A drawing that is off raises the limit to three times the
-trial's usual misfit.
+limit and no other fits nearly as well. Of several that fit, as a cluster alike in two directions has, the one is taken
+that leaves the markers where they were just before and after, if no other comes nearly as near; otherwise the body's
+markers are masked at that instant. A single foreign marker is masked alone where the others are rigid without it. A
+drawing that is off raises the limit to three times the trial's usual misfit.
 """
 
 import logging
@@ -22,6 +23,7 @@ from calibration.schema import Body
 
 _LIMIT = 0.1  # of the shortest edge [-]
 _CLEAR = 3.0  # times better than the next permutation [-]
+_NEAR = 1.0  # [s] within which markers seen rightly tell where they are
 _MOST = 6  # markers of a cluster whose permutations are tried: 720
 _log = logging.getLogger(__name__)
 
@@ -47,7 +49,7 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
         rows = np.flatnonzero(misfit > max(_limit(xyz), _CLEAR * float(np.median(misfit))))
         if not len(rows):
             continue
-        mended = _mended(xyz, position[np.ix_(rows, columns)])
+        mended = _mended(xyz, position[np.ix_(rows, columns)], _places(trial.t_mocap, position[:, columns], rows))
         position = position.copy()
         position[np.ix_(rows, columns)] = mended
         n_masked = int(np.isnan(mended).all(axis=(1, 2)).sum())
@@ -73,18 +75,49 @@ def _misfit(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.sqrt((r**2).sum(axis=(1, 2)) / seen)
 
 
-def _mended(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Markers (n, m, 3) in the order that fits, or NaN."""
+def _places(t: np.ndarray, p: np.ndarray, wrong: np.ndarray) -> np.ndarray:
+    """Where markers p (n, m, 3) are in the `wrong` rows by those around them at t (n,) [s]; NaN where none are near."""
+    right = np.setdiff1d(np.arange(len(t)), wrong)
+    out = np.full((len(wrong), *p.shape[1:]), np.nan)
+    for k in range(p.shape[1]):
+        seen = right[np.isfinite(p[right, k]).all(axis=1)]
+        if not len(seen):
+            continue
+        after = np.clip(np.searchsorted(seen, wrong), 1, max(len(seen) - 1, 1))
+        apart = np.abs(t[wrong] - t[seen[[after - 1, np.minimum(after, len(seen) - 1)]]]).min(axis=0)
+        at = np.stack([np.interp(t[wrong], t[seen], p[seen, k, axis]) for axis in range(3)], axis=1)
+        out[:, k] = np.where(apart[:, None] <= _NEAR, at, np.nan)
+    return out
+
+
+def _mended(xyz: np.ndarray, p: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Markers (n, m, 3) in the order that fits, or NaN; `places` (n, m, 3) is where they were around."""
     m = p.shape[1]
     orders = np.array(list(permutations(range(m)))) if m <= _MOST else np.arange(m)[None]
     found = np.array([_misfit(xyz, p[:, order]) for order in orders])
-    found[:, np.isfinite(p).all(axis=2).sum(axis=1) < 4] = np.inf
-    rank = np.sort(found, axis=0)
-    second = rank[1] if len(rank) > 1 else np.full(len(p), np.inf)
-    clear = (rank[0] <= _limit(xyz)) & (second > _CLEAR * rank[0])
-    best = orders[np.argmin(found, axis=0)]
-    out = np.where(clear[:, None, None], np.take_along_axis(p, best[:, :, None], axis=1), np.nan)
+    fits = found <= _limit(xyz)
+    found[:, np.isfinite(p).all(axis=2).sum(axis=1) < 4] = np.inf  # three say nothing by their shape
+    moved = np.where(fits, np.array([_apart(p[:, order], places) for order in orders]), np.inf)
+    by_shape = _clearest(found) & (fits & np.isfinite(found)).any(axis=0)
+    by_place = _clearest(moved) & np.isfinite(moved).any(axis=0)
+    best = orders[np.where(by_shape, np.argmin(found, axis=0), np.argmin(moved, axis=0))]
+    clear = (by_shape | by_place)[:, None, None]
+    out = np.where(clear, np.take_along_axis(p, best[:, :, None], axis=1), np.nan)
     return _without_one(xyz, p, out)
+
+
+def _clearest(found: np.ndarray) -> np.ndarray:
+    """Where one of the orders (k, n) is far better than all others."""
+    rank = np.sort(found, axis=0)
+    second = rank[1] if len(rank) > 1 else np.full(found.shape[1], np.inf)
+    return np.asarray(second > _CLEAR * rank[0])
+
+
+def _apart(p: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """rms distance (n,) [m] of markers p (n, m, 3) from their places; infinite where no place is known."""
+    d = ((p - places) ** 2).sum(axis=2)
+    known = np.isfinite(d).sum(axis=1)
+    return np.where(known >= 3, np.sqrt(np.nansum(d, axis=1) / np.maximum(known, 1)), np.inf)
 
 
 def _without_one(xyz: np.ndarray, p: np.ndarray, out: np.ndarray) -> np.ndarray:

@@ -52,15 +52,48 @@ def test_a_foreign_marker_is_masked_alone(trial, bodies):
     assert np.isfinite(np.delete(found.marker_position, 6, axis=1)).all()
 
 
-def test_what_fits_in_two_ways_is_masked(trial):
-    square = [[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]]
-    body = Body(
-        name="base", link="base_footprint", markers=[Marker(name=f"base{i}", xyz=p) for i, p in enumerate(square)]
-    )
+def square(trial):
+    """A base that is alike in four directions, standing still."""
+    xyz = [[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]]
+    body = Body(name="base", link="base_footprint", markers=[Marker(name=f"base{i}", xyz=p) for i, p in enumerate(xyz)])
     position = trial.marker_position.copy()
-    position[:, :4] = np.array(square)
-    found, done = with_right_labels([body], swapped(replace(trial, marker_position=position), np.arange(10), 0, 1))
-    assert np.isnan(found.marker_position[:10, :4]).all() and done[0].n_masked == 10
+    position[:, :4] = np.array(xyz)
+    return body, replace(trial, marker_position=position)
+
+
+def test_what_fits_in_two_ways_is_set_right_by_where_the_markers_were(trial):
+    body, still = square(trial)
+    for rows in (np.arange(10), np.arange(100, 130), np.arange(len(still.t_mocap) - 10, len(still.t_mocap))):
+        found, done = with_right_labels([body], swapped(still, rows, 0, 1))
+        np.testing.assert_array_equal(found.marker_position, still.marker_position)
+        assert (done[0].n_mended, done[0].n_masked) == (len(rows), 0)
+
+
+def test_what_fits_in_two_ways_long_after_it_was_right_is_masked(trial):
+    body, still = square(trial)
+    found, done = with_right_labels([body], swapped(still, np.arange(240), 0, 1))
+    assert np.isnan(found.marker_position[:135, :4]).all() and done[0].n_masked == pytest.approx(140, abs=2)
+    np.testing.assert_array_equal(found.marker_position[145:], still.marker_position[145:])
+
+
+def test_what_fits_in_two_ways_and_moved_as_far_as_they_are_apart_is_masked(trial):
+    body, still = square(trial)
+    turned = still.marker_position.copy()
+    turned[:110, :4] = turned[:110, [1, 2, 3, 0]]  # the base turned by a quarter while its labels were wrong
+    found, done = with_right_labels([body], swapped(replace(still, marker_position=turned), np.arange(100, 120), 0, 1))
+    assert done[0].n_masked > 0
+    true = still.marker_position[0, :4]
+    for p in found.marker_position[100:120, :4]:
+        assert np.isnan(p).all() or np.allclose(p, true) or np.allclose(p, true[[1, 2, 3, 0]])
+
+
+def test_exchanged_labels_of_three_markers_in_sight_are_set_right_by_where_they_were(trial, bodies):
+    position = trial.marker_position.copy()
+    position[90:140, 6] = np.nan
+    hidden = replace(trial, marker_position=position)
+    found, done = with_right_labels(bodies, swapped(hidden, np.arange(100, 130), 4, 7))
+    np.testing.assert_array_equal(found.marker_position, position)
+    assert [(d.n_mended, d.n_masked) for d in done] == [(30, 0)]
 
 
 def test_a_dataset_gives_trials_with_their_labels_right(truth, trial, tmp_path):

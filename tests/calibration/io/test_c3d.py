@@ -59,6 +59,20 @@ def test_markers_and_wrenches_come_back_to_the_rounding_of_float32(lab, file):
     assert load(lab.out).description.mocap_clock == ()
 
 
+def test_moments_are_about_the_setup_s_centre_where_the_file_s_is_a_little_off(lab, tmp_path):
+    off, true = np.array([1e-3, -1.5e-3, 0.0]), trial()
+    moved = described().model_copy(update={"plates": tuple(
+        p.model_copy(update={"centre": tuple(np.array(p.centre) + off)}) for p in described().plates
+    )})  # fmt: skip
+    about = true.plate_wrench.copy()
+    about[..., 3:] -= np.cross(off, about[..., :3])
+    write_c3d(tmp_path / "log.c3d", replace(true, plate_wrench=about, plate_centre=true.plate_centre + off), moved)
+    lab.run(mapping(), tmp_path / "log.c3d", kind="c3d")
+    ((_, found),) = load(lab.out).trials("calibration")
+    assert np.abs(found.plate_wrench - true.plate_wrench)[..., 3:].max() < MOMENT
+    assert np.abs(about - true.plate_wrench)[..., 3:].max() > 0.3, "half a newton metre is at stake"
+
+
 def test_the_same_trial_gives_the_same_bytes(tmp_path, file):
     write_c3d(tmp_path / "b.c3d", trial(), described(), DEPTH)
     assert sha256(file) == sha256(tmp_path / "b.c3d")
@@ -206,8 +220,13 @@ def test_files_without_a_time_of_their_own_need_a_start_each(lab, capsys, file):
 
 
 def test_static_postures_are_marked_by_events(lab, tmp_path):
-    dwells = np.array([[100.31, 100.87], [101.13, 101.99]])
-    static = replace(trial(), dwell_start=dwells[:, 0], dwell_stop=dwells[:, 1], approach=np.zeros((2, 8), np.int8))
+    dwells = np.array([[100.31, 100.87], [161.13, 161.99]])  # the second one in the second minute
+    static = replace(
+        trial(65.0, rate=20.0, plate_rate=100.0),
+        dwell_start=dwells[:, 0],
+        dwell_stop=dwells[:, 1],
+        approach=np.zeros((2, 8), np.int8),
+    )
     write_c3d(tmp_path / "log.c3d", static, described())
     described_ = mapping(trials=[{"id": "log", "role": "calibration", "kind": "static"}])
     described_["c3d"]["dwell_events"] = ["dwell start", "dwell stop"]
