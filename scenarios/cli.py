@@ -80,12 +80,23 @@ def run(
 
 @app.command()
 def simulate(
-    scenario: ScenarioName, out: Out, seed: Seed = None, quick: Quick = False, overrides: Overrides = None
+    scenario: ScenarioName,
+    out: Out,
+    seed: Seed = None,
+    quick: Quick = False,
+    overrides: Overrides = None,
+    also: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Record the postures of a record_next.yaml, too.")
+    ] = None,
 ) -> None:
     """Write dataset/ and truth/ of a scenario."""
     from scenarios import console, steps
 
     loaded = steps.load(scenario, overriding(overrides, seed))
+    if also is not None:
+        from scenarios.design import recording_too
+
+        loaded = recording_too(loaded, also)
     with console.progress() as progress:
         steps.simulate(loaded.quick() if quick else loaded, out, progress)
     typer.echo(f"Dataset: {out / 'dataset'}\nTruth: {out / 'truth'}")

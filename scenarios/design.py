@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenarios import folder
+from scenarios.errors import ScenarioError
 
 if TYPE_CHECKING:
     from calibration.design import Criterion
@@ -71,6 +72,34 @@ def _work() -> "Sample":
         return rng.permutation(postures.draw(nominal, n, rng))
 
     return draw
+
+
+def recording_too(scenario: "Scenario", file: Path) -> "Scenario":
+    """The scenario with the postures of a file after its own calibration postures, each reached from its side.
+
+    Raises:
+        InputError: It is no file of postures and motions.
+        ScenarioError: It is of another robot, or asks for no posture.
+    """
+    import mjcf
+    from calibration.remedy import read_remedies
+    from twin.motions import JOINTS, RATE
+    from twin.schedule import schedule
+
+    joints, remedies = read_remedies(file)
+    asked = [p for r in remedies for p in r.postures]
+    if joints != JOINTS:
+        raise ScenarioError(f"{file}: joints are {list(joints)}; the twin has {list(JOINTS)}")
+    if not asked:
+        raise ScenarioError(f"{file}: asks for no posture; motions are recorded by hand, see its `motions`")
+    campaign = scenario.twin.campaign
+    own = schedule(replace(campaign, only=("postures",)), mjcf.spec().compile(), scenario.seed)[0]
+    rests = [tuple(map(float, own.command[round(stop * RATE)])) for _, stop in own.dwells]
+    sides = campaign.given_approaches or ((0,) * len(JOINTS),) * len(rests)
+    given: Any = (*rests, *(p.q for p in asked))
+    approaches: Any = (*sides, *(p.approach for p in asked))
+    changed = replace(campaign, given_postures=given, given_approaches=approaches)
+    return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)})
 
 
 def recording(scenario: "Scenario", plan: "Plan") -> "Scenario":
