@@ -18,7 +18,7 @@ from calibration.remedy import read_remedies, to_text
 from calibration.shapes import shapes_of
 from calibration.sight import in_sight, visible
 from scenarios import load, yaml_file
-from scenarios.design import design, recording
+from scenarios.design import design, recording, recording_too
 from scenarios.errors import ScenarioError
 from tests.calibration import matched
 from twin.declare import declaration
@@ -223,3 +223,17 @@ def test_approaches_that_are_not_one_a_posture_are_refused():
             "humanoids2024",
             [f"twin.campaign.given_postures={given}", "twin.campaign.given_approaches=[[0,1,1,1,1,1,1,1]]"],
         )
+
+
+def test_what_an_estimate_asks_for_is_recorded_after_the_scenario_s_own_postures(found, tmp_path):
+    remedy = replace(found.remedy("geometry", "too few"), postures=found.postures[:8])
+    (tmp_path / "record_next.yaml").write_text(to_text(DESCRIBED.joint_names, [remedy]))
+    plain = load("humanoids2024", ["twin.campaign.calibration_postures=5"])
+    both = recording_too(plain, tmp_path / "record_next.yaml").twin.campaign
+    alone = schedule(plain.twin.campaign, mjcf.spec().compile(), plain.seed)[0]
+    rests = [alone.command[round(stop * RATE)] for _, stop in alone.dwells]
+    np.testing.assert_allclose(both.given_postures, [*rests, *(p.q for p in remedy.postures)], atol=1e-12)
+    assert both.given_approaches == ((0,) * 8,) * 5 + tuple(p.approach for p in remedy.postures)
+    (tmp_path / "other.yaml").write_text(to_text(("a",), []))
+    with pytest.raises(ScenarioError, match="joints are"):
+        recording_too(plain, tmp_path / "other.yaml")
