@@ -44,3 +44,19 @@ def test_the_rank_is_that_of_the_model_for_any_postures_in_any_order(torso, comp
         found += [told(rows, components=components, **where) for rows in (q, q[::-1], q[np.argsort(q[:, 3])])]
     assert {(known.rank, known.clear) for known in found} == {(rank, True)}
     assert len({known.base for known in found[:3]}) == len({known.status for known in found[:3]}) == 1
+
+
+@pytest.mark.parametrize("torso, on_the_axis", [(True, 31), (False, 29)])
+def test_off_the_axis_of_arm_7_two_more_are_seen_in_proportion_to_the_distance_never_one(torso, on_the_axis):
+    """They are arm_7's tilts about the two axes across its own: a marker at the distance a moves by a times the tilt.
+
+    So 31 or 33 of one marker. 29 of a marker on arm_6 plus three coordinates on arm_7 would be 32, but 29 hold the
+    coordinate along the axis already.
+    """
+    q, weak = matched.random_angles(np.random.default_rng(0), 60, torso), []
+    for distance in (1e-4, 1e-3):
+        known = told(q, tool="arm_7_link", hand=np.r_[distance, 0.0, 0.1, np.zeros(3)], components=3)
+        assert known.rank == on_the_axis + 2 and known.clear
+        weak.append(known.singular_values[on_the_axis : on_the_axis + 2] / known.singular_values[0])
+        assert known.singular_values[on_the_axis - 1] > 10.0 * known.singular_values[on_the_axis]
+    np.testing.assert_allclose(weak[1] / weak[0], 10.0, rtol=0.01)
