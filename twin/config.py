@@ -8,7 +8,7 @@ any value that is given as a distribution (`twin.uncertain`).
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
@@ -32,6 +32,9 @@ from twin.config_values import (
 )
 from twin.uncertain import DRAWN
 
+ArmLink = Literal[
+    "arm_1_link", "arm_2_link", "arm_3_link", "arm_4_link", "arm_5_link", "arm_6_link", "arm_7_link"
+]  # fmt: skip
 TrialName = Literal[
     "postures", "sweeps", "around_x", "around_y", "around_z", "x_fold", "y_fold",
     "xyz", "xyz_mirror", "push", "postures_validation",
@@ -52,6 +55,7 @@ class WheelType:
         torsion_damping: Bushing crx, cry, crz [N.m.s/rad].
         torsional_friction: Of the contact, moment about the normal over normal force [m].
         rolling_friction: Of the contact, moment about a tangent over normal force [m].
+        guide_friction: Coulomb's, of the bushing along z [N]: a vertical load below it moves the contact alone.
     """
 
     stiffness: tuple[Positive, Positive, Positive]
@@ -63,6 +67,7 @@ class WheelType:
     torsion_damping: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     torsional_friction: NonNegative = 0.02
     rolling_friction: NonNegative = 0.02
+    guide_friction: NonNegative = 0.0
 
     @field_validator("torsion")
     @classmethod
@@ -91,6 +96,15 @@ class Base:
     caster_back: WheelType
     pose: Point
     wheels: Literal["contact", "anchored", "rigid"] = "contact"
+
+    @field_validator("wheels")
+    @classmethod
+    def _guided(cls, wheels: str, info: ValidationInfo) -> str:
+        """Anchored wheels are linear, rigid ones have no guides."""
+        types = (info.data.get(k) for k in ("drive", "caster_front", "caster_back"))
+        if wheels != "contact" and any(t is not None and t.guide_friction > 0.0 for t in types):
+            raise ValueError(f"guide_friction needs wheels: contact, found {wheels}; set it to 0 for all three types")
+        return wheels
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -122,6 +136,7 @@ class Widths:
         mount_translation: Where the arm is bolted on, per axis, on top of its first joint's placement [m].
         mount_rotation: The same, per axis [rad].
         spread: Half width of the uniform factor on offsets and gaps [-]; 0 leaves them as written.
+        mass_scales: Mass of a link over the datasheet's, where it is of another make [-]; the others' is 1.
     """
 
     placement_translation: NonNegative
@@ -131,6 +146,7 @@ class Widths:
     spread: Annotated[float, Field(ge=0.0, le=0.9), DRAWN] = 0.0
     mount_translation: NonNegative = 0.0
     mount_rotation: NonNegative = 0.0
+    mass_scales: dict[ArmLink, Annotated[float, Field(ge=0.3, le=3.0), DRAWN]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, config=STRICT)

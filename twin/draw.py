@@ -86,10 +86,12 @@ def _masses(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> tuple[Lin
         n for n in links if nominal.body(n).mass[0] > 0 and n.startswith(("torso", "head", "arm", "wrist", "gripper"))
     ]
     w = config.widths
+    make: dict[str, float] = {str(link): scale for link, scale in w.mass_scales.items()}
 
     def one(link: str) -> LinkMass:
         rng = generator(seed, "mass", link)
-        return LinkMass(link, 1.0 + w.link_mass * float(rng.uniform(-1.7, 1.7)), w.link_com * rng.normal(size=3))
+        scale = make.get(link, 1.0) * (1.0 + w.link_mass * float(rng.uniform(-1.7, 1.7)))
+        return LinkMass(link, scale, w.link_com * rng.normal(size=3))
 
     return tuple(one(link) for link in heavy)
 

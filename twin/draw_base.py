@@ -32,9 +32,13 @@ def _wheel(nominal: mjcf.Wheel, of: WheelType, ground: str) -> Wheel:
         f"{nominal.name}_contact",
         nominal.centre,
         nominal.contact,
-        bushing=None if ground == "rigid" else Bushing(of.stiffness, of.damping, of.torsion, of.torsion_damping),
+        bushing=None if ground == "rigid" else _bushing(of),
         footing=None if ground == "anchored" else _contact(of),
     )
+
+
+def _bushing(of: WheelType) -> Bushing:
+    return Bushing(of.stiffness, of.damping, of.torsion, of.torsion_damping, of.guide_friction)
 
 
 def _contact(of: WheelType) -> Contact:

@@ -24,7 +24,7 @@ from twin.measure import measure
 from twin.randomness import generator
 from twin.simulate import simulate
 
-RAMP = (0.08, 0.15)  # [s] in which the log's motions start and stop
+RAMP = (0.07, 0.09)  # [s] in which the log's hand starts: its markers show it, samples are 10 ms apart
 _SLOW = 2.5  # [Hz]
 _TRANSIENT = 3.0  # [s] after a start in which a swing is not steady
 _OPERATORS = 8

@@ -5,7 +5,9 @@ import pinocchio as pin
 import pytest
 
 import mjcf
+from scenarios import load
 from twin.build import build
+from twin.campaign import laboratory
 from twin.defects.contact import Chatters
 from twin.defects.gear import Gear
 from twin.defects.loads import LinkMass, Payload
@@ -65,6 +67,14 @@ def test_masses_and_payload_are_as_declared(lab, nominal):
             assert d.scale != 1.0
     payload = next(d for d in lab.robot.defects if isinstance(d, Payload))
     assert model.body("payload").mass[0] == payload.mass == 0.437
+
+
+def test_a_link_of_another_make_has_another_mass_and_the_same_scatter(lab):
+    heavier = laboratory(load("humanoids2024", ["twin.widths.mass_scales.arm_5_link=1.5"]).quick().twin, 0)
+    ratio = {d.link: d.scale for d in heavier.robot.defects if isinstance(d, LinkMass)}
+    for d in lab.robot.defects:
+        if isinstance(d, LinkMass):
+            assert ratio[d.link] / d.scale == pytest.approx(1.5 if d.link == "arm_5_link" else 1.0)
 
 
 def test_contacts_that_would_chatter_are_refused(lab):

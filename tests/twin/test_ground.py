@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from scenarios import load
+from scenarios.errors import ScenarioError
 from twin import motions, truth
 from twin.campaign import laboratory
 from twin.simulate import simulate
@@ -41,3 +42,19 @@ def test_an_anchored_base_presses_on_the_plate_with_its_weight(anchored, config)
 def test_infinite_stiffness_is_null_in_a_file(tmp_path):
     truth.write_parameters(tmp_path / "truth.json", [], {"K": np.diag([np.inf, 2.0])})
     assert json.loads((tmp_path / "truth.json").read_text())["derived"]["K"] == [[None, 0.0], [0.0, 2.0]]
+
+
+def test_guides_rub_along_the_vertical_and_are_in_the_truth():
+    lab = laboratory(load("humanoids2024", ["twin.base.drive.guide_friction=7.0"]).twin, 0)
+    true = {p.name: p.value for p in lab.twin.truth}
+    for wheel in lab.robot.wheels:
+        found = [lab.twin.model.joint(f"{wheel.name}.{a}").frictionloss[0] for a in "xyz"]
+        rubs = wheel.name.startswith("wheel")
+        assert found == [0.0, 0.0, 7.0 if rubs else 0.0]
+        assert true.get(f"suspension.{wheel.name}.guide_friction") == (7.0 if rubs else None)
+
+
+@pytest.mark.parametrize("ground", ["anchored", "rigid"])
+def test_wheels_without_guides_have_no_friction_in_them(ground):
+    with pytest.raises(ScenarioError, match="guide_friction needs wheels: contact"):
+        load("humanoids2024", [f"twin.base.wheels={ground}", "twin.base.caster_back.guide_friction=7.0"])

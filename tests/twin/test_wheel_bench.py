@@ -29,9 +29,9 @@ BENCH = f"""
 </mujoco>"""
 
 
-def stand(k, c, kn, bn, step):
+def stand(k, c, kn, bn, step, guide_friction=0.0):
     """A wheel on its bushing and contact; the model."""
-    bushing = Bushing((1.4e4, 1.4e4, k), (60.0, 60.0, c))
+    bushing = Bushing((1.4e4, 1.4e4, k), (60.0, 60.0, c), guide_friction=guide_friction)
     hub, foot = (0.0, 0.0, 0.05), (0.0, 0.0, 0.0)
     wheel = Wheel("caster", "caster", "caster_contact", hub, foot, bushing, Contact(kn, bn, 0.25))
     return build(mujoco.MjSpec.from_string(BENCH), [wheel], timestep=step).model
@@ -111,3 +111,34 @@ def test_a_contact_on_which_the_light_wheel_would_hop_is_refused(kn, bears):
     else:
         with pytest.raises(Chatters, match="contact stiffness 3e.06 N/m of 'caster' makes the wheel hop"):
             stand(1.7e5, 300.0, kn, 200.0, 1e-3)
+
+
+def test_a_guide_that_rubs_holds_until_twice_its_friction_is_taken_off():
+    """(F + M g - f) / k when pressed by F, the contact alone while less than 2 f is taken off, (M g + f) / k beyond."""
+    k, kn, f = 1.7e5, 8e5, 10.0
+    model = stand(k, 2500.0, kn, 200.0, 1e-3, f)
+    data, base = mujoco.MjData(model), model.body("base_footprint").id
+    guide = []
+    _pressed(model, data, base, 0.0, 2.0)
+    for load in (4.0 * f, 3.0 * f, 0.0):
+        _pressed(model, data, base, load, 3.0)
+        guide.append(data.joint("caster.z").qpos[0])
+        assert data.joint("root.z").qpos[0] + guide[-1] == pytest.approx(-(load + (M + m) * G) / kn, rel=1e-2)
+    np.testing.assert_allclose(guide, np.array([3.0 * f + M * G, 3.0 * f + M * G, f + M * G]) / k, rtol=2e-3)
+
+
+def test_a_guide_at_rest_does_not_creep():
+    model = stand(1.7e5, 2500.0, 8e5, 200.0, 1e-3, 10.0)
+    data, base = mujoco.MjData(model), model.body("base_footprint").id
+    _pressed(model, data, base, 8.0, 2.0)
+    held = data.joint("caster.z").qpos[0]
+    _pressed(model, data, base, 8.0, 20.0)
+    assert abs(data.joint("caster.z").qpos[0] - held) < 1e-8
+
+
+def _pressed(model, data, base, load, duration):
+    """Press the base down with a load [N], put on over the first half of the time: nothing bounces past its rest."""
+    n, before = round(duration / model.opt.timestep), -data.xfrc_applied[base, 2]
+    for share in np.minimum(2.0 * np.arange(1, n + 1) / n, 1.0):
+        data.xfrc_applied[base, 2] = -(before + share * (load - before))
+        mujoco.mj_step(model, data)

@@ -1,6 +1,6 @@
 """The elastic part between the base and one wheel, in base axes.
 
-F = k s + c ds/dt                 three slides
+F = k s + c ds/dt                 three slides; + f sign(ds/dt) along z, where the wheel is guided
 M = k_r phi + c_r dphi/dt         hinges about the hub, where the wheel can turn against the base
 
 Where friction holds a wheel of mass m, MuJoCo finds the friction for m alone and then steps with m + h c, since
@@ -18,6 +18,8 @@ from twin.errors import TwinError
 
 Vector = tuple[float, float, float]
 DIRECTIONS = "xyz"
+_Z = 2
+_RUBS = (0.002, 1.0)  # MuJoCo's default, 0.02 s, lets a guide creep at half its friction
 _AHEAD = 0.5  # h k / (m b), at most
 _NONE = (0.0, 0.0, 0.0)
 
@@ -41,12 +43,14 @@ class Bushing:
         damping: cx, cy, cz [N.s/m].
         torsion: krx, kry, krz [N.m/rad]; 0: the wheel is fixed to the base about that axis.
         torsion_damping: crx, cry, crz [N.m.s/rad].
+        guide_friction: f [N].
     """
 
     stiffness: Vector
     damping: Vector
     torsion: Vector = _NONE
     torsion_damping: Vector = _NONE
+    guide_friction: float = 0.0
 
     @property
     def k(self) -> np.ndarray:
@@ -70,6 +74,8 @@ class Bushing:
                     axis=R_wheel_base[:, i % 3],
                     stiffness=np.array([k, 0.0, 0.0]),
                     damping=np.array([c, 0.0, 0.0]),
+                    frictionloss=self.guide_friction if i == _Z else 0.0,
+                    solref_friction=_RUBS,
                 )
 
     def tune_held(self, model: mujoco.MjModel, name: str, body_name: str, geom_name: str) -> None:

@@ -95,6 +95,8 @@ class Wheel(Defect):
                 if np.any(self.bushing.torsion):
                     turning = zip(DIRECTIONS, values[3:], strict=True)
                     found += [Parameter(f"{s}r{a}", f"N.m{unit}/rad", float(v)) for a, v in turning]
+            if self.bushing.guide_friction > 0.0:
+                found.append(Parameter(f"suspension.{self.name}.guide_friction", "N", self.bushing.guide_friction))
         if self.footing is not None:
             found += self.footing.parameters(self.name)
         return tuple(found)
