@@ -8,10 +8,11 @@ any value that is given as a distribution (`twin.uncertain`).
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
+from twin.config_base import Base
 from twin.config_datasheet import Datasheet
 from twin.config_departures import Departures
 from twin.config_driving import Driving
@@ -25,7 +26,6 @@ from twin.config_values import (
     GivenApproaches,
     GivenPosture,
     NonNegative,
-    Point,
     Positive,
     Value,
     Vector3,
@@ -39,72 +39,6 @@ TrialName = Literal[
     "postures", "sweeps", "around_x", "around_y", "around_z", "x_fold", "y_fold",
     "xyz", "xyz_mirror", "push", "postures_validation",
 ]  # fmt: skip
-
-
-@dataclass(frozen=True, config=STRICT)
-class WheelType:
-    """How one type of wheel stands.
-
-    Attributes:
-        stiffness: Bushing kx, ky, kz [N/m].
-        damping: Bushing cx, cy, cz [N.s/m].
-        contact_stiffness: Normal, on the floor [N/m].
-        contact_damping: Normal, on the floor [N.s/m].
-        friction: Coefficient mu [-].
-        torsion: Bushing krx, kry, krz [N.m/rad]: krz alone, or all three; 0: fixed to the base about that axis.
-        torsion_damping: Bushing crx, cry, crz [N.m.s/rad].
-        torsional_friction: Of the contact, moment about the normal over normal force [m].
-        rolling_friction: Of the contact, moment about a tangent over normal force [m].
-        guide_friction: Coulomb's, of the bushing along z [N]: a vertical load below it moves the contact alone.
-    """
-
-    stiffness: tuple[Positive, Positive, Positive]
-    damping: tuple[NonNegative, NonNegative, NonNegative]
-    contact_stiffness: Positive
-    contact_damping: NonNegative
-    friction: NonNegative
-    torsion: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
-    torsion_damping: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
-    torsional_friction: NonNegative = 0.02
-    rolling_friction: NonNegative = 0.02
-    guide_friction: NonNegative = 0.0
-
-    @field_validator("torsion")
-    @classmethod
-    def _carried(cls, torsion: Vector3) -> Vector3:
-        """A wheel that can tilt about one tangent alone would roll away."""
-        if (torsion[0] > 0.0) != (torsion[1] > 0.0) or (torsion[0] > 0.0 and torsion[2] == 0.0):
-            raise ValueError("torsional stiffness about z alone or about x, y and z; the others must be 0")
-        return torsion
-
-
-@dataclass(frozen=True, config=STRICT)
-class Base:
-    """How the base stands.
-
-    Attributes:
-        drive: The two driven wheels, braked.
-        caster_front: The two casters in front.
-        caster_back: The two casters behind; each pair stands as the last drive has turned it.
-        pose: x, y [m] and yaw [rad] of the base in the lab.
-        wheels: `contact`: on bushings, by contacts that stick and slip; `anchored`: on bushings whose lower ends are
-            fixed in the floor, a linear base; `rigid`: without bushings, on soft contacts alone.
-    """
-
-    drive: WheelType
-    caster_front: WheelType
-    caster_back: WheelType
-    pose: Point
-    wheels: Literal["contact", "anchored", "rigid"] = "contact"
-
-    @field_validator("wheels")
-    @classmethod
-    def _guided(cls, wheels: str, info: ValidationInfo) -> str:
-        """Anchored wheels are linear, rigid ones have no guides."""
-        types = (info.data.get(k) for k in ("drive", "caster_front", "caster_back"))
-        if wheels != "contact" and any(t is not None and t.guide_friction > 0.0 for t in types):
-            raise ValueError(f"guide_friction needs wheels: contact, found {wheels}; set it to 0 for all three types")
-        return wheels
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -1,7 +1,7 @@
 """From what a scenario says of the base to its wheels on one of three grounds (`twin.defects.ground`)."""
 
 import mjcf
-from twin.config import Base, WheelType
+from twin.config_base import Base, WheelType
 from twin.defects.anchored import Anchored
 from twin.defects.base import Defect
 from twin.defects.bushing import Bushing

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import mjcf
 from twin.build import Twin, build
-from twin.config import Base
+from twin.config_base import Base
 from twin.conventions import states_with_their_sensors, transform
 from twin.draw_base import ground, wheels_of
 from twin.errors import Diverged

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.realism.recorded import Recorded
-from twin.config import Base, TwinConfig
+from twin.config import TwinConfig
+from twin.config_base import Base
 from twin.instruments.plate import draw
 from twin.randomness import generator
 from twin.replay import Pull, carriage, replay
