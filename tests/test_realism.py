@@ -153,7 +153,7 @@ def test_the_swings_start_at_full_speed_under_the_joints_limits():
 
 @pytest.mark.slow
 def test_the_log_moves_among_the_draws_where_the_floor_holds_what_the_plate_read(log):
-    """y, z and pitch as drawn; roll and yaw with twice the friction, for the drawn floor's is less than the jerk needs."""
+    """y, z and pitch as drawn; roll and yaw with twice the friction: the drawn is less than the jerk needs."""
     trials = recorded(load_dataset(log))
     drawn, held = (compare_replay(load("reality"), trials, 20, grip) for grip in (1.0, 2.0))
     assert min(drawn.share[k] for k in (1, 2, 4)) >= 0.8

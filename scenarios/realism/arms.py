@@ -4,8 +4,8 @@
 
 The log has three markers on the gripper and no joint angles. From random postures c, A, f, the markers' place on the
 gripper and the base's on the plate (1 cm, 30 mrad) were fitted to the paths of all three over two cycles, 0.9 x 0.5 x
-0.3 m and 0.8 rad: 2.3 mm rms, f = 0.1972 Hz. Free phases came out 0 or pi: all joints start at their highest speed. Kept
-is every fit within 3 mm, under the joints' limits, clear of the body, its markers within 0.2 m of the grasping frame,
+0.3 m and 0.8 rad: 2.3 mm rms, f = 0.1972 Hz. Free phases came out 0 or pi: all joints start at their highest speed.
+Kept is every fit within 3 mm, inside limits, clear of the body, its markers within 0.2 m of the grasping frame,
 as far as the hand reaches; fits that differ only in arm_7's angle, which the markers' place makes up for, are one. All
 of them turn arm_1, arm_2 and arm_4 by 0.80, 0.72 and -0.69 rad. Which of them moves a robot is drawn.
 """
