@@ -1,10 +1,11 @@
 """What hangs on the wrist's force-torque sensor, weighed by it in static postures.
 
-    f = m a + f_0        tau = h x a + tau_0        a = R_base_sensor(q)' g,   h = m c
+    f = R_base_sensor' w + f_0        tau = h x a + tau_0        m = |w| / |g|,   a = R_base_sensor' w / m,   h = m c
 
-f, tau: ACTION of what hangs there on the sensor, its axes, about its origin; m its mass [kg], c its centre [m], f_0 and
-tau_0 the sensor's zeros. Linear in (m, f_0) and in (h, tau_0); standard deviations from the residuals. A gain of the
-sensor's passes for mass: a sensor that is 1 % off weighs 1 % wrong. The base is taken to stand level.
+f, tau: ACTION of what hangs there on the sensor, its axes, about its origin; w its weight [N, base], m its mass [kg], c
+its centre [m], f_0 and tau_0 the sensor's zeros. Linear in (w, f_0) and then in (h, tau_0); standard deviations from
+the residuals. A base out of level turns w and not m. A gain of the sensor's passes for mass: a sensor that is 1 % off
+weighs 1 % wrong.
 Nominal: all links of the drawing beyond the sensor, and the declared payload where it hangs there.
 """
 
@@ -71,11 +72,13 @@ def weigh(R: np.ndarray, wrench: np.ndarray, gravity: np.ndarray) -> Hanging:
             "record some with the hand up, down and on its side"
         )
     zero = np.broadcast_to(np.eye(3), (len(a), 3, 3))
-    m, C_m = _least_squares(np.concatenate([a[:, :, None], zero], axis=2), wrench[:, :3])
+    w, C_w = (x[..., :3] for x in _least_squares(np.concatenate([np.swapaxes(R, 1, 2), zero], axis=2), wrench[:, :3]))
+    along, g = w / np.linalg.norm(w), float(np.linalg.norm(gravity))
+    a = g * np.swapaxes(R, 1, 2) @ along
     h, C_h = _least_squares(np.concatenate([-skew(a), zero], axis=2), wrench[:, 3:])
     covariance = np.zeros((4, 4))
-    covariance[0, 0], covariance[1:, 1:] = C_m[0, 0], C_h[:3, :3]
-    return Hanging(float(m[0]), h[:3], covariance)
+    covariance[0, 0], covariance[1:, 1:] = along @ C_w[:3] @ along / g**2, C_h[:3, :3]
+    return Hanging(float(w @ along) / g, h[:3], covariance)
 
 
 def _least_squares(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

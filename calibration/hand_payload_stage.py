@@ -1,6 +1,11 @@
-"""What the wrist's sensor says hangs on it, held against the drawing and the declared payload."""
+"""What the wrist's sensor says hangs on it, held against the drawing and the declared payload.
 
-from collections.abc import Iterator, Sequence
+    R_base_sensor = R_base_B R_B_H R_H_tool R_tool_sensor       R_B_H measured by the markers in each dwell
+
+Angles behind gears would not do: a hand that sags by 10 mrad always sags with gravity, and weighs 1 % less.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -8,9 +13,10 @@ from calibration.clock import Clock
 from calibration.errors import NotEnoughData
 from calibration.hand import HandModel
 from calibration.hand_payload import Hanging, drawn, weigh
-from calibration.postures import dwell_windows
+from calibration.postures import Postures, dwell_windows
 from calibration.recording import Trial
 from calibration.schema import Description
+from calibration.se3 import from_vector, inverse
 from calibration.verdict import Verdict
 
 _STAGE = "geometry"
@@ -19,7 +25,12 @@ _FEW = 5  # samples of a dwell
 
 
 def weighed(
-    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock | None, hand: HandModel
+    urdf: str,
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock | None,
+    hand: HandModel,
+    postures: Postures,
 ) -> tuple[Verdict, ...]:
     """What is to be said of the load of the hand; nothing where no wrist was recorded.
 
@@ -29,6 +40,7 @@ def weighed(
         trials: Continuous ones; their dwells count.
         robot: The robot's clock.
         hand: The calibrated robot.
+        postures: Those of the trials that show base and hand.
     """
     recorded = [trial for trial in trials if np.isfinite(trial.wrist_wrench).any()]
     if not recorded or robot is None:
@@ -36,26 +48,37 @@ def weighed(
     link = description.wrist_link
     if link is None:
         return (Verdict(_STAGE, "missing", "wrist_wrench is recorded, but wrist_link does not say where: not used"),)
-    rows = list(_means(recorded, robot))
+    w = _means(recorded, robot)
+    rows = [k for k, label in enumerate(postures.label) if label in w and postures.components == 6]
     if not rows:
         return (Verdict(_STAGE, "missing", "wrist_wrench is recorded, but in no static posture: not used"),)
-    q, w = (np.array(x) for x in zip(*rows, strict=True))
-    R = hand.chain.poses(hand.angles(q), link)[:, :3, :3]
+    seen = postures.rows(np.array(rows))
+    R = _turned(hand, seen, link)
     try:
-        found = weigh(R, w, np.array(description.gravity))
+        found = weigh(R, np.array([w[label] for label in seen.label]), np.array(description.gravity))
     except NotEnoughData as error:
         return (Verdict(_STAGE, "missing", str(error)),)
-    return (_judged(found, drawn(urdf, description, link), link, len(q)),)
+    return (_judged(found, drawn(urdf, description, link), link, len(seen)),)
 
 
-def _means(trials: Sequence[Trial], robot: Clock) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Mean readings (n_joints,) and wrench (6,) of each dwell."""
+def _turned(hand: HandModel, postures: Postures, link: str) -> np.ndarray:
+    """R_base_sensor (n, 3, 3)."""
+    q = hand.angles(postures.q)
+    T_base_tool = from_vector(hand.base) @ postures.T_base_hand @ inverse(from_vector(hand.hand)[None])
+    T_tool_sensor = inverse(hand.chain.poses(q)) @ hand.chain.poses(q, link)
+    return np.asarray((T_base_tool @ T_tool_sensor)[:, :3, :3])
+
+
+def _means(trials: Sequence[Trial], robot: Clock) -> dict[str, np.ndarray]:
+    """Mean wrench (6,) of each dwell by the label of its posture."""
+    found = {}
     for trial in trials:
         t, known = robot.to_mocap(trial.t_robot), np.isfinite(trial.wrist_wrench).all(axis=1)
-        for start, stop in dwell_windows(trial):
+        for k, (start, stop) in enumerate(dwell_windows(trial)):
             rows = (t >= start) & (t <= stop) & known
             if rows.sum() >= _FEW:
-                yield trial.q_motor[rows].mean(axis=0), trial.wrist_wrench[rows].mean(axis=0)
+                found[f"{trial.id} {k}"] = trial.wrist_wrench[rows].mean(axis=0)
+    return found
 
 
 def _judged(found: Hanging, expected: Hanging, link: str, n: int) -> Verdict:

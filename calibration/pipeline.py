@@ -161,7 +161,7 @@ def _weighed(work: Work, model: Model) -> tuple[Verdict, ...]:
     declared = {entry.id for entry in work.dataset.entries("calibration") if entry.payload is None}
     trials = [trial for trial in work.trials if trial.id in declared]
     hand = model.hand(work.chain, nominal_frames(work.chain, work.description))
-    return weighed(work.dataset.urdf, work.description, trials, work.clock("robot"), hand)
+    return weighed(work.dataset.urdf, work.description, trials, work.clock("robot"), hand, postures_of(work))
 
 
 def _calibrate_joints(work: Work) -> Work:

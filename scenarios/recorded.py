@@ -12,6 +12,8 @@ from calibration.recording import Trial
 from calibration.schema import TrialEntry
 from scenarios.plots.recording import holes
 
+_REST = 1.0  # [s] at both ends of a trial
+
 
 @dataclass(frozen=True)
 class Looked:
@@ -38,7 +40,11 @@ def looked_at(dataset: Dataset, entry: TrialEntry) -> Looked:
         means = dataset.read_means(entry)
         return Looked(entry, means, (f"{len(means)} static postures as means, no times", *_markers(means)))
     trial = dataset.read(entry)
-    return Looked(entry, trial, (*_clocks(trial), *_markers(trial), *_plates(trial), *_encoders(trial)))
+    return Looked(
+        entry,
+        trial,
+        (*_clocks(trial), *_markers(trial), *_plates(trial), *_at_rest(trial), *_encoders(trial), *_felt(trial)),
+    )
 
 
 def difference(trial: Trial | PostureMeans) -> np.ndarray:
@@ -96,6 +102,29 @@ def _plates(trial: Trial) -> Iterator[str]:
         spread = 1e3 * np.ptp(cop[loaded, :2], axis=0)
         unloaded = "" if loaded.all() else f", {100.0 * (1.0 - loaded.mean()):.2g} % not loaded"
         yield f"{name}: {load}, centre of pressure over {spread[0]:.1f} x {spread[1]:.1f} mm{unloaded}"
+
+
+def _at_rest(trial: Trial) -> Iterator[str]:
+    """The weight on all plates in the first and the last second, the same but for drift."""
+    t, fz = trial.t_plate, trial.plate_wrench[:, :, 2].sum(axis=1)
+    if len(t) < 2 or t[-1] - t[0] < 2.0 * _REST:
+        return
+    first, last = float(fz[t <= t[0] + _REST].mean()), float(fz[t >= t[-1] - _REST].mean())
+    yield f"plates: Fz {first:+.2f} N in the first second, {last:+.2f} N in the last: {last - first:+.2f} N"
+
+
+def _felt(trial: Trial) -> Iterator[str]:
+    """What motors and wrist felt."""
+    if not len(trial.t_robot):
+        return
+    known = np.isfinite(trial.effort).any(axis=0)
+    if known.any():
+        k = int(np.nanargmax(np.abs(np.nan_to_num(trial.effort)).max(axis=0)))
+        most = float(np.nanmax(np.abs(trial.effort[:, k])))
+        yield f"robot: motor currents of {known.sum()} joints, {trial.joint[k]} the most, {most:.3g} A"
+    f = np.linalg.norm(trial.wrist_wrench[:, :3], axis=1)
+    if np.isfinite(f).any():
+        yield f"wrist: force {np.nanmin(f):.1f}-{np.nanmax(f):.1f} N, zero included"
 
 
 def _encoders(trial: Trial) -> Iterator[str]:

@@ -122,3 +122,21 @@ def test_a_plate_that_carries_next_to_nothing_has_no_centre_of_pressure():
     np.testing.assert_allclose(found[0], [0.9 - 0.03, 0.45 - 0.05, 0.1])
     assert np.isnan(found[1:]).all()
     np.testing.assert_allclose(centre_of_pressure(-wrench, np.array([0.9, 0.45, 0.1]))[0], found[0])
+
+
+def test_the_weight_at_both_ends_the_motors_and_the_wrist_are_told(tmp_path):
+    rng, names = np.random.default_rng(0), matched.JOINTS
+    trial = matched.record(matched.defects(2), matched.sweep(3, seconds=3.0), 12.0, rng)
+    wrench, effort = trial.plate_wrench.copy(), np.zeros_like(trial.effort)
+    wrench[...] = [0.0, 0.0, -700.0, 0.0, 0.0, 0.0]
+    effort[40, 4] = -2.25
+    wrist = np.zeros((len(trial.t_robot), 6))
+    wrist[10, :3], wrist[10:, 0] = [3.0, 4.0, 0.0], 6.0
+    late = np.flatnonzero(trial.t_plate >= trial.t_plate[-1] - 1.0)
+    wrench[late, :, 2] = -700.0 - 1.5 / wrench.shape[1]
+    trial = replace(trial, plate_wrench=wrench, effort=effort, wrist_wrench=wrist)
+    folder = matched.write(tmp_path / "dataset", [("sweep", "calibration", "sweep", trial)])
+    said = "\n".join(looked_at(load(folder), load(folder).description.trials[0]).said)
+    assert "in the last: -1.50 N" in said
+    assert f"motor currents of 8 joints, {names[4]} the most, 2.25 A" in said
+    assert "wrist: force 0.0-7.2 N" in said

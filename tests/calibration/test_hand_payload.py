@@ -15,6 +15,7 @@ from calibration.hand import nominal_hand
 from calibration.hand_payload import Hanging, drawn, weigh
 from calibration.hand_payload_stage import weighed
 from calibration.parameters import nominal_frames
+from calibration.postures import read_postures
 from calibration.robot import chain_of
 from calibration.schema import Payload
 from tests.calibration import matched
@@ -109,7 +110,14 @@ def recorded(undeclared: float):
 ])  # fmt: skip
 def test_a_load_nobody_declared_is_told_with_what_to_declare(undeclared, verdict, words):
     description, trial, hand = recorded(undeclared)
-    (said,) = weighed(mjcf.urdf(), description, [trial], shared_clock("robot"), hand)
+    (said,) = weighed(
+        mjcf.urdf(),
+        description,
+        [trial],
+        shared_clock("robot"),
+        hand,
+        read_postures(description, [trial], shared_clock("robot")),
+    )
     assert said.verdict == verdict and words in said.message and "25 postures" in said.message
 
 
@@ -118,7 +126,24 @@ def test_a_wrist_without_a_link_or_a_static_posture_is_said_not_to_be_used():
     nameless = description.model_copy(update={"wrist_link": None})
     moving = replace(trial, dwell_start=np.zeros(0), dwell_stop=np.zeros(0), approach=np.zeros((0, 8)))
     for one, t, words in ((nameless, trial, "wrist_link"), (description, moving, "no static posture")):
-        (said,) = weighed(mjcf.urdf(), one, [t], shared_clock("robot"), hand)
+        (said,) = weighed(
+            mjcf.urdf(),
+            one,
+            [t],
+            shared_clock("robot"),
+            hand,
+            read_postures(description, [trial], shared_clock("robot")),
+        )
         assert said.verdict == "missing" and words in said.message
     silent = replace(trial, wrist_wrench=np.full((len(trial.t_robot), 6), np.nan))
-    assert weighed(mjcf.urdf(), description, [silent], shared_clock("robot"), hand) == ()
+    assert (
+        weighed(
+            mjcf.urdf(),
+            description,
+            [silent],
+            shared_clock("robot"),
+            hand,
+            read_postures(description, [trial], shared_clock("robot")),
+        )
+        == ()
+    )

@@ -92,3 +92,15 @@ def test_a_compressed_file_out_of_its_folder_is_told(tmp_path, monkeypatch):
     path = written(tmp_path, monkeypatch, "ROS 2 file, mcap")
     with pytest.raises(InputError, match="log.mcap.zstd: cannot be read as a ROS bag"):
         read_bag([data_file(path)], layout(**WRIST))
+
+
+@pytest.mark.parametrize("name", [n for n in WRITTEN if any(word in n for word in SMALLER) and "message" not in n])
+def test_a_compressed_bag_with_wrong_bytes_is_told(tmp_path, monkeypatch, name):
+    path = written(tmp_path, monkeypatch, name)
+    file = data_file(path)
+    content = bytearray(file.read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 600] = b"\xff" * 600
+    file.write_bytes(bytes(content))
+    with pytest.raises(InputError, match="cannot be read as a ROS bag"):
+        read_bag([path], layout(**WRIST))
