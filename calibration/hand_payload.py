@@ -1,11 +1,12 @@
 """What hangs on the wrist's force-torque sensor, weighed by it in static postures.
 
-    f = R_base_sensor' w + f_0        tau = h x a + tau_0        m = |w| / |g|,   a = R_base_sensor' w / m,   h = m c
+    f = E R_base_sensor' w + f_0        tau = c x f + tau_0'        m = |w| / |g|
 
 f, tau: ACTION of what hangs there on the sensor, its axes, about its origin; w its weight [N, base], m its mass [kg], c
-its centre [m], f_0 and tau_0 the sensor's zeros. Linear in (w, f_0) and then in (h, tau_0); standard deviations from
-the residuals. A base out of level turns w and not m. A gain of the sensor's passes for mass: a sensor that is 1 % off
-weighs 1 % wrong.
+its centre [m], f_0 the sensor's zero, tau_0' = tau_0 - c x f_0. E turns the sensor by the little that its axes are off:
+the hand's markers tell R_base_sensor up to a constant on either side. w, E and f_0 by Gauss-Newton, c linearly;
+standard deviations from the residuals, those of a posture together. A base out of level turns w and not m. A gain of
+the sensor's passes for mass: a sensor that is 1 % off weighs 1 % wrong.
 Nominal: all links of the drawing beyond the sensor, and the declared payload where it hangs there.
 """
 
@@ -14,12 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from calibration.errors import NotEnoughData, ShapeError
 from calibration.schema import Description
 from calibration.se3 import skew
 
 _FEWEST = 6  # postures
+_STEPS = 8
 _SPREAD = 0.1  # of gravity: smallest spread of its direction over the sensor's axes that tells all of a centre [-]
 
 
@@ -71,14 +74,30 @@ def weigh(R: np.ndarray, wrench: np.ndarray, gravity: np.ndarray) -> Hanging:
             f"{len(a)} postures do not turn the wrist's sensor enough against gravity to weigh what hangs on it; "
             "record some with the hand up, down and on its side"
         )
-    zero = np.broadcast_to(np.eye(3), (len(a), 3, 3))
-    w, C_w = (x[..., :3] for x in _least_squares(np.concatenate([np.swapaxes(R, 1, 2), zero], axis=2), wrench[:, :3]))
-    along, g = w / np.linalg.norm(w), float(np.linalg.norm(gravity))
-    a = g * np.swapaxes(R, 1, 2) @ along
-    h, C_h = _least_squares(np.concatenate([-skew(a), zero], axis=2), wrench[:, 3:])
-    covariance = np.zeros((4, 4))
-    covariance[0, 0], covariance[1:, 1:] = along @ C_w[:3] @ along / g**2, C_h[:3, :3]
-    return Hanging(float(w @ along) / g, h[:3], covariance)
+    w, C_w = _weight(R, wrench[:, :3], gravity)
+    f = wrench[:, :3] - wrench[:, :3].mean(axis=0)
+    c, C_c = (x[..., :3] for x in _least_squares(np.concatenate([-skew(f), _ones(len(f))], axis=2), wrench[:, 3:]))
+    g, along = float(np.linalg.norm(gravity)), w / np.linalg.norm(w)
+    m, var = float(w @ along) / g, float(along @ C_w @ along) / g**2
+    J = np.append(1.0, c)
+    covariance = var * np.outer(J, J)
+    covariance[1:, 1:] += m**2 * C_c[:3]
+    return Hanging(m, m * c, covariance)
+
+
+def _weight(R: np.ndarray, f: np.ndarray, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """w (3,) [N, base] and its covariance (3, 3), from forces f (n, 3)."""
+    E, w = np.eye(3), gravity / np.linalg.norm(gravity) * np.linalg.norm(f - f.mean(axis=0), axis=1).mean()
+    for _ in range(_STEPS):
+        turned = E @ np.swapaxes(R, 1, 2)
+        A = np.concatenate([turned, -skew(turned @ w), _ones(len(f))], axis=2)
+        step, C = _least_squares(A, f - turned @ w)
+        w, E = w + step[:3], Rotation.from_rotvec(step[3:6]).as_matrix() @ E
+    return w, C[:3, :3]
+
+
+def _ones(n: int) -> np.ndarray:
+    return np.broadcast_to(np.eye(3), (n, 3, 3))
 
 
 def _least_squares(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,6 +22,7 @@ from calibration.verdict import Verdict
 _STAGE = "geometry"
 _CLEAR = 3.0  # standard deviations
 _FEW = 5  # samples of a dwell
+_SETTLED = 0.5  # share of a dwell after which an arm has stopped ringing: a mean over turned forces is too small
 
 
 def weighed(
@@ -75,7 +76,7 @@ def _means(trials: Sequence[Trial], robot: Clock) -> dict[str, np.ndarray]:
     for trial in trials:
         t, known = robot.to_mocap(trial.t_robot), np.isfinite(trial.wrist_wrench).all(axis=1)
         for k, (start, stop) in enumerate(dwell_windows(trial)):
-            rows = (t >= start) & (t <= stop) & known
+            rows = (t >= start + _SETTLED * (stop - start)) & (t <= stop) & known
             if rows.sum() >= _FEW:
                 found[f"{trial.id} {k}"] = trial.wrist_wrench[rows].mean(axis=0)
     return found

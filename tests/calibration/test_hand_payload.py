@@ -35,9 +35,11 @@ def rotations(n, seed=0):
     return Rotation.random(n, random_state=seed).as_matrix()
 
 
-def test_without_noise_mass_and_centre_come_back_whatever_the_zeros():
+@pytest.mark.parametrize("off", [(0.0, 0.0), (0.1, 0.2)])
+def test_without_noise_mass_and_centre_come_back_whatever_the_zeros_and_constant_turns(off):
     R = rotations(12)
-    found = weigh(R, wrenches(R), G)
+    before, after = (Rotation.from_rotvec(a * np.array([0.6, -0.64, 0.48])).as_matrix() for a in off)
+    found = weigh(before @ R @ after, wrenches(R), G)
     assert found.mass == pytest.approx(MASS, rel=1e-12)
     np.testing.assert_allclose(found.centre, CENTRE, atol=1e-12)
     assert (found.sigma < 1e-10).all()
