@@ -23,6 +23,7 @@ _SAME = 1e-3  # [m] two markers are never closer
 _SIZE = (0.02, 2.0)  # [m] believable largest distance within a body of markers
 _FLEX = 0.01  # [m] a distance within a body may scatter by this much
 _DRAWN = 0.03  # [m] a distance within a body may be off its drawing by this much
+_APART, _FEW = 0.1, 20  # [rad, m] a link may be off its motor by this much, its zero apart; readings to judge by
 _LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or its inverse
 
 
@@ -43,7 +44,7 @@ def check(file: str, trial: Trial | PostureMeans, description: Description, chai
     found += [] if found else [*implausible_inputs(description, chain, (trial,))]
     found += [] if found else [*_rigid(trial, description)]
     if isinstance(trial, Trial):
-        found += [*_clocks(trial), *_load(trial, mass * float(np.linalg.norm(description.gravity)))]
+        found += [*_sides(trial), *_clocks(trial), *_load(trial, mass * float(np.linalg.norm(description.gravity)))]
     if found:
         raise InputError(file, "; ".join(found))
 
@@ -91,6 +92,29 @@ def _readings(trial: Trial | PostureMeans) -> Iterator[str]:
         bad = np.flatnonzero(~np.isfinite(trial.plate_wrench).all(axis=(1, 2)))
         if len(bad):
             yield f"plate: {len(bad)} samples are missing, the first is {bad[0]}; cut them out, or leave the plate out"
+
+
+def _sides(trial: Trial) -> Iterator[str]:
+    """Link readings that do not follow their motor's; zeros of either side may be anything."""
+    for k, name in enumerate(trial.joint):
+        known = np.isfinite(trial.q_link[:, k])
+        if known.sum() < _FEW or _range(trial.q_link[known, k] - trial.q_motor[known, k]) < _APART:
+            continue
+        others = {
+            (other, said): _range(trial.q_link[known, k] - sign * trial.q_motor[known, j])
+            for j, other in enumerate(trial.joint)
+            for sign, said in ((1.0, "follows"), (-1.0, "runs against"))
+            if _range(trial.q_motor[known, j]) > 2.0 * _APART
+        }
+        other, said = min(others, key=lambda key: others[key], default=("", ""))
+        hint = f"; it {said} the motor of {other}" if others and others[other, said] < _APART else ""
+        yield f"joint {name}: its link reading does not follow its motor's{hint}: columns swapped, or a sign reversed"
+
+
+def _range(x: np.ndarray) -> float:
+    """Between the 5th and the 95th percentile."""
+    low, high = np.percentile(x, (5.0, 95.0))
+    return float(high - low)
 
 
 def _clocks(trial: Trial) -> Iterator[str]:

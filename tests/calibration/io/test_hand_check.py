@@ -147,3 +147,18 @@ def test_one_marker_on_the_hand_tells_swapped_columns_of_postures():
     check_columns(one, CHAIN, [("m", means(q + truth.offset))])
     with pytest.raises(InputError, match="^m: joints arm_5_joint and arm_6_joint are swapped"):
         check_columns(one, CHAIN, [("m", means(swapped(q + truth.offset)))])
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda q: q, ""),
+    (lambda q: q + 1.3, ""),
+    (swapped, "joint arm_5_joint: its link reading does not follow its motor's; it follows the motor of arm_6_joint"),
+    (reversed_, "joint arm_6_joint: its link reading does not follow its motor's; it runs against the motor of arm_6"),
+])  # fmt: skip
+def test_link_readings_are_held_against_their_motor_s(tmp_path, capsys, change, words):
+    with_link = [(n, r, k, replace(t, q_link=change(t.q_motor + 5e-3))) for n, r, k, t in trials()[:1]]
+    source, csv = matched.write(tmp_path / "source", with_link), tmp_path / "csv"
+    assert run("export", "csv", source, "--out", csv) == 0
+    code = run("import", "csv", *files(csv), "--map", csv / "mapping.yaml", "--out", tmp_path / "out")
+    said = capsys.readouterr().err
+    assert code == (2 if words else 0) and words in said and (tmp_path / "out").exists() == (not words)
