@@ -113,11 +113,13 @@ def _hand(prospect: Prospect, C: np.ndarray, m: np.ndarray) -> float:
 
 
 def _hand_of_each(prospect: Prospect, to: _Steps) -> np.ndarray:
+    """With p = P G' and o = P C m - Z before:  trace(P C P') - |p|^2 + |o + p e|^2, summed up in one product with p."""
     n, d, r = to.G.shape
-    moved = (to.G.reshape(n * d, r) @ prospect.P.reshape(-1, r).T).reshape(n, d, -1)
-    off = (prospect.P @ (to.C @ to.m) - prospect.Z).reshape(moved.shape[2], -1) + np.swapaxes(moved, 1, 2) @ to.e
-    noise = prospect.hand(to.C) ** 2 - (moved**2).sum(axis=1).reshape(n, -1, 3).sum(axis=2)
-    left = np.maximum(noise, 0.0) + (off**2).sum(axis=2).reshape(n, -1, 3).sum(axis=2)
+    p = (to.G.reshape(n * d, r) @ prospect.P.reshape(-1, r).T).reshape(n, d, -1)
+    o = (prospect.P @ (to.C @ to.m) - prospect.Z).reshape(p.shape[2], -1)
+    change = p * ((to.e @ np.swapaxes(to.e, 1, 2) - np.eye(d)) @ p + 2.0 * (to.e @ o.T))
+    before = prospect.hand(to.C) ** 2 + (o**2).sum(axis=1).reshape(-1, 3).sum(axis=1)
+    left = np.maximum(before + change.sum(axis=1).reshape(n, -1, 3).sum(axis=2), 0.0)
     return np.asarray(((left / left.max()) ** _POWER).mean(axis=1))
 
 
