@@ -1,6 +1,7 @@
 """The wrist's sensor weighs what hangs on it: exact without noise, within its interval with it; a load is told."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -45,12 +46,13 @@ def test_without_noise_mass_and_centre_come_back_whatever_the_zeros_and_constant
     assert (found.sigma < 1e-10).all()
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say():
+@pytest.mark.parametrize("k", [10, 30])
+def test_intervals_hold_the_truth_as_often_as_they_say(k):
     rng, n, z = np.random.default_rng(0), 300, []
     for seed in range(n):
-        R = rotations(30, seed)
-        turned = R @ Rotation.from_rotvec(0.01 * rng.normal(size=(30, 3))).as_matrix()  # postures known to 10 mrad
-        w = wrenches(R) + rng.normal(size=(30, 6)) * [0.02, 0.02, 0.02, 1e-3, 1e-3, 1e-3]
+        R = rotations(k, seed)
+        turned = R @ Rotation.from_rotvec(0.01 * rng.normal(size=(k, 3))).as_matrix()  # postures known to 10 mrad
+        w = wrenches(R) + rng.normal(size=(k, 6)) * [0.02, 0.02, 0.02, 1e-3, 1e-3, 1e-3]
         found = weigh(turned, w, G)
         z.append((np.r_[found.mass, found.moment] - np.r_[MASS, MASS * CENTRE]) / found.sigma)
     held = (np.abs(z) <= 1.96).sum(axis=0)
@@ -149,3 +151,22 @@ def test_a_wrist_without_a_link_or_a_static_posture_is_said_not_to_be_used():
         )
         == ()
     )
+
+
+def test_what_a_finger_carries_is_weighed_once():
+    masses = {"base": 5.0, "arm": 2.0, "sensor": 0.3, "tool": 1.0, "finger": 0.2, "tip": 0.05}
+    links = "".join(
+        f'<link name="{n}"><inertial><mass value="{m}"/><origin xyz="0 0 0.01"/>'
+        '<inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        for n, m in masses.items()
+    )
+    kinds = ["revolute", "fixed", "fixed", "prismatic", "fixed"]
+    limit = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    joints = "".join(
+        f'<joint name="{b}_joint" type="{kind}"><parent link="{a}"/><child link="{b}"/>'
+        f'<origin xyz="0 0 0.1"/>{limit}</joint>'
+        for kind, (a, b) in zip(kinds, pairwise(masses), strict=True)
+    )
+    found = drawn(f'<robot name="r">{links}{joints}</robot>', matched.described(), "sensor")
+    assert found.mass == pytest.approx(1.25)
+    assert found.moment[2] == pytest.approx(1.0 * 0.11 + 0.2 * 0.21 + 0.05 * 0.31)
