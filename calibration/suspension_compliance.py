@@ -7,7 +7,7 @@ Gauss-Newton with Levenberg's damping; sigma (6,) from the residual of the round
 counts little. S and C stay positive definite: eigenvalues, in units of their diagonals at the start, are kept above
 1e-4 of the largest. Only elements that the wheels can couple are fitted: contact points in the floor leave (x, y, rz)
 and (z, rx, ry) apart, 12 elements; hub centres couple all 21. Constants of a trial are left out: its reference is one
-second of markers. Variances sum the autocorrelation of each parameter's influence.
+second of markers. Variances count blocks of motion that are independent (`block_covariance`).
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.lag import long_run_variance
+from calibration.block_covariance import block_covariance
 from calibration.signals import RATE
 from calibration.suspension_modes import modes_of
 from calibration.suspension_sway import Sway
@@ -31,13 +31,17 @@ UPPER = tuple((i, j) for i in range(6) for j in range(i, 6))
 
 @dataclass(frozen=True)
 class Share:
-    """A trial's share: normal matrix (p, p), gradient (p,), influences (m, p), squares and count of residuals."""
+    """A trial's share: normal matrix (p, p), gradient (p,), whitened derivatives (m, 6, p) and residuals (m, 6)."""
 
     H: np.ndarray
     g: np.ndarray
-    influence: np.ndarray
-    squares: np.ndarray
-    count: int
+    J: np.ndarray
+    r: np.ndarray
+
+    @property
+    def squares(self) -> np.ndarray:
+        """Sum of squared residuals of each axis (6,)."""
+        return np.asarray((self.r**2).sum(axis=0))
 
 
 @dataclass(frozen=True)
@@ -82,15 +86,13 @@ class Compliance:
 
     def sigmas(self) -> tuple[np.ndarray, np.ndarray]:
         """Standard deviations (6, 6) of K and of C."""
-        inverse = np.linalg.inv(sum((s.H for s in self.shares), self.prior))
-        K = self.K
+        J, r = zip(*((share.J, share.r) for share in self.shares), strict=True)
+        covariance, K = block_covariance(J, r, np.diag(self.prior)).covariance, self.K
         gains = [np.array([-K @ d @ K for d in self.dS]), self.dC]
         found = []
         for gain in gains:
-            rows = np.array([gain[:, i, j] @ inverse for i, j in UPPER])
-            psi = [share.influence @ rows.T for share in self.shares]
-            rate = RATE / _STRIDE
-            variance = [sum(long_run_variance(p[:, e], rate) for p in psi) for e in range(len(UPPER))]
+            rows = np.array([gain[:, i, j] for i, j in UPPER])
+            variance = ((rows @ covariance) * rows).sum(axis=1)
             sigma = np.zeros((6, 6))
             for (i, j), v in zip(UPPER, variance, strict=True):
                 sigma[i, j] = sigma[j, i] = np.sqrt(max(v, 0.0))
@@ -110,7 +112,7 @@ def fit_compliance(sways: Sequence[Sway], couples: np.ndarray) -> Compliance:
     sigma = np.sqrt(np.mean([(s.x**2).mean(axis=0) for s in sways], axis=0))
     for _ in range(_ROUNDS):
         S, C, shares = _round(sways, (S, C), (dS, dC), prior, sigma)
-        squares, count = sum(s.squares for s in shares), sum(s.count for s in shares)
+        squares, count = sum(s.squares for s in shares), sum(len(s.r) for s in shares)
         sigma = sigma * np.sqrt(np.maximum(squares / count, 1e-12))
     return Compliance(S, C, dS, dC, tuple(shares), prior)
 
@@ -162,7 +164,7 @@ def _share(sway: Sway, S: np.ndarray, C: np.ndarray, dS: np.ndarray, dC: np.ndar
     r = (sway.x - x)[rows]
     r, J = (r - r.mean(axis=0)) / sigma, (J - J.mean(axis=0)) / sigma[:, None]
     A = J.reshape(-1, J.shape[2])
-    return Share(A.T @ A, A.T @ r.ravel(), np.einsum("nap,na->np", J, r), (r**2).sum(axis=0), len(r))
+    return Share(A.T @ A, A.T @ r.ravel(), J, r)
 
 
 def _start(sways: Sequence[Sway]) -> tuple[np.ndarray, np.ndarray]:
