@@ -25,15 +25,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
 
 from calibration.errors import NotEnoughData, ShapeError
+from calibration.few_blocks import widening
 
 LONG = 3.0  # shortest block [correlation times]
 ENOUGH = 30  # blocks
 MANY = 60
-_QUANTILE = 0.975
 _UNKNOWN = 1e-9  # smallest over largest singular value of scaled derivatives [-]
 _LEAST = 1e-3  # share of a block's residuals that the parameters leave it, at least [-]
 
@@ -92,8 +90,7 @@ def block_covariance(
     left = np.sqrt(np.maximum(1.0 - share, _LEAST))
     g = (V @ ((np.swapaxes(V, 1, 2) @ g[..., None])[..., 0] / left)[..., None])[..., 0]
     v = ((W @ M) * W).sum(axis=2)
-    wider = student.ppf(_QUANTILE, v.sum(axis=0) ** 2 / np.maximum((v**2).sum(axis=0), np.finfo(float).tiny))
-    wider = wider / norm.ppf(_QUANTILE) * np.sqrt(_across_ends(rho, length))
+    wider = widening(v) * np.sqrt(_across_ends(rho, length))
     return BlockCovariance(np.outer(wider, wider) * (W @ (g.T @ g) @ W.T), len(g), length, T)
 
 

@@ -19,13 +19,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
 
+from calibration.few_blocks import widening
 from calibration.lag import long_run_covariance
 
 _BLOCK = 2.5  # [s] a move, or half a swing
-_QUANTILE = 0.975
 _LEAST = 1e-3  # [-] share of a block's noise that is left in its residuals, at least
 
 
@@ -68,7 +66,7 @@ def lag_and_drift(x: Reduced) -> tuple[np.ndarray, np.ndarray]:
     psi = e[:, None] * G
     in_time, prior = psi[:m].reshape(-1, 6, 2).sum(axis=1), psi[m:]
     v = np.add.reduceat(G[:m] ** 2, _starts(x.t))
-    wider = student.ppf(_QUANTILE, v.sum(axis=0) ** 2 / (v**2).sum(axis=0)) / norm.ppf(_QUANTILE)
+    wider = widening(v)
     return found, np.outer(wider, wider) * long_run_covariance(in_time, 1.0 / dt) + prior.T @ prior
 
 

@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 from calibration.block_covariance import ENOUGH, LONG, MANY, block_covariance
 from calibration.errors import NotEnoughData, ShapeError
+from calibration.few_blocks import widening
 
 
 def series(rng, a, n, p):
@@ -72,3 +73,9 @@ def test_many_parameters_do_not_make_intervals_short():
         found = block_covariance([A[:, None]], [(y - A @ theta)[:, None]])
         hits.append(np.abs(theta) < 1.96 * np.sqrt(np.diag(found.covariance)))
     assert 0.93 < np.mean(hits) < 0.97  # a third of the residuals' variance went into the parameters: 0.89 without
+
+
+def test_few_blocks_widen_as_students_table_says():
+    equal, one_counts = np.ones((30, 1)), np.array([[1.0], [0.0]])
+    np.testing.assert_allclose(widening(np.hstack([equal, 2.0 * equal])), 2.0423 / 1.95996, rtol=1e-4)
+    np.testing.assert_allclose(widening(one_counts), 12.7062 / 1.95996, rtol=1e-4)
