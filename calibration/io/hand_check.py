@@ -7,23 +7,21 @@ joints swapped), B_i the measured one; X and Y are two constant frames fitted to
 drawing is needed. A robot is a centimetre or two off its nominal model, a column that is another's by the motion
 itself: where one hypothesis explains the hand better than the declaration by a factor, it is named.
 A joint that does not move, or two that turn about one line, cannot be told apart so; then nothing is said.
+A single wrong file among right ones is held against the frames that the others give.
 
 Clocks are not known yet: the robot's is brought to the markers' by the hand's speed of rotation, for each hypothesis.
 """
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
 from calibration.bodies import poses_of
 from calibration.errors import InputError, NotEnoughData
+from calibration.io.hand_readings import MOST, Frames, Pairs, Reading, Shown, as_declared, distance, readings
 from calibration.io.place_bodies import hand_eye
 from calibration.labels import with_right_labels
-from calibration.lag import coarse_lag
 from calibration.markers import base_body, hand_body
 from calibration.means import PostureMeans
 from calibration.postures import mean_postures
@@ -31,80 +29,15 @@ from calibration.recording import Trial
 from calibration.registration_start import registration_start
 from calibration.robot import Chain
 from calibration.schema import Description
-from calibration.se3 import inverse, rotation_vector
-from calibration.signals import Signal, body_rates, even, low_passed
+from calibration.se3 import inverse
 
-_ARM, _MOST = 0.2, 0.5  # [m] what a radian of the hand is worth; what a sample counts at most
-_CUTOFF = 3.0  # [Hz]
-_STEP = 0.04  # [s] between readings the speed is taken from
 _POSES, _FEWEST, _ENOUGH = 60, 6, 10  # compared, of all trials; of each at least; to judge by
 _OFF, _ANOTHER = 0.012, 0.06  # [m] no suspicion; another robot than the nominal one
 _CLEAR = 1.5  # so many times better is an explanation
+_ODD = 3.0  # times the other files' distance: a file unlike them
+_HALF = 0.5  # of that file's distance is left by an explanation, at most
+_STRANGE = 0.15  # [m] a file for which there is none; postures far from the others' are 60 mm off on a loose robot
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How the columns q (n, k) of a file are taken: q'_j = sign_j q_order_j."""
-
-    order: tuple[int, ...]
-    sign: tuple[float, ...]
-    said: str = ""
-
-    def of(self, q: np.ndarray) -> np.ndarray:
-        """The readings (n, k) so taken."""
-        return q[:, self.order] * np.array(self.sign)
-
-
-@dataclass(frozen=True)
-class Shown:
-    """What a trial shows of the hand.
-
-    Attributes:
-        file: It came from.
-        T: (n, 4, 4) measured T_B_H.
-        t: (n,) [s, mocap clock]; empty where q belongs to T row by row.
-        q: (m, k) readings as declared [rad, m].
-        s: (m,) [s, robot clock].
-        oriented: False where one marker shows positions only.
-    """
-
-    file: str
-    T: np.ndarray
-    t: np.ndarray
-    q: np.ndarray
-    s: np.ndarray
-    oriented: bool = True
-
-    @cached_property
-    def speed(self) -> Signal:
-        """How fast the hand turns [rad/s]."""
-        return _speed(*body_rates(self.t, self.T[:, :3, :3]))
-
-    def pairs(self, chain: Chain, reading: Reading, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """A, B (n, 4, 4) of about `most` samples."""
-        good, q = np.isfinite(self.T).all(axis=(1, 2)), reading.of(self.q)
-        if len(self.t):
-            s = self.t - coarse_lag(self.speed, _turning(chain, self.s, q))
-            good &= (s > self.s[0]) & (s < self.s[-1])
-        rows = np.flatnonzero(good)
-        rows = rows[:: max(1, len(rows) // most)]
-        at = np.stack([np.interp(s[rows], self.s, c) for c in q.T], axis=1) if len(self.t) else q[rows]
-        return chain.poses(at), self.T[rows]
-
-
-def _turning(chain: Chain, t: np.ndarray, q: np.ndarray) -> Signal:
-    """How fast the nominal hand turns along readings q (n, k) at t (n,) [s]."""
-    step = max(1, round(_STEP / float(np.median(np.diff(t)))))
-    t, q = t[::step], q[::step]
-    J = chain.joint_jacobians(0.5 * (q[1:] + q[:-1]))[:, 3:]
-    w = (J @ np.diff(q[:, chain.columns], axis=0)[..., None])[..., 0] / np.diff(t)[:, None]
-    return _speed(0.5 * (t[1:] + t[:-1]), w)
-
-
-def _speed(t: np.ndarray, w: np.ndarray) -> Signal:
-    found = low_passed(even(t, w), _CUTOFF)
-    return Signal(found.t, np.linalg.norm(found.x, axis=1, keepdims=True), found.valid)
 
 
 def check_columns(description: Description, chain: Chain, trials: Sequence[tuple[str, Trial | PostureMeans]]) -> None:
@@ -124,6 +57,13 @@ def check_columns(description: Description, chain: Chain, trials: Sequence[tuple
             shown.append(_shown(description, file, trial))
         except NotEnoughData as error:
             _log.info("%s: joints not compared with the hand: %s", file, error)
+    try:
+        odd = _odd_one(chain, shown)
+    except NotEnoughData as error:
+        _log.info("files not compared with each other: %s", error)
+        odd = None
+    if odd is not None:
+        raise InputError(*odd)
     said = _judge(chain, shown) if shown else None
     if said is not None:
         more = f" and {len(shown) - 1} more" if len(shown) > 1 else ""
@@ -143,12 +83,55 @@ def _shown(description: Description, file: str, trial: Trial | PostureMeans) -> 
     return Shown(file, inverse(base.T) @ hand.T, trial.t_mocap, trial.q_motor, trial.t_robot)
 
 
+def _odd_one(chain: Chain, shown: Sequence[Shown]) -> tuple[str, str] | None:
+    """The one file that the frames of all others do not fit, and what is to be said of it."""
+    if len(shown) < 2 or not all(x.oriented for x in shown):
+        return None
+    most = max(_FEWEST, _POSES // len(shown))
+    lags = [x.lag(chain, as_declared(chain)) for x in shown]
+    pairs = [x.pairs(chain, as_declared(chain), most, lag) for x, lag in zip(shown, lags, strict=True)]
+    rest, k, frames = min(_without_each(pairs), default=(np.inf, 0, None), key=lambda left: left[0])
+    if frames is None or rest > _ANOTHER or len(pairs[k][0]) < _FEWEST:
+        return None
+    of_others = [lag for j, lag in enumerate(lags) if j != k and np.isfinite(lag)]
+    clocks = (None, float(np.median(of_others)) if of_others else None)  # its own may be as wrong as its columns
+
+    def left_by(reading: Reading) -> float:
+        found = (shown[k].pairs(chain, reading, _POSES, lag) for lag in clocks)
+        return min((float(distance(frames, A, B).mean()) for A, B in found if len(A) >= _FEWEST), default=MOST)
+
+    off = left_by(as_declared(chain))
+    if off < max(_OFF, _ODD * rest):
+        return None
+    far = f"the hand's markers are {1e3 * off:.0f} mm (mean) from where its readings put them, {1e3 * rest:.0f} mm in"
+    far = f"{far} the other files, frames fitted to those"
+    left, said = min((left_by(r), r.said) for r in readings(chain))
+    if left < min(_HALF * off, _ANOTHER):
+        return shown[k].file, f"{said}: {far}, {1e3 * left:.0f} mm otherwise; correct this file's columns"
+    if off < _STRANGE:
+        return None
+    return shown[k].file, (
+        f"{far}; no joint reversed and no two swapped explain it: other columns are swapped, or it is another session's"
+    )
+
+
+def _without_each(pairs: Sequence[Pairs]) -> Iterator[tuple[float, int, Frames]]:
+    """For each file k the mean distance of the others, k, and the frames X, Y that they give, where they do."""
+    for k in range(len(pairs)):
+        others = [np.concatenate(x) for x in zip(*(p for j, p in enumerate(pairs) if j != k), strict=True)]
+        try:
+            frames = hand_eye(others[0], others[1])
+        except NotEnoughData:
+            continue
+        yield float(distance(frames, others[0], others[1]).mean()), k, frames
+
+
 def _judge(chain: Chain, shown: Sequence[Shown]) -> str | None:
     """What is to be said of the readings, if anything."""
-    d = _distances(chain, shown, Reading(tuple(range(len(chain.measured))), (1.0,) * len(chain.measured)))
+    d = _distances(chain, shown, as_declared(chain))
     if d is None or (off := float(d.mean())) < _OFF:
         return None
-    found = [(float(d_h.mean()), r.said) for r in _readings(chain) if (d_h := _distances(chain, shown, r)) is not None]
+    found = [(float(d_h.mean()), r.said) for r in readings(chain) if (d_h := _distances(chain, shown, r)) is not None]
     left, said = min(found, default=(off, ""))
     far = f"the hand's markers are {1e3 * off:.0f} mm (mean) from where the readings put them, frames fitted"
     if left < min(off / _CLEAR, _ANOTHER):
@@ -161,18 +144,6 @@ def _judge(chain: Chain, shown: Sequence[Shown]) -> str | None:
     return None
 
 
-def _readings(chain: Chain) -> Iterator[Reading]:
-    """Every joint of the chain reversed, every two swapped."""
-    k, names = len(chain.measured), chain.measured
-    for j in chain.columns:
-        yield Reading(
-            tuple(range(k)), tuple(-1.0 if i == j else 1.0 for i in range(k)), f"joint {names[j]} is reversed"
-        )
-    for a, b in combinations(chain.columns, 2):
-        order = tuple(b if i == a else a if i == b else i for i in range(k))
-        yield Reading(order, (1.0,) * k, f"joints {names[a]} and {names[b]} are swapped")
-
-
 def _distances(chain: Chain, shown: Sequence[Shown], reading: Reading) -> np.ndarray | None:
     """min(|d_i|, 0.5 m) (n,) of all trials; None where they do not tell the constant frames."""
     try:
@@ -181,11 +152,8 @@ def _distances(chain: Chain, shown: Sequence[Shown], reading: Reading) -> np.nda
         if len(A) < _ENOUGH:
             raise NotEnoughData(f"{len(A)} samples show base and hand")
         if not all(x.oriented for x in shown):
-            return np.minimum(registration_start(A, B, False).residual, _MOST)
-        X, Y = hand_eye(A, B)
+            return np.minimum(registration_start(A, B, False).residual, MOST)
+        return distance(hand_eye(A, B), A, B)
     except NotEnoughData as error:
         _log.info("joints not compared with the hand: %s", error)
         return None
-    d = inverse(X @ A @ Y) @ B
-    r = np.column_stack([d[:, :3, 3], _ARM * rotation_vector(d[:, :3, :3])])
-    return np.minimum(np.linalg.norm(r, axis=1), _MOST)

@@ -9,8 +9,8 @@ import pytest
 import mjcf
 from calibration import load
 from calibration.errors import InputError
-from calibration.io import hand_check
 from calibration.io.hand_check import _shown, check_columns
+from calibration.io.hand_readings import readings
 from calibration.means import PostureMeans
 from calibration.recording import Trial
 from calibration.robot import chain_of_frames
@@ -100,11 +100,36 @@ D = matched.described()
 CHAIN = chain_of_frames(mjcf.urdf(), D.joint_names, D.base_frame, D.tool_frame)
 
 
-@pytest.mark.parametrize("reading", list(hand_check._readings(CHAIN))[::7], ids=lambda r: r.said)
+@pytest.mark.parametrize("reading", list(readings(CHAIN))[::7], ids=lambda r: r.said)
 def test_every_reading_is_recognised(reading):
     wrong = [(n, replace(t, q_motor=reading.of(t.q_motor))) for n, _, _, t in trials()]
     with pytest.raises(InputError, match=f"^swing and 1 more: {reading.said}: .* correct the mapping file"):
         check_columns(D, CHAIN, wrong)
+
+
+def two_swings(change) -> list[tuple[str, Trial]]:
+    """Two swings of one robot and a sweep; the readings of the second swing are changed."""
+    rng, truth = np.random.default_rng(5), matched.defects(3)
+    drives, found = geared.gears(rng), []
+    for name, motor in (
+        ("one", geared.swing(rng, 12.0)),
+        ("two", geared.swing(rng, 9.0)),
+        ("sweep", geared.sweep(4, 6.0)),
+    ):
+        trial = geared.record(truth, drives, motor, 20.0, rng, 1e-3)
+        found.append((name, replace(trial, q_motor=change(trial.q_motor)) if name == "two" else trial))
+    return found
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (swapped, "joints arm_5_joint and arm_6_joint are swapped: .* correct this file's columns"),
+    (reversed_, "joint arm_6_joint is reversed"),
+    (lambda q: np.column_stack([q[:, 0], q[:, :0:-1]]), "no two swapped explain it: other columns are swapped"),
+])  # fmt: skip
+def test_one_wrong_file_among_right_ones_is_named(change, words):
+    with pytest.raises(InputError, match=f"^two: .*{words}"):
+        check_columns(D, CHAIN, two_swings(change))
+    check_columns(D, CHAIN, two_swings(lambda q: q))
 
 
 def test_columns_in_quite_another_order_are_refused_though_not_explained():
