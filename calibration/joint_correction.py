@@ -61,11 +61,6 @@ class Corrected:
     modelled: np.ndarray
     variance: np.ndarray
 
-    @property
-    def share_outside(self) -> np.ndarray:
-        """Share of samples (n_measured,) outside the domain [-]."""
-        return self.outside.mean(axis=0)
-
 
 def correct(models: JointModels, t: np.ndarray, q_motor: np.ndarray, velocity: np.ndarray | None = None) -> Corrected:
     """What goes into the geometry in place of q_motor (n, n_measured) [rad, m], read at t (n,) [s].

@@ -43,8 +43,8 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
 
     description = declaration(scenario.twin, ())
     rng = generator(scenario.seed, "design")
-    campaign_ = scenario.twin.campaign
-    still = campaign_.sweep == 0.0 and campaign_.calibration_swing == 0.0
+    motions = scenario.twin.campaign
+    still = motions.sweep == 0.0 and motions.calibration_swing == 0.0
     found = plan(nominal_task(mjcf.urdf(), description, rng, _work(), still), n, criterion, rng)
     against = compared(found, rng)
     worst, usual = 1e3 * against.designed, 1e3 * float(np.median(against.random))
@@ -66,7 +66,7 @@ def _work() -> "Sample":
     import mjcf
     from twin import postures
 
-    nominal = mjcf.spec().compile()
+    nominal = mjcf.model()
 
     def draw(n: int, rng: np.random.Generator) -> np.ndarray:
         return rng.permutation(postures.draw(nominal, n, rng))
@@ -93,18 +93,18 @@ def recording_too(scenario: "Scenario", file: Path) -> "Scenario":
     if not asked:
         raise ScenarioError(f"{file}: asks for no posture; motions are recorded by hand, see its `motions`")
     campaign = scenario.twin.campaign
-    own = schedule(replace(campaign, only=("postures",)), mjcf.spec().compile(), scenario.seed)[0]
+    own = schedule(replace(campaign, only=("postures",)), mjcf.model(), scenario.seed)[0]
     rests = [tuple(map(float, own.command[round(stop * RATE)])) for _, stop in own.dwells]
     sides = campaign.given_approaches or ((0,) * len(JOINTS),) * len(rests)
-    given: Any = (*rests, *(p.q for p in asked))
-    approaches: Any = (*sides, *(p.approach for p in asked))
-    changed = replace(campaign, given_postures=given, given_approaches=approaches)
-    return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)})
+    return _with_postures(scenario, (*rests, *(p.q for p in asked)), (*sides, *(p.approach for p in asked)))
 
 
 def recording(scenario: "Scenario", plan: "Plan") -> "Scenario":
     """The scenario with the postures of a plan as its calibration postures, each reached from the side it says."""
-    given: Any = tuple(p.q for p in plan.postures)
-    sides: Any = tuple(p.approach for p in plan.postures)
+    return _with_postures(scenario, tuple(p.q for p in plan.postures), tuple(p.approach for p in plan.postures))
+
+
+def _with_postures(scenario: "Scenario", given: Any, sides: Any) -> "Scenario":
+    """The scenario with these calibration postures (n, 8), each reached from its side (n, 8)."""
     changed = replace(scenario.twin.campaign, given_postures=given, given_approaches=sides)
     return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)})

@@ -56,7 +56,6 @@ def test_thirty_designed_postures_beat_random_ones_where_the_robot_departs_from_
     assert against.designed < against.random.min()
 
 
-@pytest.mark.slow
 def test_without_departures_they_beat_random_ones_by_thirty_percent(task):
     exact = replace(task, departures=None)
     against = compared(plan(exact, 30, "G", np.random.default_rng(2)), np.random.default_rng(3))

@@ -184,7 +184,7 @@ VALIDATION_SWINGS = {
 def sweep_path(joint: str, duration: float) -> Swing:
     """One joint back and forth twice about a posture in which gravity loads most of the arm.
 
-    It starts and stops at its highest speed, 0.6 rad / s: faster, and arm_1 pushes the base away.
+    It starts and stops at its highest speed, 0.63 rad/s at most: faster, and arm_1 pushes the base away.
     """
     index, amplitude = JOINTS.index(joint), min(0.6, _SWEEP_SPEED * duration / (2.0 * TAU))
     amplitudes = tuple(amplitude if i == index else 0.0 for i in range(len(JOINTS)))
