@@ -50,7 +50,7 @@ def laboratory(config: TwinConfig, seed: int) -> Laboratory:
     twin = build(mjcf.spec(), robot.defects, links_seen(config, robot), config.timestep)
     x, y, yaw = config.base.pose
     T_lab_base = exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, yaw]))
-    T_lab_base[:2, 3] = x, y
+    T_lab_base[:3, 3] = x, y, config.instruments.plate_place.height
     return Laboratory(config, seed, robot, twin, T_lab_base)
 
 

@@ -16,7 +16,7 @@ from twin.config_base import Base
 from twin.config_datasheet import Datasheet
 from twin.config_departures import Departures
 from twin.config_driving import Driving
-from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, WristSensor
+from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, PlatePlace, WristSensor
 from twin.config_session import Session
 from twin.config_values import (
     STRICT,
@@ -130,6 +130,7 @@ class Instruments:
         mocap: What is wrong with the motion capture.
         plate: With the plate.
         plate_grid: Into how many plates, along x and y, the plate's square is cut; no wheel may stand on a seam.
+        plate_place: Where that square lies.
         log: With the robot's log.
         wrist: The force-torque sensor of the wrist; null: none.
     """
@@ -150,6 +151,7 @@ class Instruments:
     plate: PlateErrors = field(default_factory=PlateErrors)
     log: LogErrors = field(default_factory=LogErrors)
     plate_grid: tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]] = (1, 1)
+    plate_place: PlatePlace = field(default_factory=PlatePlace)
     wrist: WristSensor | None = field(default_factory=WristSensor)
 
 

@@ -38,7 +38,7 @@ class MocapErrors:
 
 @dataclass(frozen=True, config=STRICT)
 class PlateErrors:
-    """Of the force plate; widths are standard deviations of what is drawn for one plate.
+    """Of the force plate, in its own axes; widths are standard deviations of what is drawn for one plate.
 
     Attributes:
         gain: Of each diagonal entry of the gain matrix about 1 [-].
@@ -57,6 +57,21 @@ class PlateErrors:
     force_resolution: FixedNonNegative = 0.0
     moment_resolution: FixedNonNegative = 0.0
     cutoff: FixedNonNegative = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class PlatePlace:
+    """Where the plate lies against its nominal place, as surveyed: it is declared.
+
+    Attributes:
+        shift: Of its centre along the lab's x and y [m].
+        height: Of its surface above the floor around it [m]; the robot stands on it.
+        yaw: About the vertical [rad].
+    """
+
+    shift: tuple[Annotated[float, Field(ge=-0.5, le=0.5)], Annotated[float, Field(ge=-0.5, le=0.5)]] = (0.0, 0.0)
+    height: Annotated[float, Field(ge=-0.05, le=0.05)] = 0.0
+    yaw: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)

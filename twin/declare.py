@@ -1,5 +1,9 @@
 """What the laboratory is told: dataset.json, from datasheet values only."""
 
+from typing import cast
+
+import numpy as np
+
 import mjcf
 from calibration.schema import (
     Body,
@@ -11,14 +15,14 @@ from calibration.schema import (
     Sigmas,
     Tolerances,
     TrialEntry,
+    Vector3,
     Wheel,
 )
 from twin.build import WRIST_SENSOR
-from twin.config import TwinConfig
+from twin.config import Instruments, TwinConfig
 from twin.draw import BASE, TOOL, TORSO
-from twin.instruments.tiles import Tiles
-
-_LAB_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+from twin.instruments.plate_place import T_lab_plate
+from twin.instruments.tiles import PLATE, Tiles
 
 
 def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:
@@ -37,7 +41,7 @@ def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Descripti
             for n, b in i.bodies.items()
         ),
         wheels=tuple(Wheel(name=w.name, type=w.type, centre=w.centre, contact=w.contact) for w in mjcf.wheels()),
-        plates=_plates(Tiles(i.plate_grid)),
+        plates=_plates(i),
         payload=_payload(config),
         wrist_link=None if i.wrist is None else WRIST_SENSOR,
         sigmas=Sigmas(
@@ -57,14 +61,19 @@ def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Descripti
     )
 
 
-def _plates(tiles: Tiles) -> tuple[Plate, ...]:
+def _plates(instruments: Instruments) -> tuple[Plate, ...]:
     spec = mjcf.spec()
-    plate, geom = spec.body("plate"), spec.geom("plate")
-    x, y, z = map(float, plate.pos + spec.site("plate").pos)
-    cut = tiles.cut(*(2.0 * geom.size[:2]).tolist())
+    T = T_lab_plate(spec.body(PLATE), instruments.plate_place)
+    axes = cast(tuple[Vector3, Vector3, Vector3], tuple(map(_vector, T[:3, :3].T)))
+    cut = Tiles(instruments.plate_grid).cut(*(2.0 * spec.geom(PLATE).size[:2]).tolist())
     return tuple(
-        Plate(name=t.name, centre=(x + t.shift[0], y + t.shift[1], z), axes=_LAB_AXES, size=t.size) for t in cut
+        Plate(name=t.name, centre=_vector(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size) for t in cut
     )
+
+
+def _vector(v: np.ndarray) -> Vector3:
+    x, y, z = (float(c) for c in v)
+    return x, y, z
 
 
 def _payload(config: TwinConfig) -> Payload | None:

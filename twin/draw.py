@@ -18,6 +18,7 @@ from twin.defects.loads import Flexibility, LinkMass, Payload
 from twin.defects.placements import Placement
 from twin.defects.sensing import Cluster, Encoder
 from twin.draw_base import ground, wheels_of
+from twin.instruments.plate_place import Laid
 from twin.instruments.tiles import Tiles
 from twin.randomness import generator
 
@@ -54,6 +55,7 @@ def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
     return Robot(
         defects=(
             Tiles(config.instruments.plate_grid),
+            Laid(config.instruments.plate_place),
             *_placements(config, seed),
             *_masses(config, nominal, seed),
             *_gears(config, seed),

@@ -167,7 +167,7 @@ def bench(twin: Twin, gravity: float = 1.0) -> Bench:
     Raises:
         Restless: It does not come to rest.
     """
-    T = transform(np.array([0.9, 0.45, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))
+    T = transform(twin.model.body("plate").pos, np.array([1.0, 0.0, 0.0, 0.0]))
     model, data = put_down(twin.model.__copy__(), T)
     model.opt.gravity *= gravity
     upper = _upper_joints(model)

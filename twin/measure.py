@@ -14,20 +14,19 @@ import numpy as np
 
 from calibration.recording import Trial
 from twin.config import TwinConfig
+from twin.conventions import transform
 from twin.defects.base import Defect
 from twin.draw import BASE, Robot
 from twin.instruments import mocap, optics, plate, robot_log, wrist
 from twin.instruments.clock import Clock, Latency
 from twin.instruments.sampling import averaged, interpolate, interpolate_poses
-from twin.instruments.tiles import Tiles, felt
+from twin.instruments.tiles import PLATE, Tiles, felt
 from twin.kinematic import without_plate
 from twin.laboratory import EPOCH, Laboratory
 from twin.motions import JOINTS, Motion
 from twin.randomness import generator
 from twin.simulate import States
 from twin.truth import TruthTrial
-
-PLATE = "plate"
 
 
 def links_seen(config: TwinConfig, robot: Robot) -> list[str]:
@@ -107,7 +106,7 @@ def plate_centre(model: mujoco.MjModel) -> np.ndarray:
     """Surface centre of the plate in the lab (3,) [m]."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    return data.site("plate").xpos.copy()
+    return data.site(PLATE).xpos.copy()
 
 
 def plate_centres(model: mujoco.MjModel) -> np.ndarray:
@@ -115,6 +114,11 @@ def plate_centres(model: mujoco.MjModel) -> np.ndarray:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     return np.array([data.site(name).xpos for name in felt(model) or (PLATE,)])
+
+
+def plate_axes(model: mujoco.MjModel) -> np.ndarray:
+    """R_lab_plate (3, 3), the same of all plates."""
+    return np.asarray(transform(np.zeros(3), model.body(PLATE).quat)[:3, :3])
 
 
 def _plates(lab: Laboratory) -> tuple[plate.PlateDefect, ...]:
@@ -130,7 +134,7 @@ def _wrenches(lab: Laboratory, motion: Motion, states: States, true: np.ndarray,
     """What the plates say (n, n_plates, 6), one after the other in the stream of their noise."""
     i = lab.config.instruments
     sigma = np.repeat([i.plate_force_noise, i.plate_moment_noise], 3)
-    at = plate.Sampling(true, EPOCH, i.plate_rate, sigma)
+    at = plate.Sampling(true, EPOCH, i.plate_rate, sigma, plate_axes(lab.twin.model))
     rng, t = generator(lab.seed, motion.id, "plate"), states.t + start
     each = zip(np.moveaxis(states.plates, 1, 0), _plates(lab), strict=True)
     return np.stack([plate.measured(at, t, wrench, worn, rng) for wrench, worn in each], axis=1)

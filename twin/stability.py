@@ -52,12 +52,12 @@ def _on_plate(inputs: Inputs, motion: Motion, T_lab_base: np.ndarray) -> None:
     data.qpos[:] = inputs.first[1 : 1 + model.nq]
     mujoco.mj_kinematics(model, data)
     base, plate = data.body(ROOT), data.geom("plate")
-    half = model.geom("plate").size[:2]
+    half, R_lab_plate = model.geom("plate").size[:2], plate.xmat.reshape(3, 3)
     for i in range(model.ngeom):
         name = model.geom(i).name
         if name.endswith(_WHEEL):
             p_base = base.xmat.reshape(3, 3).T @ (data.geom_xpos[i] - base.xpos)
-            p_plate = T_lab_base[:, :2, :3] @ p_base + T_lab_base[:, :2, 3] - plate.xpos[:2]
+            p_plate = (T_lab_base[:, :3, :3] @ p_base + T_lab_base[:, :3, 3] - plate.xpos) @ R_lab_plate[:, :2]
             left = (np.abs(p_plate) > half).any(axis=1)
             _refuse(left, f"{name.removesuffix(_WHEEL)} is off the plate", motion, _EVERY * model.opt.timestep)
             on_seam = (np.abs(p_plate[:, None] - _seams(model)) < _SEAM).any(axis=(1, 2))

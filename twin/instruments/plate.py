@@ -1,13 +1,14 @@
 """Force plate: the wrench averaged over each sample, with white noise and what one plate gets wrong.
 
-    w_m = round(F[G w] + r (t - t0) + n)
+    w_m = R round(F[G R' w] + r (t - t0) + n)
 
-Action of the robot on the plate, lab axes, about the plate's surface centre [N, N.m]. F is the anti-alias filter, G
+Action of the robot on the plate, lab axes, about the plate's surface centre [N, N.m]; R turns both of its halves from
+the plate's axes, in which it samples, to the lab's. F is the anti-alias filter, G
 the gain matrix with crosstalk, r the drift of the offset since the campaign's start t0. F delays by
 sqrt(2) / (2 pi cutoff) at low frequency, which no time stamp knows.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
@@ -19,7 +20,7 @@ from twin.instruments.sampling import averaged
 
 @dataclass(frozen=True)
 class PlateDefect(Defect):
-    """One plate.
+    """One plate, in its own axes.
 
     Attributes:
         name: Its name.
@@ -79,19 +80,22 @@ class Sampling:
         since: The campaign's start [s].
         rate: [Hz].
         sigma: White noise per sample (6,) [N, N.m].
+        R_lab_plate: The plate's axes as columns (3, 3).
     """
 
     t: np.ndarray
     since: float
     rate: float
     sigma: np.ndarray
+    R_lab_plate: np.ndarray = field(default_factory=lambda: np.eye(3))
 
 
 def measured(
     at: Sampling, grid: np.ndarray, wrench: np.ndarray, defect: PlateDefect, rng: np.random.Generator
 ) -> np.ndarray:
     """Samples (n, 6) of the dense wrench (m, 6) at times grid (m,) [s]."""
-    seen = wrench if (defect.gain == np.eye(6)).all() else wrench @ defect.gain.T
+    seen = _turned(wrench, at.R_lab_plate.T)
+    seen = seen if (defect.gain == np.eye(6)).all() else seen @ defect.gain.T
     if defect.cutoff:
         sos = butter(2, defect.cutoff, fs=1.0 / (grid[1] - grid[0]), output="sos")
         seen = sosfilt(sos, seen, axis=0, zi=sosfilt_zi(sos)[:, :, None] * seen[0])[0]
@@ -99,7 +103,12 @@ def measured(
     samples = samples + at.sigma * rng.normal(size=samples.shape)
     if defect.drift.any():
         samples += defect.drift * (at.t - at.since)[:, None]
-    return rounded(samples, defect.resolution)
+    return _turned(rounded(samples, defect.resolution), at.R_lab_plate)
+
+
+def _turned(wrench: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Force and moment of wrenches (n, 6) turned by R (3, 3)."""
+    return (wrench.reshape(-1, 2, 3) @ R.T).reshape(-1, 6)
 
 
 def rounded(samples: np.ndarray, resolution: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 
 from twin.defects.base import UNTOUCHED, Defect, body
 
-_PLATE = "plate"
+PLATE = "plate"
+"""Name of the whole square's body, shape and site."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Tiles(Defect):
     def names(self) -> tuple[str, ...]:
         """Of the plates: along x first, then along y."""
         n = self.grid[0] * self.grid[1]
-        return (_PLATE,) if n == 1 else tuple(f"{_PLATE}{k + 1}" for k in range(n))
+        return (PLATE,) if n == 1 else tuple(f"{PLATE}{k + 1}" for k in range(n))
 
     def cut(self, width: float, depth: float) -> tuple[Tile, ...]:
         """The plates of a square of edges [m] along x and y."""
@@ -59,7 +60,7 @@ class Tiles(Defect):
         """Put the tiles in place of the plate's shape, which then touches nothing; leave one plate alone."""
         if self.grid == (1, 1):
             return
-        whole, plate = spec.geom(_PLATE), body(spec, _PLATE)
+        whole, plate = spec.geom(PLATE), body(spec, PLATE)
         width, depth = 2.0 * whole.size[:2]
         for tile in self.cut(float(width), float(depth)):
             own = plate.add_body(name=tile.name, pos=[*tile.shift, 0.0])
@@ -73,5 +74,5 @@ class Tiles(Defect):
 def felt(model: mujoco.MjModel) -> tuple[str, ...]:
     """Sites of the tiles of a model, in order; none where there is the one plate."""
     sites = [model.site(i).name for i in range(model.nsite)]
-    tiles = {name for name in sites if name.startswith(_PLATE)} - {_PLATE}
-    return tuple(sorted(tiles, key=lambda name: int(name.removeprefix(_PLATE))))
+    tiles = {name for name in sites if name.startswith(PLATE)} - {PLATE}
+    return tuple(sorted(tiles, key=lambda name: int(name.removeprefix(PLATE))))
