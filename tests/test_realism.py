@@ -6,12 +6,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 import mjcf
 from calibration import load as load_dataset
 from calibration.errors import NotEnoughData
 from calibration.play import play
+from calibration.signals import even, low_passed
 from scenarios import cli, exchange, load
 from scenarios.realism.arms import AS_LOGGED
 from scenarios.realism.compare import compare_replay, compare_swings
@@ -108,6 +110,21 @@ def test_the_command_refuses_a_scenario_it_does_not_know(tmp_path, capsys):
         cli.main(["reality", "realty", "--out", str(tmp_path / "a.json")])
     assert left.value.code == 2 and "reality" in capsys.readouterr().err
     assert not (tmp_path / "a.json").exists()
+
+
+def test_the_floor_feels_the_hand_s_inertia(log):
+    """Newton: F = -m a along both horizontal axes. The log's column Fy says +m a, so the mapping reverses it."""
+    columns = [f"gripper{k}_{a}" for k in (1, 2, 3) for a in "xy"]
+    read = np.genfromtxt(LOG_FILE, delimiter=",", names=True, dtype=None, encoding=None, usecols=["time_utc", *columns])
+    hand = np.stack([read[c] for c in columns], axis=1).reshape(-1, 3, 2).mean(axis=1)
+    slow, cycles = (trial for _, trial in load_dataset(log).trials("calibration"))
+    force = low_passed(even(cycles.t_plate, cycles.plate_wrench[:, 0, :2]), 2.5)
+    path = low_passed(even(_seconds(read["time_utc"]), hand), 2.5)
+    t = force.t - slow.t_plate[0]
+    moving = (t > START - 0.4) & (t < t[-1] - 0.5)
+    acceleration = CubicSpline(path.t, path.x)(t[moving], 2)
+    for a, f in zip(acceleration.T, force.x[moving].T, strict=True):
+        assert np.corrcoef(a, f)[0, 1] < -0.95 and -np.polyfit(a, f, 1)[0] == pytest.approx(5.7, abs=0.5)
 
 
 def test_the_swings_turn_the_hand_as_the_log_did():

@@ -111,7 +111,7 @@ def _plates(text: CsvText, table: CsvTable, setup: Setup, t: np.ndarray) -> tupl
 
 
 def _wrench(text: CsvText, channels: PlateChannels, plate: Plate) -> tuple[np.ndarray, str]:
-    force = text.numbers(channels.force)
+    force = text.numbers(channels.force) * channels.signs
     moment = text.numbers(channels.moment, MOMENTS[channels.moment_unit])
     wrench = to_action(force, moment, channels, plate)
     cop = text.numbers(channels.cop, LENGTHS[channels.cop_unit]) if channels.cop else None

@@ -20,6 +20,7 @@ class PlateChannels(Declaration):
         force: Fx, Fy, Fz.
         moment: Mx, My, Mz.
         cop: Centre of pressure x, y, z, against which the convention is checked; may be left out.
+        reversed: Those of `force` whose sign is opposite to that of the others; a centre of pressure feels Fz alone.
         convention: Whose wrench: `action` of the robot on the plate, or the plate's `reaction`.
         axes: `lab`, or `plate`: those declared for the plate.
         about: Point of the moments: the plate's surface `centre`, or the `lab` origin.
@@ -31,12 +32,24 @@ class PlateChannels(Declaration):
     force: Columns
     moment: Columns
     cop: Columns | None = None
+    reversed: tuple[str, ...] = ()
     convention: Literal["action", "reaction"]
     axes: Literal["lab", "plate"]
     about: Literal["centre", "lab"]
     force_unit: Literal["N"]
     moment_unit: Literal["N.m", "N.mm"]
     cop_unit: Literal["m", "mm"] = "m"
+
+    @model_validator(mode="after")
+    def _reversed_are_forces(self) -> "PlateChannels":
+        if other := set(self.reversed) - set(self.force):
+            raise ValueError(f"`reversed` names columns of `force` {list(self.force)}, found {sorted(other)}")
+        return self
+
+    @property
+    def signs(self) -> tuple[float, ...]:
+        """Of the columns of `force`."""
+        return tuple(-1.0 if c in self.reversed else 1.0 for c in self.force)
 
 
 class JointChannels(Declaration):

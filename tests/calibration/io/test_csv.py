@@ -138,6 +138,20 @@ def test_reaction_in_plate_axes_about_the_lab_origin_in_newton_millimetres_is_th
     np.testing.assert_allclose(trial.plate_wrench[:, 0], expected, atol=1e-4)
 
 
+def test_a_force_whose_sign_is_opposite_is_turned_before_moments_are_moved(lab):
+    columns = series()
+    lab.run(series_mapping(), write_csv(lab.folder / "log.csv", columns))
+    ((_, right),) = load(lab.out).trials("calibration")
+    lab.run(series_mapping({"reversed": ["Fy"]}), write_csv(lab.folder / "log.csv", columns | {"Fy": -columns["Fy"]}))
+    ((_, turned),) = load(lab.out).trials("calibration")
+    np.testing.assert_array_equal(turned.plate_wrench, right.plate_wrench)
+
+
+def test_only_a_force_can_be_reversed(lab, capsys):
+    said = lab.refused(capsys, series_mapping({"reversed": ["My"]}), write_csv(lab.folder / "log.csv", series()))
+    assert "`reversed` names columns of `force` ['Fx', 'Fy', 'Fz'], found ['My']" in said
+
+
 def changed(columns, **new):
     return {k: new.get(k, v) for k, v in columns.items()}
 
