@@ -12,6 +12,7 @@ from calibration.dataset import Dataset
 from calibration.errors import InputError, InputErrors, NoSuchElement
 from calibration.io.bodies import in_order, placed_bodies, unmatched
 from calibration.io.check import check, check_order
+from calibration.io.effort_check import check_currents
 from calibration.io.hand_check import check_columns
 from calibration.io.mapping import MappedTrial, MappingFile
 from calibration.io.recorded import Joints, Markers, Plates, Recorded
@@ -69,6 +70,7 @@ def import_files(
     for session in (("calibration", "validation"), ("confirmation",)):
         some = [(recorded[entry.id].file, trial) for entry, trial in found if entry.role in session]
         check_columns(description, chain, some)
+        check_currents(chain, some)
     _write(out, mapping.urdf, description, found)
     return tuple(dict.fromkeys(note for r in recorded.values() for note in r.notes))
 
@@ -107,7 +109,8 @@ def _read_all(files: Sequence[Path], reader: Reader, mapping: MappingFile) -> di
             problems.append(error)
     if problems:
         raise InputErrors(problems)
-    return {t.id: _placed(t, read[t.stem]) for t in trials}
+    turned = mapping.content.reversed_effort
+    return {t.id: _placed(t, read[t.stem].with_currents_turned(turned)) for t in trials}
 
 
 def _placed(trial: MappedTrial, recorded: Recorded) -> Recorded:

@@ -117,6 +117,7 @@ class Mapping(Declaration):
         setup: The robot and its instruments, as in dataset.json.
         bodies: The marker bodies.
         trials: The trials.
+        reversed_effort: Joints whose drives count the motor current against the joint's own direction.
         csv: Kinds of CSV files.
         c3d: What is what in the C3D files.
         bag: What is what in the bags.
@@ -126,18 +127,22 @@ class Mapping(Declaration):
     setup: Setup
     bodies: tuple[MappedBody, ...]
     trials: Annotated[tuple[MappedTrial, ...], Field(min_length=1)]
+    reversed_effort: tuple[str, ...] = ()
     csv: tuple[CsvTable, ...] = ()
     c3d: C3dLayout | None = None
     bag: BagLayout | None = None
 
     @model_validator(mode="after")
-    def _names_are_unique(self) -> "Mapping":
+    def _names_fit(self) -> "Mapping":
         groups = {
             "bodies": [b.name for b in self.bodies],
             "markers": [name for b in self.bodies for name in b.marker_names],
             "trials": [t.id for t in self.trials],
         }
         refuse_repeated(groups)
+        unknown = sorted(set(self.reversed_effort) - set(self.setup.joint_names))
+        if unknown:
+            raise ValueError(f"reversed_effort: {unknown} are no joints of the setup")
         return self
 
 

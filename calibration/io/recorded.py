@@ -3,7 +3,7 @@
 Every channel has its own clock, as the file has it. NaN only where a marker was not seen.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,6 +92,13 @@ class Recorded:
             tuple(sorted({*self.together, *other.together})),
             (*self.notes, *other.notes),
         )
+
+    def with_currents_turned(self, names: Sequence[str]) -> "Recorded":
+        """With the other sign of the motor currents of these joints."""
+        if self.joints is None:
+            return self
+        sign = np.where(np.isin(self.joints.names, names), -1.0, 1.0)
+        return replace(self, joints=replace(self.joints, effort=sign * self.joints.effort))
 
     def timed(self) -> Iterator[tuple[str, np.ndarray]]:
         """Name and times of every channel group."""
