@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.hand import HandModel, HandPoses
+from calibration.hand import HandModel, HandPoses, held_share
 from calibration.loads import gravity_moments
 from calibration.robot import Chain
 
-_HOLDS = 0.3  # tau_0 [N.m]
 _BENDING = 3e-3  # of a joint's place at the largest moment it carries, a tenth of what gears give [rad]
 _LEAST = 0.5  # [N.m] a joint that gravity loads less is not asked
 
@@ -35,7 +34,7 @@ class Departures:
     def effects(self, model: HandModel, q: np.ndarray, found: HandPoses) -> np.ndarray:
         """Local twists of the hand (n, 6, 2 k) at readings q (n, n_measured), for each z = 1; `found` at q."""
         chain, (n, k) = model.chain, (len(q), len(self.held))
-        flank = found.J_joint * (self.held * np.tanh(chain.gravity_torques(q) / _HOLDS))[:, None, :]
+        flank = found.J_joint * (self.held * held_share(chain.gravity_torques(q)))[:, None, :]
         turns = found.J[:, :, 12 : 12 + 6 * k].reshape(n, 6, k, 6)[:, :, :, 3:]
         bent = np.einsum("ndkj,nkj->ndk", turns, self.bending[:, None] * moments(chain, q))
         return np.concatenate([flank, bent], axis=2)

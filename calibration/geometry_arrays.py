@@ -193,7 +193,7 @@ def _parameters(chain: Chain, start: Start, widths: Widths, tau: np.ndarray, ori
     placement = [widths.translation] * 3 + [widths.rotation] * 3
     slides = [chain.is_prismatic(name) for name in chain.joints]
     return ParameterSet(
-        parameter_names(chain),
+        parameter_names(chain)[: 12 + 8 * k],
         ("m", "m", "m", "rad", "rad", "rad") * (2 + k)
         + tuple("m" if s else "rad" for s in slides)
         + tuple("m/N" if s else "rad/(N.m)" for s in slides),

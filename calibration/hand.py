@@ -1,12 +1,13 @@
 """Pose of the hand body in the base body, as a function of the readings and of all parameters.
 
-    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset - compliance tau(q), xi)  T_tool_H
+    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset - compliance tau - held tanh(tau / tau_0), xi)  T_tool_H
 
-tau is the nominal gravity torque at the readings: what the motors must give at rest, [N.m, N].
+tau(q) is the nominal gravity torque at the readings: what the motors must give at rest, [N.m, N]. A gear that gives does
+so in proportion; one with play, 2 `held` wide, lies on the flank that gravity chooses, in its middle where that is less than tau_0.
 Derivatives are local twists of the hand:
 
     d/d(T_tool_H)   L(T_tool_H)                        d/d(xi)      Ad(T_H_tool) J_placement
-    d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint,  compliance: times tau
+    d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint,  compliance: times tau,  held: times tanh(tau / tau_0)
 
 with L = diag(R', Jr(phi)) from (dp, dphi) to the local twist of a frame given as translation and rotation vector.
 """
@@ -19,6 +20,8 @@ import numpy as np
 from calibration.kinematics import Path
 from calibration.robot import Chain
 from calibration.se3 import adjoint, from_vector, inverse, local_twist
+
+_HOLDS = 0.3  # tau_0 [N.m, N]
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class HandModel:
         base: (6,) translation and rotation vector of T_base_B [m, rad].
         hand: (6,) of T_tool_H [m, rad].
         compliance: (k,) of each gear under its gravity torque [rad/(N.m), m/N].
+        held: (k,) half of the play that gravity holds on one flank [rad, m].
     """
 
     chain: Chain
@@ -53,24 +57,26 @@ class HandModel:
     base: np.ndarray
     hand: np.ndarray
     compliance: np.ndarray
+    held: np.ndarray
 
     def with_theta(self, theta: np.ndarray) -> "HandModel":
-        """The model with the first 12 (frames), 12 + 7 k (placements, offsets) or 12 + 8 k (compliances) parameters."""
+        """The model with the first 12 (frames), 12 + 7 k (placements, offsets), 12 + 8 k (compliances) or all parameters."""
         k, theta = len(self.offset), np.append(theta, self.theta[len(theta) :])
         chain = self.chain.with_placements(theta[12 : 12 + 6 * k].reshape(k, 6))
-        return HandModel(chain, theta[12 + 6 * k : 12 + 7 * k], theta[:6], theta[6:12], theta[12 + 7 * k :])
+        offset, compliance, held = theta[12 + 6 * k :].reshape(3, k)
+        return HandModel(chain, offset, theta[:6], theta[6:12], compliance, held)
 
     @property
     def theta(self) -> np.ndarray:
-        """All parameters, (12 + 8 k,)."""
-        return np.concatenate([self.base, self.hand, self.chain.xi.ravel(), self.offset, self.compliance])
+        """All parameters, (12 + 9 k,)."""
+        return np.concatenate([self.base, self.hand, self.chain.xi.ravel(), self.offset, self.compliance, self.held])
 
     def angles(self, q: np.ndarray) -> np.ndarray:
         """Joint positions (n, n_measured) behind readings q."""
         out = np.array(q, dtype=float)
         out[:, self.chain.columns] -= self.offset
-        if self.compliance.any():
-            out[:, self.chain.columns] -= self.compliance * self.chain.gravity_torques(q)
+        if self.compliance.any() or self.held.any():
+            out[:, self.chain.columns] -= self._given(self.chain.gravity_torques(q))
         return out
 
     def in_base_frame(self, q: np.ndarray) -> np.ndarray:
@@ -96,11 +102,11 @@ class HandModel:
             n_parameters: How many of theta to differentiate by; all where not given.
         """
         k = len(self.offset)
-        p = 12 + 8 * k if n_parameters is None else n_parameters
+        p = 12 + 9 * k if n_parameters is None else n_parameters
         if tau is None:
-            yields = self.compliance.any() or p > 12 + 7 * k
+            yields = self.compliance.any() or self.held.any() or p > 12 + 7 * k
             tau = self.chain.gravity_torques(q) if yields else np.zeros((len(q), k))
-        placed = self._path.placed(q[:, self.chain.columns] - self.offset - self.compliance * tau)
+        placed = self._path.placed(q[:, self.chain.columns] - self.offset - self._given(tau))
         twists = self.chain.twists.copy()
         twists[0, :, :6] = -local_twist(self.base)
         found, J = placed.end_twists(twists), np.empty((len(q), 6, p))
@@ -110,8 +116,14 @@ class HandModel:
             J[:, :, 12 : 12 + 6 * k] = found[:, :, 1:, :6].reshape(len(q), 6, 6 * k)
             J[:, :, 12 + 6 * k : 12 + 7 * k] = -J_joint
         if p > 12 + 7 * k:
-            J[:, :, 12 + 7 * k :] = -tau[:, None, :] * J_joint
+            J[:, :, 12 + 7 * k : 12 + 8 * k] = -tau[:, None, :] * J_joint
+        if p > 12 + 8 * k:
+            J[:, :, 12 + 8 * k :] = -held_share(tau)[:, None, :] * J_joint
         return HandPoses(placed.T, J, J_joint)
+
+    def _given(self, tau: np.ndarray) -> np.ndarray:
+        """How far readings (n, k) are off by what gears give and play lets under gravity torques tau (n, k)."""
+        return self.compliance * tau + self.held * held_share(tau)
 
     @cached_property
     def _path(self) -> Path:
@@ -124,4 +136,9 @@ class HandModel:
 def nominal_hand(chain: Chain, frames: np.ndarray) -> HandModel:
     """The datasheet's robot with marker frames (12,) [m, rad]."""
     k = len(chain.joints)
-    return HandModel(chain, np.zeros(k), frames[:6], frames[6:], np.zeros(k))
+    return HandModel(chain, np.zeros(k), frames[:6], frames[6:], np.zeros(k), np.zeros(k))
+
+
+def held_share(tau: np.ndarray) -> np.ndarray:
+    """tanh(tau / tau_0) of gravity torques [N.m, N]: on which flank they hold a gear's play, -1 to 1."""
+    return np.asarray(np.tanh(tau / _HOLDS))

@@ -4,6 +4,7 @@
     geometry.<joint>      exp6 twist on the right of the joint placement [m, rad]
     encoder.<joint>.motor.offset      reading = angle + offset [rad, m]
     gear.<joint>.compliance           reading = angle + offset + compliance * gravity torque [rad/(N.m), m/N]
+    gear.<joint>.held                 reading = angle + ... + held * tanh(gravity torque / tau_0) [rad, m], see `hand`
 
 A joint's offset and the twist along its axis move the hand alike: the data speak of their combination, their
 tolerances divide it.
@@ -20,7 +21,7 @@ from calibration.schema import Body, Description
 from calibration.se3 import from_vector, to_vector
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
-TRANSLATIONS, ROTATIONS, ZEROS, COMPLIANCES = range(4)  # groups of parameters whose tolerances share a factor
+TRANSLATIONS, ROTATIONS, ZEROS, COMPLIANCES, HELD = range(5)  # groups of parameters whose tolerances share a factor
 DEFLECTION = 3e-2  # of a gear at its own largest gravity torque, play that gravity holds on one flank included [rad]
 _TORQUE = 0.5  # [N.m, N] a joint that gravity loads less has no own range of torque
 METRES_PER_RAD = 0.1  # a prismatic joint's tolerances are an angle's times this
@@ -75,6 +76,7 @@ def parameter_names(chain: Chain) -> tuple[str, ...]:
         *(f"geometry.{joint}.{axis}" for joint in chain.joints for axis in AXES),
         *(f"encoder.{joint}.motor.offset" for joint in chain.joints),
         *(f"gear.{joint}.compliance" for joint in chain.joints),
+        *(f"gear.{joint}.held" for joint in chain.joints),
     )
 
 
@@ -116,11 +118,23 @@ def gear_parameters(chain: Chain, description: Description, tau: np.ndarray) -> 
     geometry, k = geometry_parameters(chain, description), len(chain.joints)
     slides = [chain.is_prismatic(j) for j in chain.joints]
     return ParameterSet(
-        parameter_names(chain),
+        parameter_names(chain)[: 12 + 8 * k],
         geometry.units + tuple("m/N" if s else "rad/(N.m)" for s in slides),
         np.append(geometry.nominal, np.zeros(k)),
         np.append(geometry.tolerance, gear_tolerances(chain, tau, DEFLECTION)),
         np.append(geometry.groups, np.full(k, COMPLIANCES)),
+    )
+
+
+def held_parameters(chain: Chain, description: Description, tau: np.ndarray) -> ParameterSet:
+    """Those of the gears, and the play that gravity holds, as wide as the datasheet's."""
+    gears, k = gear_parameters(chain, description, tau), len(chain.joints)
+    return ParameterSet(
+        parameter_names(chain),
+        gears.units + tuple("m" if chain.is_prismatic(j) else "rad" for j in chain.joints),
+        np.append(gears.nominal, np.zeros(k)),
+        np.append(gears.tolerance, play_start(chain, description)),
+        np.append(gears.groups, np.full(k, HELD)),
     )
 
 
