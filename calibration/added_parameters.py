@@ -3,9 +3,9 @@
     r = r_0 + J dtheta + H z + e,     z ~ N(0, I) against z = 0,     e and dtheta as the fit has them
     log B = g' (I + M)^-1 g / 2 - log det(I + M) / 2,     g = -H' r_0,     M = H' (I - A C A') H
 
-H (m, h) are whitened derivatives by the new parameters times their prior widths, A those by the fitted ones, C the fit's
-covariance: z is judged after theta has taken what it can. The random errors' sizes stay what they are without z, so that
-what they had to swallow speaks against z: the factor is a lower one.
+H (m, h) are whitened derivatives by the new parameters times their prior widths, A those by the fitted ones, C the
+fit's covariance: z is judged after theta has taken what it can. The random errors' sizes stay what they are without z,
+so that what they had to swallow speaks against z: the factor is a lower one.
 Reference: Kass, Raftery, JASA 1995.
 """
 

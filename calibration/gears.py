@@ -52,7 +52,7 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
 
 
 def _speaks_for_play(found: RobustFit, tau: np.ndarray, width: np.ndarray) -> float:
-    """Log Bayes factor of play that gravity holds, `width` (k,) believed, at gravity torques tau (n, k) of the postures."""
+    """Log Bayes factor of held play, `width` (k,) believed, at gravity torques tau (n, k) of the postures."""
     J = -held_share(tau[found.kept])[:, None, :] * found.fit.at.J_joint
     return log_bayes_factor(found.fit, J, width)
 

@@ -2,13 +2,14 @@
 
     T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset - compliance tau - held tanh(tau / tau_0), xi)  T_tool_H
 
-tau(q) is the nominal gravity torque at the readings: what the motors must give at rest, [N.m, N]. A gear that gives does
-so in proportion; one with play, 2 `held` wide, lies on the flank that gravity chooses, in its middle where that is less than tau_0.
+tau(q) is the nominal gravity torque at the readings: what the motors must give at rest, [N.m, N]. A gear gives in
+proportion; one with play, 2 `held` wide, lies on the flank that gravity chooses, near its middle where that is weak.
 Derivatives are local twists of the hand:
 
     d/d(T_tool_H)   L(T_tool_H)                        d/d(xi)      Ad(T_H_tool) J_placement
-    d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint,  compliance: times tau,  held: times tanh(tau / tau_0)
+    d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint
 
+by compliance as by offset times tau, by held times tanh(tau / tau_0),
 with L = diag(R', Jr(phi)) from (dp, dphi) to the local twist of a frame given as translation and rotation vector.
 """
 
@@ -60,7 +61,7 @@ class HandModel:
     held: np.ndarray
 
     def with_theta(self, theta: np.ndarray) -> "HandModel":
-        """The model with the first 12 (frames), 12 + 7 k (placements, offsets), 12 + 8 k (compliances) or all parameters."""
+        """The model with other frames (the first 12), placements and offsets (12 + 7 k), compliances (12 + 8 k), or all."""
         k, theta = len(self.offset), np.append(theta, self.theta[len(theta) :])
         chain = self.chain.with_placements(theta[12 : 12 + 6 * k].reshape(k, 6))
         offset, compliance, held = theta[12 + 6 * k :].reshape(3, k)
