@@ -61,7 +61,7 @@ class HandModel:
     held: np.ndarray
 
     def with_theta(self, theta: np.ndarray) -> "HandModel":
-        """The model with other frames (the first 12), placements and offsets (12 + 7 k), compliances (12 + 8 k), or all."""
+        """The model with the first of theta changed: 12 frames, 12 + 7 k with placements and offsets, and so on."""
         k, theta = len(self.offset), np.append(theta, self.theta[len(theta) :])
         chain = self.chain.with_placements(theta[12 : 12 + 6 * k].reshape(k, 6))
         offset, compliance, held = theta[12 + 6 * k :].reshape(3, k)
