@@ -57,7 +57,7 @@ class Compensator:
         hand: The calibrated robot.
         covariance: (p, p) of its first p parameters, in the order of `HandModel.theta`; the others are known.
         play: (k,) random reading error of each joint [rad, m].
-        hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
+        hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; (1,) of the position, (0,) none.
         joints: Joint models, None where the estimate has none.
         suspension: None where the estimate has none.
         laboratory: Where it was found, None where the estimate does not say.
@@ -70,6 +70,11 @@ class Compensator:
     joints: JointModels | None = None
     suspension: Suspension | None = None
     laboratory: Description | None = None
+
+    @property
+    def spread(self) -> Spread:
+        """What it is not sure of."""
+        return Spread(self.covariance, self.play, self.hand_error)
 
     @classmethod
     def load(cls, folder: Path | str, payload: float | None = None) -> "Compensator":
@@ -139,8 +144,7 @@ class Compensator:
             q_motor: (n, n_joints) readings at rest [rad, m].
             session: Another day: base and marker body are not quite where they were; `Session()` for what is usual.
         """
-        spread = Spread(self.covariance, self.play, self.hand_error)
-        return predicted_points(self.hand, spread, np.asarray(markers, dtype=float), q_motor, session)
+        return predicted_points(self.hand, self.spread, np.asarray(markers, dtype=float), q_motor, session)
 
     def step(
         self,
@@ -186,7 +190,7 @@ class Compensator:
         T_base_hand = from_vector(self.hand.base) @ found.T
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
-        covariance += np.diag(np.repeat(self.hand_error if len(self.hand_error) else np.zeros(2), 3) ** 2)
+        covariance += np.diag(self.spread.hand_variances)
         return HandPose(T_base_hand, covariance)
 
 

@@ -53,6 +53,17 @@ class Spread:
     reading: np.ndarray
     hand: np.ndarray
 
+    @property
+    def hand_variances(self) -> np.ndarray:
+        """(6,) of the hand's own random errors."""
+        pose = np.zeros(6)
+        pose[: 3 * len(self.hand)] = np.repeat(self.hand, 3) ** 2
+        return pose
+
+    def random_errors(self, J_joint: np.ndarray) -> np.ndarray:
+        """Covariance (n, 6, 6) of readings' and hand's random errors; J_joint (n, 6, k) by joint position."""
+        return np.asarray((J_joint * self.reading**2) @ np.swapaxes(J_joint, 1, 2) + np.diag(self.hand_variances))
+
 
 @dataclass(frozen=True)
 class Predicted:
@@ -79,11 +90,9 @@ def predicted_points(
 ) -> Predicted:
     """Markers (m, 3) [m] of the hand's body at readings q (n, n_measured), in another session where one is given."""
     found = hand.poses_and_derivatives(np.asarray(q, dtype=float), n_parameters=len(spread.theta))
-    eye, pose = np.broadcast_to(np.eye(6), (len(found.T), 6, 6)), np.zeros(6)
-    pose[: 3 * len(spread.hand)] = np.repeat(spread.hand, 3)
-    S = found.J @ spread.theta @ np.swapaxes(found.J, 1, 2) + eye * pose**2
-    S = S + (found.J_joint * spread.reading**2) @ np.swapaxes(found.J_joint, 1, 2)
+    S = found.J @ spread.theta @ np.swapaxes(found.J, 1, 2) + spread.random_errors(found.J_joint)
     if session is not None:
+        eye = np.broadcast_to(np.eye(6), S.shape)
         both = np.concatenate([adjoint(inverse(found.T)), eye], axis=2)
         S = S + (both * session.variances) @ np.swapaxes(both, 1, 2)
     R = found.T[:, None, :3, :3]

@@ -6,6 +6,7 @@ Asked of the dwells of the session's registration trials, which are not scored. 
 `model_1`, are not registered. Encoders that were homed anew are not asked for: their error is part of the prediction's.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,10 +43,19 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
     trials = [dataset.read(entry) for entry in registration_trials(dataset)]
     models = dict(predict.models)
     for name in models.keys() - set(_DATASHEET):
-        seen = [_dwells(predict, name, trial) for trial in trials]
-        q, T = (np.concatenate(parts) for parts in zip(*seen, strict=True)) if seen else (np.empty(0), np.empty(0))
-        models[name] = _fit(models[name], q, T, predict.description)
+        models[name] = fit_frames(models[name], *_postures(predict, name, trials), predict.description)
     return replace(predict, models=models)
+
+
+def registration_postures(predict: Predictor, name: str, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Mean positions (n, n_joints) a row's geometry is asked with, and measured T_B_H (n, 4, 4), a dwell each."""
+    return _postures(predict, name, [dataset.read(entry) for entry in registration_trials(dataset)])
+
+
+def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:
+    seen = [_dwells(predict, name, trial) for trial in trials]
+    q, T = (np.concatenate(parts) for parts in zip(*seen, strict=True)) if seen else (np.empty(0), np.empty(0))
+    return q, T
 
 
 def _dwells(predict: Predictor, name: str, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
@@ -61,9 +71,19 @@ def _dwells(predict: Predictor, name: str, trial: Trial) -> tuple[np.ndarray, np
     return np.array([q[k].mean(axis=0) for k in seen]), np.array([mean(T[k]) for k in seen])
 
 
-def _fit(model: HandModel, q: np.ndarray, T_measured: np.ndarray, description: Description) -> HandModel:
+def frame_weights(description: Description) -> np.ndarray:
+    """(6,) weights of a pose's errors: in tolerances of a marker body [1/m, 1/rad]."""
     tol = description.tolerances
-    weight = 1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)
+    return 1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)
+
+
+def fit_frames(model: HandModel, q: np.ndarray, T_measured: np.ndarray, description: Description) -> HandModel:
+    """The model with both marker frames fitted to T_measured (n, 4, 4) at q (n, n_joints).
+
+    Raises:
+        NotEnoughData: Fewer than two postures, or they turn the hand about one direction only.
+    """
+    weight = frame_weights(description)
     if len(q) < 2:
         raise NotEnoughData(f"{len(q)} registration postures of the confirmation session show base and hand; make more")
     for _ in range(_STEPS):

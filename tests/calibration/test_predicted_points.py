@@ -41,6 +41,11 @@ def test_random_errors_of_readings_go_along_lever_arms(hand):
     np.testing.assert_allclose(found.covariance[0, 0], expected, atol=0.05 * np.trace(expected))
 
 
+def test_a_hand_that_was_seen_as_a_point_has_random_errors_of_its_place_only():
+    seen = Spread(NONE.theta, np.full(2, 1e-3), np.array([2e-3]))
+    np.testing.assert_array_equal(seen.random_errors(np.zeros((1, 6, 2))), [np.diag([4e-6] * 3 + [0.0] * 3)])
+
+
 def test_the_radius_of_a_sphere_is_that_of_chi_with_three_degrees():
     found = Predicted(np.zeros((1, 1, 3)), np.eye(3)[None, None])
     assert found.radius_95[0, 0] == pytest.approx(np.sqrt(7.815), rel=1e-3)
