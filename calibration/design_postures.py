@@ -12,7 +12,7 @@ from calibration.design_sides import Sides, sides
 from calibration.design_tour import Tour, tour
 from calibration.hand import HandModel, nominal_hand
 from calibration.information import Prospect, departing, prospect
-from calibration.parameters import ParameterSet, gear_parameters, geometry_parameters, play_floor, play_start
+from calibration.parameters import ParameterSet, geometry_parameters, held_parameters, play_floor, play_start
 from calibration.remedy import Posture, Remedy, Sigma
 from calibration.robot import chain_of
 from calibration.schema import Description
@@ -111,16 +111,16 @@ def nominal_task(
         description: Of the laboratory.
         rng: For what is drawn.
         work: Draws postures like those the robot works in.
-        gears: Whether the postures alone are to tell the gears, as they are where no motion is recorded.
+        gears: Whether the postures alone are to tell the gears and their play, as where no motion is recorded.
     """
     chain = chain_of(urdf, description)
     play = np.maximum(play_start(chain, description), play_floor(chain, description))
     room = room_of(shapes_of(urdf, chain, description), description, rng)
     anywhere = room.sample(_ANYWHERE, rng)
-    parameters = geometry_parameters(chain, description)
+    parameters, held = geometry_parameters(chain, description), play
     if gears:
-        parameters = gear_parameters(chain, description, chain.gravity_torques(anywhere))
-    departures = departures_of(chain, play, anywhere)
+        parameters, held = held_parameters(chain, description, chain.gravity_torques(anywhere)), np.zeros(len(play))
+    departures = departures_of(chain, held, anywhere)
     hand = nominal_hand(chain, parameters.nominal[:12])
     return Task(room, hand, parameters, play, departures=departures, work=work)
 

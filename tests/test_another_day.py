@@ -60,6 +60,7 @@ def shares(tmp_path_factory) -> np.ndarray:
         again = registered_anew(robot, *registration_postures(predict, "full", dataset), dataset.description)
         pairs = ((again, None), (again, Session()), (robot, Session()), (robot, REMOUNTED))
         found.append([inside(r, dataset, predict.robot, session) for r, session in pairs])
+    print((100.0 * np.array(found)).round().astype(int))
     return np.array(found)
 
 
