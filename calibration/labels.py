@@ -7,24 +7,25 @@ cluster's shortest edge, something is labelled wrongly: the permutation that fit
 limit and no other fits nearly as well. Of several that fit, as a cluster alike in two directions has, the one is taken
 that leaves the markers where they were just before and after, if no other comes nearly as near; otherwise the body's
 markers are masked at that instant. A single foreign marker is masked alone where the others are rigid without it. A
-drawing that is off raises the limit to three times the trial's usual misfit.
+drawing that is off raises the limit to three times the trial's usual misfit. For exchanges that keep the shape see
+`label_jumps`.
 """
 
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations
+from itertools import permutations
 
 import numpy as np
 
 from calibration.bodies import body_poses
+from calibration.label_jumps import MOST, shortest_edge, without_jumps
 from calibration.recording import Trial
 from calibration.schema import Body
 
 _LIMIT = 0.1  # of the shortest edge [-]
 _CLEAR = 3.0  # times better than the next permutation [-]
 _NEAR = 1.0  # [s] within which markers seen rightly tell where they are
-_MOST = 6  # markers of a cluster whose permutations are tried: 720
 _log = logging.getLogger(__name__)
 
 
@@ -45,18 +46,27 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
         xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
         if len(columns) < 3 or not len(position):
             continue
-        misfit = _misfit(xyz, position[:, columns])
-        rows = np.flatnonzero(misfit > max(_limit(xyz), _CLEAR * float(np.median(misfit))))
+        before = position[:, columns]
+        after = without_jumps(xyz, trial.t_mocap, _of_one_shape(xyz, trial.t_mocap, before))
+        rows = np.flatnonzero(((after != before) & ~(np.isnan(after) & np.isnan(before))).any(axis=(1, 2)))
         if not len(rows):
             continue
-        mended = _mended(xyz, position[np.ix_(rows, columns)], _places(trial.t_mocap, position[:, columns], rows))
         position = position.copy()
-        position[np.ix_(rows, columns)] = mended
-        n_masked = int(np.isnan(mended).all(axis=(1, 2)).sum())
+        position[:, columns] = after
+        n_masked = int(np.isnan(after[rows]).all(axis=(1, 2)).sum())
         done.append(Relabelled(body.name, len(rows) - n_masked, n_masked))
         told = "%s: labels of body %r exchanged: %d frames set right, %d masked"
         _log.warning(told, trial.id, body.name, len(rows) - n_masked, n_masked)
     return (replace(trial, marker_position=position) if done else trial), tuple(done)
+
+
+def _of_one_shape(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Markers (n, m, 3) set right or masked where they have not the cluster's shape."""
+    misfit = _misfit(xyz, p)
+    rows = np.flatnonzero(misfit > max(_limit(xyz), _CLEAR * float(np.median(misfit))))
+    out = p.copy()
+    out[rows] = _mended(xyz, p[rows], _places(t, p, rows))
+    return out
 
 
 def _columns(body: Body, trial: Trial) -> np.ndarray:
@@ -65,7 +75,7 @@ def _columns(body: Body, trial: Trial) -> np.ndarray:
 
 
 def _limit(xyz: np.ndarray) -> float:
-    return _LIMIT * min(float(np.linalg.norm(a - b)) for a, b in combinations(xyz, 2))
+    return _LIMIT * shortest_edge(xyz)
 
 
 def _misfit(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -93,7 +103,7 @@ def _places(t: np.ndarray, p: np.ndarray, wrong: np.ndarray) -> np.ndarray:
 def _mended(xyz: np.ndarray, p: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Markers (n, m, 3) in the order that fits, or NaN; `places` (n, m, 3) is where they were around."""
     m = p.shape[1]
-    orders = np.array(list(permutations(range(m)))) if m <= _MOST else np.arange(m)[None]
+    orders = np.array(list(permutations(range(m)))) if m <= MOST else np.arange(m)[None]
     found = np.array([_misfit(xyz, p[:, order]) for order in orders])
     fits = found <= _limit(xyz)
     found[:, np.isfinite(p).all(axis=2).sum(axis=1) < 4] = np.inf  # three say nothing by their shape
