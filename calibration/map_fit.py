@@ -20,7 +20,7 @@ from scipy.linalg import lapack
 
 from calibration.evidence import Noise, Widths, inverse_and_log_det, moved_by, refined
 from calibration.linearised import Linearised, Prior
-from calibration.parsimony import without_needless
+from calibration.parsimony import needed
 
 _OUTER = 15
 _PROMISE = 1e-3  # the last Gauss-Newton step promises a smaller decrease of the cost [-], the one after it 1e-7
@@ -123,14 +123,14 @@ def solve(
     same, promise = (_HASTY, _HASTY_PROMISE) if hasty else (_SAME, _PROMISE)
     widths, noise = problem.widths, problem.sources(at)
     some = spread(len(at.r), at.r.shape[1], _MANY)
-    change = np.inf
-    for round_ in range(_OUTER):
+    change, free = np.inf, None
+    for _ in range(_OUTER):
         settled = change < same
         old = widths
-        if not settled:
+        if not settled and hasty:
             widths = refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
-        if round_ == 0 and not hasty and len(some) == len(at.r):
-            noise, widths = without_needless(at, noise, problem.prior, widths)
+        elif not settled:
+            free, widths = needed(at.rows(some), noise.rows(some), problem.prior, widths, free, same)
         W = noise.whitener(widths.noise)
         step = _step(problem.prior, at, W, widths)
         if not settled:
@@ -147,7 +147,7 @@ def solve(
         lower = at if still else _descended(problem, at, W, widths, step)
         if lower is None:
             break
-        at, noise = lower, replace(problem.sources(lower), weight=noise.weight, free=noise.free)
+        at, noise = lower, replace(problem.sources(lower), weight=noise.weight)
     return Fit(at, noise, widths, step.covariance, W, False)
 
 

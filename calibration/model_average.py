@@ -1,17 +1,21 @@
 """Averaging over which of some parameters are needed at all.
 
-    w_m = p(m | data) ~ p(theta_m = 0 | data) / p(theta_m = 0)        m: a set of parameters that are zero
+    w_m = p(m | data) ~ p(m) p(theta_m = 0 | data) / p(theta_m = 0)        m: a set of parameters that are zero
+    p(m) ~ 1 / C(k, |m|)
     theta = sum_m w_m theta_m,     covariance = sum_m w_m (covariance_m + (theta_m - theta) (theta_m - theta)')
 
 theta_m and covariance_m are the Gaussian posterior of all parameters given those zeros. A parameter the data do not
-need costs nothing then, one they need stays, and where they cannot tell, both are averaged, by their evidence. All sets
-are equally likely beforehand.
-References: Dickey, Ann. Math. Stat. 1971 (density ratio); Hoeting et al., Statistical Science 1999 (averaging).
+need costs nothing then, one they need stays, and where they cannot tell, both are averaged, by their evidence. Every
+number of zeros is equally likely beforehand, and every set of that number: a share of parameters that are needed, of
+which nothing is known, is integrated out, so that seven that are zero speak against the eighth.
+References: Dickey, Ann. Math. Stat. 1971 (density ratio); Hoeting et al., Statistical Science 1999 (averaging);
+Scott, Berger, Annals of Statistics 2010 (the prior of sets).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import betaln
 
 _MOST = 10  # parameters that are asked; of more, those farthest from zero are needed without asking
 
@@ -43,6 +47,7 @@ def averaged(theta: np.ndarray, covariance: np.ndarray, asked: np.ndarray, width
     masked = zero[:, :, None] * zero[:, None] * S + np.eye(k) * (1 - zero)[:, None]
     inverse = np.linalg.inv(masked) * zero[:, :, None] * zero[:, None]
     log_w = -0.5 * (np.einsum("i,mij,j->m", x, inverse, x) + np.linalg.slogdet(masked)[1])
+    log_w = log_w + betaln(zero.sum(axis=1) + 1, len(asked) - zero.sum(axis=1) + 1)
     w = np.exp(log_w - log_w.max())
     w = w / w.sum()
     gain = covariance[:, mine] / width[weak]

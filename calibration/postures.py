@@ -45,6 +45,7 @@ class Postures:
         misfit: (n,) rms distance of markers from their nominal places in their cluster [m].
         label: (n,) trial and number, counted from 0, or time; empty where they have no name.
         point: (3,) the point that was seen, in the hand's frame [m].
+        motion: (n,) which motion a posture was passed in, counted from 0, -1 where the arm stood; it did if not given.
     """
 
     q: np.ndarray
@@ -53,6 +54,11 @@ class Postures:
     misfit: np.ndarray
     label: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=str))
     point: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    motion: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def __post_init__(self) -> None:
+        if len(self.motion) != len(self.q):
+            object.__setattr__(self, "motion", np.full(len(self.q), -1))
 
     def __len__(self) -> int:
         return len(self.q)
@@ -66,7 +72,7 @@ class Postures:
         """Some of the postures."""
         label = self.label[chosen] if len(self.label) else self.label
         T, S = self.T_base_hand[chosen], self.covariance[chosen]
-        return Postures(self.q[chosen], T, S, self.misfit[chosen], label, self.point)
+        return Postures(self.q[chosen], T, S, self.misfit[chosen], label, self.point, self.motion[chosen])
 
     def joined(self, other: "Postures") -> "Postures":
         """These postures, then the other ones."""
@@ -131,9 +137,11 @@ def _points(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarra
 def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
     """Postures passed through every `spacing` [s] of these trials, one sample each, their first second left out."""
     found = [_passed(description, trial, robot, spacing) for trial in trials]
+    motion = np.repeat(np.arange(len(found)), [len(of_trial[1]) for of_trial in found])
     T, q, S, misfit, label = (np.concatenate(x) for x in zip(*found, strict=True))
     good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
-    return Postures(q[good], T[good], S[good] * description.sigmas.marker**2, misfit[good], label[good])
+    S = S * description.sigmas.marker**2
+    return Postures(q, T, S, misfit, label, motion=motion).rows(good)
 
 
 def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:

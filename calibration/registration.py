@@ -7,14 +7,16 @@ markers' noise is a tenth of one, so position and rotation weigh as the datashee
 postures passed through in swings count beside the static ones: a baseline must not hang on where the statics lie.
 A posture much farther from the others' fit than they are, `_STRAY` times their median squared distance, is left out and
 named: a robot's own errors are much alike over its workspace. The first guess minimises distances, not their squares.
-With the arm alone moving, all twelve are identifiable once it turns about two directions; where the base stands in the
-lab is not asked.
+Samples of one swing hang together in time, by the robot's own errors foremost: the covariance is summed over blocks of
+several correlation times, each static posture being one (`block_covariance`). With the arm alone moving, all twelve
+are identifiable once it turns about two directions; where the base stands in the lab is not asked.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from calibration.block_covariance import block_covariance
 from calibration.estimate import Model
 from calibration.hand import HandModel, nominal_hand
 from calibration.hand_fit import fit_weighted, linearised
@@ -50,6 +52,7 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
             "so a turn of both frames about it cannot be told apart; move another joint"
         )
         return model, (Verdict(STAGE, "warning", message),)
+    model = model_of(STAGE, chain, parameters, _in_time(found, parameters, postures.motion[kept]))
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
     message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from its drawing"
     said = [Verdict(STAGE, "ok", message)]
@@ -61,6 +64,19 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
         )
         said.append(Verdict(STAGE, "warning", message + f"out, counted from 0: {names}"))
     return model, tuple(said)
+
+
+def _in_time(found: Fit, parameters: ParameterSet, motion: np.ndarray) -> Fit:
+    """The fit, samples of one `motion` (n,) no longer taken for independent; as it is where the arm always stood."""
+    if (motion < 0).all():
+        return found
+    J, prior = found.whitener @ found.at.J, 1.0 / parameters.tolerance**2
+    swings = [np.flatnonzero(motion == k) for k in np.unique(motion[motion >= 0])]
+    series = [*np.flatnonzero(motion < 0)[:, None], *swings]
+    blocks = block_covariance([J[rows] for rows in series], [found.r_white[rows] for rows in series], prior)
+    H = found.J_white.T @ found.J_white + np.diag(prior)
+    drawn = np.linalg.solve(H, np.diag(np.sqrt(prior)))
+    return replace(found, covariance=blocks.covariance + drawn @ drawn.T)
 
 
 def _without_strays(

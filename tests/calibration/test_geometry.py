@@ -11,6 +11,7 @@ from calibration.identifiability import identifiability
 from calibration.parameters import geometry_parameters, nominal_frames, play_floor, play_start, registration_parameters
 from calibration.postures import Postures
 from calibration.registration import register
+from calibration.twists import exp6
 from tests.calibration import matched
 
 TINY = np.full(8, 1e-12)
@@ -134,6 +135,27 @@ def test_registration_alone_recovers_both_frames(chain):
     )
     assert [v.verdict for v in verdicts] == ["ok"]
     np.testing.assert_allclose([p.value for p in model.parameters], np.r_[truth.base, truth.hand], atol=1e-8)
+
+
+def test_registration_does_not_take_samples_of_a_swing_for_independent(chain):
+    """Two swings whose residuals keep 0.9 of themselves from sample to sample beside ten static postures."""
+    truth, z = replace(matched.defects(2), xi=np.zeros((8, 6)), offset=np.zeros(8)), []
+    t = np.arange(150) / 2.0
+    centre, angles = matched.CENTRE, np.arange(8)
+    swings = [centre + 0.5 * np.sin(t[:, None] * (0.3 + 0.07 * angles) + k + angles) for k in range(2)]
+    q = np.concatenate([matched.near_postures(np.random.default_rng(1), 10), *swings])
+    motion, size = np.repeat([-1, 0, 1], [10, 150, 150]), np.repeat([1e-3, 2e-3], 3)
+    still = replace(matched.postures(truth, q), motion=motion)
+    for seed in range(40):
+        e = np.random.default_rng(seed).normal(size=(len(q), 6))
+        for k in range(1, len(q)):
+            if motion[k] >= 0 and motion[k] == motion[k - 1]:
+                e[k] = 0.9 * e[k - 1] + np.sqrt(1.0 - 0.9**2) * e[k]
+        model, _ = register(chain, matched.described(), replace(still, T_base_hand=still.T_base_hand @ exp6(e * size)))
+        error = np.array([p.value for p in model.parameters]) - np.r_[truth.base, truth.hand]
+        z.append(error / np.array([p.sigma for p in model.parameters]))
+    print((np.abs(z) < 1.96).mean(), np.mean(np.square(z)))
+    assert 0.92 <= np.mean(np.abs(z) < 1.96) <= 0.98
 
 
 def test_registration_says_what_one_turning_joint_cannot_tell(chain):

@@ -1,6 +1,7 @@
 """Averaging over sets of parameters against the same sums written out, and its limits."""
 
 from itertools import combinations
+from math import comb
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def test_the_average_is_the_sum_over_all_sets_by_their_evidence():
     for zero in sets:
         rest = [i for i in range(5) if i not in zero]
         B = A[:, rest]
-        weights.append(multivariate_normal(cov=1.5**2 * np.eye(12) + B @ B.T).pdf(y))
+        weights.append(multivariate_normal(cov=1.5**2 * np.eye(12) + B @ B.T).pdf(y) / comb(3, len(zero)))
         C, m = np.zeros((5, 5)), np.zeros(5)
         C[np.ix_(rest, rest)] = np.linalg.inv(B.T @ B / 1.5**2 + np.eye(len(rest)))
         m[rest] = C[np.ix_(rest, rest)] @ B.T @ y / 1.5**2
@@ -52,6 +53,17 @@ def test_a_parameter_without_data_is_averaged_half_and_half():
     found = averaged(np.zeros(1), np.eye(1), np.array([0]), np.ones(1))
     assert found.needed == pytest.approx([0.5])
     assert found.covariance == pytest.approx(np.array([[0.5]]))
+
+
+def test_parameters_that_are_zero_speak_against_the_next():
+    """Of eight known to be zero within a hundredth of their width: an eighth of the odds of one that is alone."""
+    alone, eighth = (averaged(np.zeros(k), 1e-4 * np.eye(k), np.arange(k), np.ones(k)).needed[-1] for k in (1, 8))
+    assert alone == pytest.approx(0.01, rel=0.02)
+    assert eighth == pytest.approx(alone / 8.0, rel=0.05)
+
+
+def test_parameters_without_data_are_each_needed_with_one_half():
+    np.testing.assert_allclose(averaged(np.zeros(4), np.eye(4), np.arange(4), np.ones(4)).needed, 0.5)
 
 
 def test_of_many_parameters_the_clear_ones_are_not_asked():
