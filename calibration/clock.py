@@ -68,6 +68,7 @@ class TrialLag:
         drift: Within the trial [-].
         drift_sigma: Its standard deviation [-]; infinite where the trial alone does not tell.
         duration: Of the trial [s].
+        wound: Mean lateness that the fit laid to gears wound by friction, not in the lag [s].
     """
 
     trial_id: str
@@ -76,6 +77,7 @@ class TrialLag:
     drift: float = 0.0
     drift_sigma: float = np.inf
     duration: float = np.inf
+    wound: float = 0.0
 
 
 def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> tuple[Clock, tuple[str, ...]]:

@@ -43,6 +43,11 @@ class Reduced:
     U: np.ndarray
     t: np.ndarray
 
+    def coefficients(self, x: np.ndarray) -> np.ndarray:
+        """b (b,) where x (2,) are lag and drift."""
+        m = 6 * len(self.t)
+        return self.S[m:] @ x - self.r[m:]
+
 
 def without_nuisances(A: np.ndarray, B: np.ndarray, r: np.ndarray, S: np.ndarray, t: np.ndarray) -> Reduced:
     """Eliminate columns A (6 n, a), free, and B (6 n, b), with coefficients N(0, 1), from r (6 n,) and S (6 n, 2)."""

@@ -13,7 +13,7 @@ fit says. The remaining noise is the markers' and each joint's random reading er
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -135,7 +135,11 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     r = W @ _residuals(x.T, at.T)[..., None]
     S = np.stack([slope, slope * (x.t - middle)[:, None]], axis=2).reshape(-1, 2)
     reduced = without_nuisances(A, B, r.ravel(), S, x.t)
-    return _told(*lag_and_drift(reduced), x.t, middle, trial_id, clock)
+    change, C = lag_and_drift(reduced)
+    played = np.concatenate(known, axis=2).reshape(len(S), -1)
+    wound = played @ reduced.coefficients(change)[-played.shape[1] :]
+    late = float(S[:, 0] @ wound / (S[:, 0] @ S[:, 0]))
+    return replace(_told(change, C, x.t, middle, trial_id, clock), wound=late)
 
 
 def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:

@@ -31,6 +31,7 @@ from calibration.inverse_dynamics import (
     plate_moments,
 )
 from calibration.lag import Pair, coarse_lag, fit_lag
+from calibration.lateness import allowance
 from calibration.markers import base_body, hand_body
 from calibration.plate_axes import plate_axes
 from calibration.play import play
@@ -41,9 +42,6 @@ from calibration.se3 import inverse
 from calibration.signals import Signal, body_rates, even, low_passed
 from calibration.verdict import Verdict
 
-# What all trials share [s], its mean and standard deviation: a link is late behind viscous friction c on a mesh of
-# stiffness k by c / k, 50 us of a strain-wave gear (0.5 N.m.s/rad on 10 kN.m/rad), later where dry friction winds it.
-_COMMON = {"robot": (7.5e-5, 7.5e-5), "plate": (0.0, 3e-4)}
 _CUTOFF = 6.0  # robot [Hz]
 _LATE, _FAR = 2e-3, 5.0  # [s] and standard deviations by which a clock declared shared may be off unsaid
 _HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
@@ -145,7 +143,7 @@ def _clock(instrument: str, motions: Iterable[Motion], passes: int) -> tuple[Clo
 
 def _concluded(instrument: str, lags: list[TrialLag]) -> tuple[Clock, tuple[Verdict, ...]]:
     """The clock of these lags, and what is to be said of it."""
-    late, common = _COMMON[instrument]
+    late, common = allowance(instrument, lags)
     clock, outliers = fit_clock(instrument, lags, common)
     clock = replace(clock, offset=clock.offset - late)
     message = (

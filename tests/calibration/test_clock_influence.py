@@ -60,10 +60,12 @@ def test_values_are_those_of_least_squares_with_all_columns_at_once():
     rng = np.random.default_rng(0)
     A, B, S, t = design(rng)
     r = rng.normal(size=len(S))
-    found, _ = lag_and_drift(without_nuisances(A, B, r, S, t))
+    x = without_nuisances(A, B, r, S, t)
+    found, _ = lag_and_drift(x)
     rows = np.block([[S, A, B], [np.zeros((5, 2 + A.shape[1])), np.eye(5)]])
     everything = np.linalg.lstsq(rows, np.concatenate([r, np.zeros(5)]), rcond=None)[0]
     np.testing.assert_allclose(found, everything[:2], rtol=1e-8)
+    np.testing.assert_allclose(x.coefficients(found), everything[-5:], rtol=1e-6)
 
 
 def test_a_block_that_nuisances_explain_whatever_it_was_says_nothing():

@@ -1,0 +1,34 @@
+"""How late an instrument shows a motion, alike in all trials, where no recording can tell it from its clock.
+
+Robot: a link is late behind viscous friction c on a mesh of stiffness k by c / k, and where dry friction f winds the
+mesh by f / k over the speed,
+
+    late = c / k + left * wound,      ln(c / k) ~ N(ln 50 us, 0.6^2),      left ~ U(0, 0.2)
+
+c / k of strain-wave gears (0.5 N.m.s/rad on 10 kN.m/rad), a factor of 1.8 either way from cold to worn in; wound is the
+mean lateness of the play that the fit of poses found in the loaded joints. Play operators are not quite what a wound
+gear does, and what a fit leaves of such a term has the sign of what it took: of dry friction alone a tenth was left.
+Friction never makes a link early: play that the fit finds to be early stands for something else, and only widens.
+Plate: an anti-alias filter's delay is a part of its clock.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calibration.clock import TrialLag
+
+_VISCOUS, _COLD = 5e-5, 0.6  # [s] median of c / k; standard deviation of its logarithm
+_LEFT = 0.2  # at most, of what dry friction winds
+_PLATE = 3e-4  # [s]
+
+
+def allowance(instrument: str, lags: Sequence[TrialLag]) -> tuple[float, float]:
+    """Mean and standard deviation [s] of what all trials share."""
+    if instrument == "plate":
+        return 0.0, _PLATE
+    w = np.array([t.lag.sigma for t in lags]) ** -2.0
+    wound = float(w @ [t.wound for t in lags] / w.sum()) if len(lags) else 0.0
+    viscous = _VISCOUS * np.exp(0.5 * _COLD**2)
+    spread = viscous * np.sqrt(np.expm1(_COLD**2))
+    return float(viscous + 0.5 * _LEFT * max(wound, 0.0)), float(np.hypot(spread, _LEFT / np.sqrt(12.0) * wound))

@@ -1,0 +1,51 @@
+"""What a link's lateness takes off the clock: the moments of the formula, by draws; what the fit lays to winding."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration.clock import Clock, TrialLag
+from calibration.clock_refinement import provisional, refined_lags
+from calibration.lag import Lag
+from calibration.lateness import allowance
+from calibration.robot import chain_of
+from tests.calibration import geared, matched
+
+CLOCK = Clock("robot", 3.9, 40e-6, np.zeros((2, 2)), 20.0, 1e-4)
+
+
+def lag(wound: float, sigma: float = 1e-4) -> TrialLag:
+    return TrialLag("swing", 10.0, Lag(3.9, sigma, 1.0), wound=wound)
+
+
+@pytest.mark.parametrize("wound", [0.0, 4e-4])
+def test_mean_and_spread_are_those_of_the_formula(wound):
+    rng, n = np.random.default_rng(0), 400_000
+    late = 5e-5 * np.exp(0.6 * rng.normal(size=n)) + rng.uniform(0.0, 0.2, n) * wound
+    np.testing.assert_allclose(allowance("robot", [lag(wound)]), (late.mean(), late.std()), rtol=0.01)
+
+
+def test_trials_count_by_what_they_tell_of_the_clock_and_a_plate_is_not_geared():
+    both = [lag(4e-4, 1e-4), lag(0.0, 2e-4)]
+    np.testing.assert_allclose(allowance("robot", both), allowance("robot", [lag(3.2e-4)]))
+    assert allowance("plate", both) == (0.0, 3e-4)
+
+
+def test_play_that_is_early_widens_and_does_not_shift():
+    early, none = allowance("robot", [lag(-4e-4)]), allowance("robot", [lag(0.0)])
+    assert early[0] == none[0] and early[1] == allowance("robot", [lag(4e-4)])[1] > none[1]
+
+
+def test_friction_that_winds_the_gears_is_found_and_not_where_there_is_none():
+    truth, description, chain = matched.defects(0), matched.described(), chain_of(mjcf.urdf(), matched.described())
+    found = []
+    for friction in (1e-12, 2.0):
+        rng = np.random.default_rng(5)
+        drives = geared.gears(rng)
+        drives = replace(drives, coulomb=friction * drives.coulomb, viscous=0.0 * drives.viscous)
+        trial = geared.record(truth, drives, geared.swing(rng, 20.0), 12.0, rng)
+        model = provisional(chain, description, [trial], CLOCK)
+        found.append(refined_lags(model, description, [trial], CLOCK)[0].wound)
+    assert found[1] - found[0] > 1e-4 > abs(found[0])
