@@ -8,7 +8,7 @@ and the instrument, so that the files do not depend on the number of threads.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -47,7 +47,7 @@ def laboratory(config: TwinConfig, seed: int) -> Laboratory:
     """Draw a robot and put it on its plate."""
     config = drawn(config, seed)
     robot = draw(config, mjcf.model(), seed)
-    twin = build(mjcf.spec(), robot.defects, links_seen(config, robot), config.timestep)
+    twin = _built(config, robot.defects, links_seen(config, robot))
     x, y, yaw = config.base.pose
     T_lab_base = exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, yaw]))
     T_lab_base[:3, 3] = x, y, config.instruments.plate_place.height
@@ -146,7 +146,11 @@ def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
     defects = tuple(now(d) for d in lab.robot.defects)
     if all(a is b for a, b in zip(defects, lab.robot.defects, strict=True)):
         return lab.twin
-    return build(mjcf.spec(), defects, lab.twin.links, lab.config.timestep)
+    return _built(lab.config, defects, lab.twin.links)
+
+
+def _built(config: TwinConfig, defects: Sequence[Defect], links: Sequence[str]) -> Twin:
+    return build(mjcf.spec(), defects, links, config.timestep, wrist=config.instruments.wrist is not None)
 
 
 def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:

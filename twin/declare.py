@@ -18,11 +18,11 @@ from calibration.schema import (
     Vector3,
     Wheel,
 )
-from twin.build import WRIST_SENSOR
 from twin.config import Instruments, TwinConfig
 from twin.draw import BASE, TOOL, TORSO
 from twin.instruments.plate_place import T_lab_plate
 from twin.instruments.tiles import PLATE, Tiles
+from twin.wrenches import WRIST_SENSOR
 
 
 def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:

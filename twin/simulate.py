@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
+from twin import wrenches
 from twin.build import Twin
 from twin.conventions import states_with_their_sensors, transform
 from twin.inputs import driven, prepare
@@ -78,7 +79,7 @@ def _unpack(
     velocity = np.stack([qvel[:, model.joint(driven(j)).dofadr[0]] for j in JOINTS], axis=1)
     servos = [model.actuator(driven(j)).id for j in JOINTS]
     kp, kv = model.actuator_gainprm[servos, 0], -model.actuator_biasprm[servos, 2]
-    wrench = _floor_wrench(model, qpos, qvel) if anchored(model) else _wrench(model, sensors, "plate")
+    wrench = _floor_wrench(model, qpos, qvel) if anchored(model) else wrenches.on_plate(model, sensors, wrenches.PLATE)
     several = felt(model)
     return States(
         t=np.arange(len(states)) * model.opt.timestep,
@@ -89,43 +90,19 @@ def _unpack(
         command=command,
         poses={name: _pose(model, sensors, name) for name in links},
         wrench=wrench,
-        plates=np.stack([_wrench(model, sensors, n) for n in several], axis=1) if several else wrench[:, None],
-        wrist=_wrist(model, sensors),
+        plates=np.stack([wrenches.on_plate(model, sensors, n) for n in several], axis=1)
+        if several
+        else wrench[:, None],
+        wrist=wrenches.on_wrist(model, sensors),
     )
-
-
-def _sensed(model: mujoco.MjModel, sensors: np.ndarray, name: str) -> np.ndarray:
-    sensor = model.sensor(name)
-    return sensors[:, sensor.adr[0] : sensor.adr[0] + sensor.dim[0]]
 
 
 def _pose(model: mujoco.MjModel, sensors: np.ndarray, link: str) -> np.ndarray:
     kinds = (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMEQUAT)
-    return transform(*(_sensed(model, sensors, f"{link}.{k.name}") for k in kinds))
+    return transform(*(wrenches.sensed(model, sensors, [f"{link}.{k.name}"]) for k in kinds))
 
 
 def _floor_wrench(model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    return floor_wrench(model, qpos, qvel, data.site("plate").xpos)
-
-
-def _wrench(model: mujoco.MjModel, sensors: np.ndarray, site: str) -> np.ndarray:
-    """Action on a plate: its site's sensors give what holds it up, less its own weight."""
-    support = _held_up(model, sensors, site)
-    plate = model.body(model.site(site).bodyid[0])
-    weight = plate.mass[0] * model.opt.gravity
-    lever = plate.ipos - model.site(site).pos
-    return -support - np.concatenate([weight, np.cross(lever, weight)])
-
-
-def _wrist(model: mujoco.MjModel, sensors: np.ndarray) -> np.ndarray:
-    """Action on the wrist's sensor; NaN on a bench without one."""
-    there = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "wrist") >= 0
-    return -_held_up(model, sensors, "wrist") if there else np.full((len(sensors), 6), np.nan)
-
-
-def _held_up(model: mujoco.MjModel, sensors: np.ndarray, site: str) -> np.ndarray:
-    """Wrench (n, 6) with which a site's body is held by its parent, the site's axes, about the site."""
-    kinds = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
-    return np.concatenate([_sensed(model, sensors, f"{site}.{k.name}") for k in kinds], axis=1)
+    return floor_wrench(model, qpos, qvel, data.site(wrenches.PLATE).xpos)

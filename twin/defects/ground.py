@@ -21,7 +21,7 @@ Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
 # Solver tolerance, iterations against slip and their tolerance. One rigid body's wheels share its load and friction in
 # more than one way; iterated to the end, friction drifts. Where each has a spring, those iterations set the accuracy.
-_OWN = 1e-6, 20, 1e-9
+_OWN = 1e-4, 20, 1e-9
 _SHARED = 1e-10, 3, 1e-6
 _LATE = 0.1  # torsional damping times step over inertia of the wheel [-]
 
