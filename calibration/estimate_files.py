@@ -15,13 +15,11 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import h5netcdf
-import h5py
 import numpy as np
 from pydantic import ValidationError
 
+from calibration import netcdf
 from calibration.errors import InputError
 from calibration.estimate import Estimate, Model
 from calibration.estimate_schema import EstimateFile, to_estimate, to_file
@@ -101,25 +99,19 @@ def _replace_text(path: Path, text: str) -> None:
 
 def _write_covariances(path: Path, estimate: Estimate) -> None:
     part = path.with_name(path.name + ".part")
-    with h5netcdf.File(part, "w") as file:
-        file.attrs["title"] = "covariance of the parameters of each model, units of the parameters"
+    with netcdf.created(part) as file:
+        file.title = "covariance of the parameters of each model, units of the parameters"
         for model in estimate.models:
-            group: Any = file.create_group(model.name)
-            group.dimensions = {"parameter": len(model.parameters)}
-            names = np.array([p.name for p in model.parameters], dtype=object)
-            group.create_variable("parameter", ("parameter",), dtype=h5py.string_dtype(), data=names)
-            variable = group.create_variable(
-                "covariance", ("parameter", "parameter"), dtype="f8", data=model.covariance
-            )
-            variable.attrs["units"] = "product of the two parameters' units"
+            group = file.createGroup(model.name)
+            netcdf.add_dimensions(group, {"parameter": len(model.parameters)})
+            netcdf.write_labels(group, {"parameter": tuple(p.name for p in model.parameters)})
+            units = {"units": "product of the two parameters' units"}
+            netcdf.write_variable(group, "covariance", model.covariance, ("parameter", "parameter"), "f8", units)
     os.replace(part, path)
 
 
 def _read_covariances(path: Path) -> dict[str, np.ndarray]:
     if not path.is_file():
         return {}
-    try:
-        with h5netcdf.File(path, "r") as file:
-            return {name: np.asarray(group.variables["covariance"][...]) for name, group in file.groups.items()}
-    except (OSError, RuntimeError, KeyError) as error:
-        raise InputError(path, f"not a readable netCDF4 file ({error}); write the estimate again") from error
+    with netcdf.opened(path, "write the estimate again") as file:
+        return {name: netcdf.array(group, "covariance") for name, group in file.groups.items()}

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import h5netcdf
 import numpy as np
 
+from calibration import netcdf
 from calibration.bodies import poses_of
 from calibration.comparison import comparisons
 from calibration.dataset import Dataset
@@ -255,12 +255,12 @@ def _means_trace(p: Prediction, errors: PoseErrors) -> Trace:
 def _write_traces(path: Path, traces: tuple[Trace, ...]) -> None:
     """One group a row and trial: model/base/encoder/trial."""
     part = path.with_name(path.name + ".part")
-    with h5netcdf.File(part, "w") as file:
-        file.attrs["title"] = "errors of predicted hand poses, predicted minus measured, lab axes"
+    with netcdf.created(part) as file:
+        file.title = "errors of predicted hand poses, predicted minus measured, lab axes"
         for trace in traces:
-            group: Any = file.create_group(f"{trace.model}/{trace.base}/{trace.encoder}/{trace.trial_id}")
-            group.attrs["kind"] = trace.kind
-            group.dimensions = {"t": len(trace.t), "scored": len(trace.scored), "axis": 3}
+            group = file.createGroup(f"{trace.model}/{trace.base}/{trace.encoder}/{trace.trial_id}")
+            group.kind = trace.kind
+            netcdf.add_dimensions(group, {"t": len(trace.t), "scored": len(trace.scored), "axis": 3})
             for name, dims, units, data in (
                 ("t", ("t",), "s", trace.t),
                 ("position_error", ("t", "axis"), "m", trace.errors.position),
@@ -268,7 +268,5 @@ def _write_traces(path: Path, traces: tuple[Trace, ...]) -> None:
                 ("scored_position_error", ("scored", "axis"), "m", trace.scored.position),
                 ("scored_rotation_error", ("scored", "axis"), "rad", trace.scored.rotation),
             ):
-                kind = "f8" if name == "t" else "f4"
-                variable = group.create_variable(name, dims, dtype=kind, data=data.astype(kind))
-                variable.attrs["units"] = units
+                netcdf.write_variable(group, name, data, dims, "f8" if name == "t" else "f4", {"units": units})
     os.replace(part, path)

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import h5netcdf
 import numpy as np
 
+from calibration import netcdf
 from calibration.bodies import BodyPoses, body_poses, still_poses
 from calibration.errors import InputError, NotEnoughData, ShapeError
-from calibration.recording import check_shapes, labels, sha256, write_labels, write_variable
+from calibration.recording import check_shapes, sha256
 from calibration.schema import Body
 
 # name: (dimensions, units, what it is)
@@ -94,22 +94,23 @@ class PostureMeans:
 def holds_means(path: Path) -> bool:
     """Whether a trial's file holds posture means instead of a continuous recording; False where it cannot be read."""
     try:
-        with h5netcdf.File(path, "r") as file:
+        with netcdf.opened(path) as file:
             return "q_motor" in file.variables and file.variables["q_motor"].dimensions[:1] == ("posture",)
-    except (OSError, RuntimeError, KeyError):
+    except InputError:
         return False
 
 
 def write_means(path: Path, means: PostureMeans) -> str:
     """Write posture means as netCDF4 (f8) and return the file's sha256; the same means give the same bytes."""
-    with h5netcdf.File(path, "w") as file:
-        file.attrs["title"] = means.id
-        file.attrs["Conventions"] = "SI; means over static postures"
-        file.dimensions = {"axis": 3, "posture": len(means), "joint": len(means.joint), "marker": len(means.marker)}
-        write_labels(file, {name: getattr(means, name) for name in ("joint", "marker", "marker_body")})
+    sizes = {"axis": 3, "posture": len(means), "joint": len(means.joint), "marker": len(means.marker)}
+    with netcdf.created(path) as file:
+        file.title = means.id
+        file.Conventions = "SI; means over static postures"
+        netcdf.add_dimensions(file, sizes)
+        netcdf.write_labels(file, {name: getattr(means, name) for name in ("joint", "marker", "marker_body")})
         for name, (dims, units, meaning) in _LAYOUT.items():
             kind = "i1" if name == "approach" else "f8"
-            write_variable(file, name, getattr(means, name), dims, kind, {"units": units, "long_name": meaning})
+            netcdf.write_variable(file, name, getattr(means, name), dims, kind, {"units": units, "long_name": meaning})
     return sha256(path)
 
 
@@ -120,19 +121,15 @@ def read_means(path: Path, trial_id: str | None = None) -> PostureMeans:
         InputError: The file is missing, damaged, lacks a variable, or says nothing of its noise.
     """
     try:
-        with h5netcdf.File(path, "r") as file:
+        with netcdf.opened(path) as file:
             needed = ("joint", "marker", "marker_body", "q_motor", "marker_position", "marker_position_std")
             missing = [name for name in needed if name not in file.variables]
             if missing:
                 raise InputError(path, f"has no variable {missing}; see the layout in calibration/means.py")
-            fields: dict[str, Any] = {
-                n: np.asarray(file.variables[n][...], float) for n in _LAYOUT if n in file.variables
-            }
+            fields: dict[str, Any] = {n: netcdf.array(file, n) for n in _LAYOUT if n in file.variables}
             fields.setdefault("approach", np.zeros(fields["q_motor"].shape))
-            fields |= {name: labels(file, name) for name in ("joint", "marker", "marker_body")}
+            fields |= {name: netcdf.labels(file, name) for name in ("joint", "marker", "marker_body")}
             means = PostureMeans(id=trial_id or path.stem, **fields)
-    except (OSError, RuntimeError, KeyError) as error:
-        raise InputError(path, f"not a readable netCDF4 file ({error}); copy or record it again") from error
     except ShapeError as error:
         raise InputError(path, str(error)) from error
     seen = np.isfinite(means.marker_position)

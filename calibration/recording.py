@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5netcdf
-import h5py
+import netCDF4
 import numpy as np
 
+from calibration import netcdf
 from calibration.errors import InputError, ShapeError
 
 _CLOCKS = {"t_robot": "robot", "t_mocap": "mocap", "t_plate": "plate"}
@@ -156,46 +156,20 @@ def write_trial(path: Path, trial: Trial) -> str:
 
     Signals are stored as f4 (0.1 um at 2 m, 0.1 urad at 2 rad), times as f8; the same trial gives the same bytes.
     """
-    with h5netcdf.File(path, "w") as file:
-        file.attrs["title"] = trial.id
-        file.attrs["Conventions"] = "SI; wrench = action of the robot on the plate, lab axes, z up"
-        file.dimensions = {"axis": 3, "wrench": 6, "posture": len(trial.dwell_start)}
-        for clock in _CLOCKS:
-            file.dimensions[clock] = len(getattr(trial, clock))
-        for label in ("joint", "marker", "plate"):
-            file.dimensions[label] = len(getattr(trial, label))
-        write_labels(file, {label: getattr(trial, label) for label in _LABELS})
+    sizes = {"axis": 3, "wrench": 6, "posture": len(trial.dwell_start)}
+    sizes |= {name: len(getattr(trial, name)) for name in (*_CLOCKS, "joint", "marker", "plate")}
+    with netcdf.created(path) as file:
+        file.title = trial.id
+        file.Conventions = "SI; wrench = action of the robot on the plate, lab axes, z up"
+        netcdf.add_dimensions(file, sizes)
+        netcdf.write_labels(file, {label: getattr(trial, label) for label in _LABELS})
         for v in VARIABLES:
             if v.name == _OPTIONAL and not np.isfinite(trial.wrist_wrench).any():
                 continue
             kind = "i1" if v.name == "approach" else "f8" if v.name in _EXACT else "f4"
             attributes = {"units": v.units, "long_name": v.meaning, "frame": v.frame, "clock": v.clock}
-            write_variable(file, v.name, getattr(trial, v.name), v.dims, kind, attributes)
+            netcdf.write_variable(file, v.name, getattr(trial, v.name), v.dims, kind, attributes)
     return sha256(path)
-
-
-def write_labels(file: h5netcdf.File, names: Mapping[str, tuple[str, ...]]) -> None:
-    """Write names along their dimension; `marker_body` lies along `marker`."""
-    for label, values in names.items():
-        dims = ("marker" if label == "marker_body" else label,)
-        data = np.array(values, dtype=object) if values else None
-        variable = file.create_variable(label, dims, dtype=h5py.string_dtype(), data=data)
-        variable.attrs.update(units="none", frame="none", clock="none")
-
-
-def write_variable(
-    file: h5netcdf.File, name: str, data: np.ndarray, dims: tuple[str, ...], kind: str, attributes: Mapping[str, str]
-) -> None:
-    """Write an array, packed, with its attributes; one that is empty says `none`."""
-    packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if data.size else {}
-    variable = file.create_variable(name, dims, dtype=kind, data=data.astype(kind), **packing)
-    variable.attrs.update({key: value or "none" for key, value in attributes.items()})
-
-
-def labels(file: h5netcdf.File, name: str) -> tuple[str, ...]:
-    """Names along a dimension; none where the file has no such variable."""
-    values = file.variables[name][...] if name in file.variables else ()
-    return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
 
 
 def sha256(path: Path) -> str:
@@ -212,29 +186,28 @@ def read_trial(path: Path, trial_id: str | None = None) -> Trial:
     if not path.is_file():
         raise InputError(path, "no such file; restore it or remove the trial from dataset.json")
     try:
-        with h5netcdf.File(path, "r") as file:
+        with netcdf.opened(path) as file:
             missing = [n for n in ("joint", "marker", "marker_body", "t_robot", "q_motor") if n not in file.variables]
             if missing:
                 raise InputError(path, f"has no variable {missing}; see the layout in calibration/recording.py")
             trial = _trial_from(file, trial_id or path.stem)
-    except (OSError, RuntimeError, KeyError) as error:
-        raise InputError(path, f"not a readable netCDF4 file ({error}); copy or record it again") from error
     except ShapeError as error:
         raise InputError(path, str(error)) from error
     _check_clocks(path, trial)
     return trial
 
 
-def _trial_from(file: h5netcdf.File, trial_id: str) -> Trial:
+def _trial_from(file: netCDF4.Dataset, trial_id: str) -> Trial:
     n = {d: v.size for d, v in file.dimensions.items()} | {"axis": 3, "wrench": 6}
 
-    def array(name: str) -> np.ndarray:
+    def read(name: str) -> np.ndarray:
         dims = _LAYOUT[name][0]
         if name in file.variables:
-            return np.asarray(file.variables[name][...], dtype=np.int8 if name == "approach" else np.float64)
+            found = netcdf.array(file, name)
+            return found.astype(np.int8) if name == "approach" else found
         return np.full([n.get(d, 0) for d in dims], np.nan if "t_robot" in dims else 0.0)
 
-    fields: dict[str, Any] = {k: labels(file, k) for k in _LABELS} | {k: array(k) for k in _LAYOUT}
+    fields: dict[str, Any] = {k: netcdf.labels(file, k) for k in _LABELS} | {k: read(k) for k in _LAYOUT}
     return Trial(id=trial_id, **fields)
 
 

@@ -120,7 +120,7 @@ def test_every_parameter_of_the_truth_is_judged_once(result):
 
 def test_other_programs_open_every_file(result):
     for path in [*result.folder.glob("dataset/trials/*.nc"), *result.folder.glob("truth/trials/*.nc")]:
-        with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as data:
             for name, variable in data.variables.items():
                 assert variable.dtype.kind not in "fi" or "units" in variable.attrs, (path.name, name)
 

@@ -27,17 +27,26 @@ def check(inputs: Inputs, motion: Motion, states: np.ndarray) -> None:
         NotStanding: The robot tipped over, or a wheel left the plate in a trial whose base stays.
     """
     model, step = inputs.model, inputs.model.opt.timestep
-    speed = np.abs(states[:, 1 + model.nq : 1 + model.nq + model.nv])
     late = np.abs(states[:, 0] - np.arange(len(states)) * step) > 0.5 * step
-    with np.errstate(invalid="ignore"):
-        bad = late | ~np.isfinite(states).all(axis=1) | ~(speed < _FAST).all(axis=1)
-    if bad.any():
-        k = int(np.argmax(bad))
-        raise Diverged(motion.id, k * step - SETTLE, _fastest(model, speed[max(k - 1, 0) : k + 1], late[k]))
+    velocity = states[:, 1 + model.nq : 1 + model.nq + model.nv]
+    with np.errstate(invalid="ignore", over="ignore"):
+        fine = np.isfinite(states.sum()) and velocity.max() < _FAST and velocity.min() > -_FAST
+    if late.any() or not fine:
+        _refuse_diverged(inputs, motion, states, np.abs(velocity), late)
     T = base_poses(model, states[::_EVERY, 1 : 1 + model.nq])
     _refuse(T[:, 2, 2] < _MIN_UPRIGHT, "the robot tips over", motion, _EVERY * step)
     if motion.base is None:
         _on_plate(inputs, motion, T)
+
+
+def _refuse_diverged(inputs: Inputs, motion: Motion, states: np.ndarray, speed: np.ndarray, late: np.ndarray) -> None:
+    """Say when it first happens, and to which joint."""
+    with np.errstate(invalid="ignore"):
+        bad = late | ~np.isfinite(states).all(axis=1) | ~(speed < _FAST).all(axis=1)
+    if bad.any():
+        k, model = int(np.argmax(bad)), inputs.model
+        fastest = _fastest(model, speed[max(k - 1, 0) : k + 1], late[k])
+        raise Diverged(motion.id, k * model.opt.timestep - SETTLE, fastest)
 
 
 def _fastest(model: mujoco.MjModel, speed: np.ndarray, reset: bool) -> str:

@@ -5,10 +5,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5netcdf
-import h5py
 import numpy as np
 
+from calibration import netcdf
 from twin.defects.base import Parameter
 
 _UNITS = {
@@ -61,43 +60,31 @@ class TruthTrial:
 
 def write_trial(path: Path, trial: TruthTrial) -> None:
     """Write the signals as netCDF4, f8."""
-    with h5netcdf.File(path, "w") as file:
-        file.dimensions = {
-            "t_mocap": len(trial.t_mocap),
-            "joint": len(trial.joint),
-            "marker": len(trial.marker),
-            "axis": 3,
-            "row": 4,
-            "column": 4,
-            "wrench": 6,
-        }
-        for label in ("joint", "marker"):
-            names = np.array(getattr(trial, label), dtype=object)
-            variable = file.create_variable(label, (label,), dtype=h5py.string_dtype(), data=names)
-            variable.attrs.update(units="none", frame="none", clock="none")
+    sizes = {"t_mocap": len(trial.t_mocap), "joint": len(trial.joint), "marker": len(trial.marker)}
+    with netcdf.created(path) as file:
+        netcdf.add_dimensions(file, sizes | {"axis": 3, "row": 4, "column": 4, "wrench": 6})
+        netcdf.write_labels(file, {"joint": trial.joint, "marker": trial.marker})
         for name, dims in _DIMS.items():
-            data = getattr(trial, name)
-            variable = file.create_variable(
-                name, dims, dtype="f8", data=data, compression="gzip", compression_opts=4, shuffle=True
-            )
-            variable.attrs.update(units=_UNITS[name], frame=_FRAMES.get(name, "lab"), clock="mocap")
+            attributes = {"units": _UNITS[name], "frame": _FRAMES.get(name, "lab"), "clock": "mocap"}
+            netcdf.write_variable(file, name, getattr(trial, name), dims, "f8", attributes)
 
 
 def read_trial(path: Path) -> TruthTrial:
-    """Read what `write_trial` wrote."""
-    with h5netcdf.File(path, "r") as file:
-        labels = [tuple(v.decode() if isinstance(v, bytes) else v for v in file[n][...]) for n in ("joint", "marker")]
-        return TruthTrial(labels[0], labels[1], **{name: np.asarray(file[name][...]) for name in _DIMS})
+    """Read what `write_trial` wrote.
+
+    Raises:
+        InputError: It is no such file.
+    """
+    with netcdf.opened(path) as file:
+        joint, marker = (netcdf.labels(file, label) for label in ("joint", "marker"))
+        return TruthTrial(joint, marker, **{name: netcdf.array(file, name) for name in _DIMS})
 
 
 def write_parameters(path: Path, parameters: Iterable[Parameter], derived: dict[str, np.ndarray]) -> None:
     """Write truth.json: every parameter, and what follows from them."""
-    content = {
-        "schema": 1,
-        "parameters": [p._asdict() for p in parameters],
-        "derived": {name: _numbers(value) for name, value in derived.items()},
-    }
-    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    rows = ",\n  ".join(json.dumps(p._asdict(), allow_nan=False) for p in parameters)
+    values = json.dumps({name: _numbers(value) for name, value in derived.items()}, allow_nan=False)
+    path.write_text(f'{{"schema": 1,\n "parameters": [\n  {rows}],\n "derived": {values}}}\n', encoding="utf-8")
 
 
 def _numbers(value: np.ndarray) -> object:

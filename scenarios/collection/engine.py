@@ -26,7 +26,15 @@ if TYPE_CHECKING:
 _TRIES = 3  # of a run that takes its worker down, before it is given up
 _AGAIN = "give the same command: what is complete stays"
 _PROBE = 4_000_000  # bytes that must still find room for a failure to be the run's own
-_QUIET = {"logging.distributed": "critical", "distributed.worker.profile.enabled": False}  # the profiler: a tenth
+# The profiler costs a tenth; looking at clocks, memory and tasks many times a second 3 %, and runs take seconds.
+_QUIET = {
+    "logging.distributed": "critical",
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.scheduler.work-stealing-interval": "2s",
+    "distributed.worker.memory.monitor-interval": "1s",
+}
 _PATIENCE = "20s"  # for a scheduler to answer
 
 

@@ -53,7 +53,7 @@ class Run:
         """One trial of `dataset` or `truth`, lazily; xarray must be installed."""
         import xarray
 
-        return xarray.open_dataset(self._file(part, name), engine="h5netcdf", decode_times=False)
+        return xarray.open_dataset(self._file(part, name), engine="netcdf4", decode_times=False)
 
     def _file(self, part: str, name: str) -> Path:
         path = self.folder / part / "trials" / f"{name}.nc"

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 
+from calibration import netcdf
 from calibration.schema import Description, TrialEntry
-from scenarios.errors import ScenarioError
 from scenarios.report.numbers import fixed, significant
 
 
@@ -33,14 +32,12 @@ def recorded(path: Path, entry: TrialEntry) -> Recorded:
     """Read the clocks of a trial.
 
     Raises:
-        ScenarioError: The file cannot be read.
+        InputError: The file cannot be read.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            clocks = {name: file[f"t_{name}"][...] for name in ("robot", "mocap", "plate") if f"t_{name}" in file}
-            postures = len(file["posture"]) if "posture" in file else 0
-    except (OSError, RuntimeError) as error:
-        raise ScenarioError(f"{path}: not a readable netCDF4 file ({error}); copy or record it again") from error
+    with netcdf.opened(path) as file:
+        names = [name for name in ("robot", "mocap", "plate") if f"t_{name}" in file.variables]
+        clocks = {name: netcdf.array(file, f"t_{name}") for name in names}
+        postures = file.dimensions["posture"].size if "posture" in file.dimensions else 0
     clocks = {name: t for name, t in clocks.items() if len(t) > 1}
     t = clocks.get("mocap", clocks.get("robot"))
     return Recorded(

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 
-from scenarios.errors import ScenarioError
+from calibration import netcdf
+from calibration.netcdf import Group
 
 
 @dataclass(frozen=True)
@@ -43,36 +43,31 @@ def read_traces(path: Path) -> tuple[Trace, ...]:
     """Read the errors; none where there is no file.
 
     Raises:
-        ScenarioError: The file cannot be read.
+        InputError: The file cannot be read.
     """
     if not path.is_file():
         return ()
-    try:
-        with h5py.File(path, "r") as file:
-            return tuple(_trace(names, group) for names, group in _leaves(file, ()))
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise ScenarioError(f"{path}: not as evaluate writes it ({error}); make it again with it") from error
+    with netcdf.opened(path, "make it again with evaluate") as file:
+        return tuple(_trace(names, group) for names, group in _leaves(file, ()))
 
 
-def _leaves(group: h5py.Group, names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], h5py.Group]]:
-    if "position_error" in group:
+def _leaves(group: Group, names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Group]]:
+    if "position_error" in group.variables:
         yield names, group
-        return
-    for name, child in group.items():
-        if isinstance(child, h5py.Group):
-            yield from _leaves(child, (*names, name))
+    for name, child in group.groups.items():
+        yield from _leaves(child, (*names, name))
 
 
-def _trace(names: tuple[str, ...], group: h5py.Group) -> Trace:
+def _trace(names: tuple[str, ...], group: Group) -> Trace:
     model, base, encoder, trial = names
 
     def mm(name: str) -> np.ndarray:
-        return 1e3 * np.asarray(group[name][...], dtype=float)
+        return 1e3 * netcdf.array(group, name)
 
     def deg(name: str) -> np.ndarray:
-        return np.degrees(np.linalg.norm(np.asarray(group[name][...], dtype=float), axis=1))
+        return np.degrees(np.linalg.norm(netcdf.array(group, name), axis=1))
 
-    t = np.asarray(group["t"][...], dtype=float)
+    t = netcdf.array(group, "t")
     scored_position, scored_angle = mm("scored_position_error"), deg("scored_rotation_error")
     good = np.isfinite(scored_position).all(axis=1) & np.isfinite(scored_angle)
     return Trace(
@@ -80,7 +75,7 @@ def _trace(names: tuple[str, ...], group: h5py.Group) -> Trace:
         base=base,
         encoder=encoder,
         trial=trial,
-        kind=str(group.attrs["kind"]),
+        kind=str(group.kind),
         t=t - t[:1],
         position=mm("position_error"),
         angle=deg("rotation_error"),

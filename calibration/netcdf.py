@@ -1,0 +1,83 @@
+"""netCDF4 files, written and read by the format's own C library.
+
+Signals are packed; the same data give the same bytes. The library is not safe for threads: one file at a time.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from threading import RLock
+from typing import Any
+
+import netCDF4
+import numpy as np
+
+from calibration.errors import InputError
+
+Group = netCDF4.Dataset | netCDF4.Group
+_NO_UNIT = {"units": "none", "frame": "none", "clock": "none"}
+_one_at_a_time = RLock()
+
+
+@contextmanager
+def created(path: Path) -> Iterator[netCDF4.Dataset]:
+    """A new file; what was there is gone.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    with _one_at_a_time, netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+        yield file
+
+
+@contextmanager
+def opened(path: Path, remedy: str = "copy or record it again") -> Iterator[netCDF4.Dataset]:
+    """A file to read, whose numbers come as they were written, not masked.
+
+    Raises:
+        InputError: It is not such a file, or lacks what is asked of it.
+    """
+    try:
+        with _one_at_a_time, netCDF4.Dataset(path, "r") as file:
+            file.set_auto_mask(False)
+            yield file
+    except (OSError, RuntimeError, KeyError) as error:
+        raise InputError(path, f"not a readable netCDF4 file ({error}); {remedy}") from error
+
+
+def add_dimensions(group: Group, sizes: Mapping[str, int]) -> None:
+    """Name the dimensions; one of no length is of the kind that may grow, the only one that may be empty."""
+    for name, size in sizes.items():
+        group.createDimension(name, size)
+
+
+def write_labels(group: Group, names: Mapping[str, tuple[str, ...]]) -> None:
+    """Write names along their dimension; `marker_body` lies along `marker`."""
+    for label, values in names.items():
+        variable = group.createVariable(label, str, ("marker" if label == "marker_body" else label,))
+        variable.setncatts(_NO_UNIT)
+        variable[:] = np.array(values, dtype=object)
+
+
+def write_variable(
+    group: Group, name: str, data: np.ndarray, dims: tuple[str, ...], kind: str, attributes: Mapping[str, str]
+) -> None:
+    """Write an array, packed, with its attributes; one that is empty says `none`."""
+    packing: dict[str, Any] = {"compression": "zlib", "complevel": 4, "shuffle": True} if data.size else {}
+    variable = group.createVariable(name, kind, dims, fill_value=False, **packing)
+    variable.setncatts({key: value or "none" for key, value in attributes.items()})
+    variable[...] = data.astype(kind)
+
+
+def labels(group: Group, name: str) -> tuple[str, ...]:
+    """Names along a dimension; none where the file has no such variable."""
+    return tuple(str(value) for value in group.variables[name][...]) if name in group.variables else ()
+
+
+def array(group: Group, name: str) -> np.ndarray:
+    """The numbers of a variable, f8.
+
+    Raises:
+        KeyError: There is none of that name.
+    """
+    return np.asarray(group.variables[name][...], dtype=float)
