@@ -19,8 +19,8 @@ FORBIDDEN = {
     "twin": ("calibration", "scenarios", "pinocchio"),
     "scenarios": (),
 }
-ALLOWED = {"twin": ("calibration.recording", "calibration.schema")}
-"""The recording format, which has no field for truth."""
+ALLOWED = {"twin": ("calibration.recording", "calibration.schema", "calibration.netcdf")}
+"""The recording format, which has no field for truth, and its kind of file."""
 
 SIDE_EFFECTS = ("open", "read_text", "read_bytes", "loadtxt", "print", "ArgumentParser", "from_xml_path", "from_file")
 LONGEST_FILE = 300

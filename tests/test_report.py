@@ -12,6 +12,7 @@ import pytest
 
 from calibration import Estimate, Evaluation, save_estimate
 from calibration.clock import Clock
+from calibration.errors import InputError
 from calibration.estimate import Model, Parameter
 from calibration.evaluate import Trace, ladder
 from calibration.identifiability import Combination
@@ -381,7 +382,7 @@ def test_the_headline_is_the_main_model_where_it_was_evaluated(whole):
 def test_what_cannot_be_read_is_named(run, file, content, said):
     before = (run / "report.html").read_bytes()
     (run / file).unlink() if content is None else (run / file).write_text(content)
-    with pytest.raises(ScenarioError, match=re.escape(said)):
+    with pytest.raises((ScenarioError, InputError), match=re.escape(said)):
         write(run)
     assert (run / "report.html").read_bytes() == before
 

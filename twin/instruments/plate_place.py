@@ -2,8 +2,7 @@
 
     T_lab_plate = Trans(x, y, height) T_nominal R_z(yaw)
 
-The slabs of floor around it are shifted and turned with it and stay at their height: a raised plate is a step. Sites of
-plates keep the axes of the lab, in which wrenches are told.
+The slabs of floor around it are shifted and turned with it and stay at their height: a raised plate is a step.
 """
 
 from dataclasses import dataclass
@@ -41,9 +40,6 @@ class Laid(Defect):
         for slab in (g for g in spec.geoms if g.name.startswith(_SLAB)):
             slab.pos, slab.quat = placement(moved @ transform(slab.pos, slab.quat))
         plate.pos, plate.quat = placement(T_new)
-        back = Rotation.from_euler("z", -self.place.yaw).as_quat(scalar_first=True)
-        for site in (s for s in spec.sites if s.name.startswith(PLATE)):
-            site.quat = back
 
 
 def T_lab_plate(nominal: mujoco.MjsBody, place: PlatePlace) -> np.ndarray:
