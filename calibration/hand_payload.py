@@ -50,6 +50,12 @@ class Hanging:
         """c (3,) [m]."""
         return np.asarray(self.moment / self.mass)
 
+    @property
+    def centre_sigma(self) -> np.ndarray:
+        """Standard deviations (3,) of c [m]."""
+        J = np.column_stack([-self.centre, np.eye(3)]) / self.mass
+        return np.sqrt(np.diag(J @ self.covariance @ J.T))
+
     def less(self, other: "Hanging") -> "Hanging":
         """What hangs there besides `other`."""
         return Hanging(self.mass - other.mass, self.moment - other.moment, self.covariance + other.covariance)

@@ -84,7 +84,8 @@ def _means(trials: Sequence[Trial], robot: Clock) -> dict[str, np.ndarray]:
 
 def _judged(found: Hanging, expected: Hanging, link: str, n: int) -> Verdict:
     message = (
-        f"wrist: {found.mass:.3f} +- {found.sigma[0]:.3f} kg hang on {link}, centre {_millimetres(found.centre)} mm, "
+        f"wrist: {found.mass:.3f} +- {found.sigma[0]:.3f} kg hang on {link}, centre {_millimetres(found.centre)} mm "
+        f"+- {_millimetres(found.centre_sigma, 1)}, "
         f"{n} postures; drawing and declared payload: {expected.mass:.3f} +- {expected.sigma[0]:.3f} kg"
     )
     more = found.less(expected)
@@ -98,5 +99,5 @@ def _judged(found: Hanging, expected: Hanging, link: str, n: int) -> Verdict:
     return Verdict(_STAGE, "warning", f"{message}: {remedy}")
 
 
-def _millimetres(x: np.ndarray) -> str:
-    return "(" + ", ".join(f"{1e3 * v:.0f}" for v in x) + ")"
+def _millimetres(x: np.ndarray, digits: int = 0) -> str:
+    return "(" + ", ".join(f"{1e3 * v:.{digits}f}" for v in x) + ")"

@@ -54,7 +54,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say(k):
         turned = R @ Rotation.from_rotvec(0.01 * rng.normal(size=(k, 3))).as_matrix()  # postures known to 10 mrad
         w = wrenches(R) + rng.normal(size=(k, 6)) * [0.02, 0.02, 0.02, 1e-3, 1e-3, 1e-3]
         found = weigh(turned, w, G)
-        z.append((np.r_[found.mass, found.moment] - np.r_[MASS, MASS * CENTRE]) / found.sigma)
+        of_centre = (found.centre - CENTRE) / found.centre_sigma
+        z.append(np.r_[(np.r_[found.mass, found.moment] - np.r_[MASS, MASS * CENTRE]) / found.sigma, of_centre])
     held = (np.abs(z) <= 1.96).sum(axis=0)
     assert (held >= binom.ppf(0.001, n, 0.93)).all() and (held <= binom.ppf(0.999, n, 0.98)).all(), held
 
