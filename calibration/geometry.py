@@ -5,8 +5,7 @@ prismatic joints has 4 R + 2 P + 6 identifiable combinations: 36 for a torso and
 still. What the data do not separate stays at what the tolerances make most likely. Postures that contradict all others
 are left out and named.
 
-Where no motion was recorded there will be no joint model, and what a gear under load gives is asked for here: row
-`full`, see `gears`.
+What gears give under load, and the play that gravity holds, is asked for in row `full`, see `gears`.
 """
 
 from collections.abc import Iterator

@@ -92,7 +92,7 @@ def calibrate(
         absent = lacking(work, name)
         work = work.saying(Verdict(name, "missing", absent)) if absent else _RUN[name](work)
     tell("done", 1.0)
-    return _concluded(work.estimate)
+    return _concluded(work)
 
 
 def _usual(dataset: Dataset) -> tuple[str, ...]:
@@ -149,11 +149,17 @@ def _calibrate_geometry(work: Work) -> Work:
     suggested = record_next(work.dataset.urdf, chain, description, postures, model, refused)
     work = work.with_model(model, said).suggesting(*suggested)
     work = work.saying(*_weighed(work, model))
-    moving = any(entry.kind in ("sweep", "swing") for entry in work.dataset.entries("calibration"))
-    if moving or refused:
+    if refused:
         return work
     soft, more = calibrate_gears(chain, description, postures)
+    wrong = [v.message for v in more if v.verdict == "refused"]
+    if wrong and _moving(work.dataset):
+        return work.saying(Verdict("geometry", "warning", f"no row `full`: {'; '.join(wrong)}"))
     return work.with_model(soft, [v for v in more if v not in said])
+
+
+def _moving(dataset: Dataset) -> bool:
+    return any(entry.kind in ("sweep", "swing") for entry in dataset.entries("calibration"))
 
 
 def _weighed(work: Work, model: Model) -> tuple[Verdict, ...]:
@@ -198,10 +204,12 @@ _RUN: dict[str, Callable[[Work], Work]] = {
 }
 
 
-def _concluded(estimate: Estimate) -> Estimate:
+def _concluded(work: Work) -> Estimate:
     """Whether it may be used, and by which row."""
+    estimate = work.estimate
     names = [m.name for m in estimate.models]
-    main = next((name for name in MAIN if name in names), names[-1] if names else "")
+    rows = MAIN[1:] if _moving(work.dataset) else MAIN  # joint models go with the geometry they were fitted beside
+    main = next((name for name in rows if name in names), names[-1] if names else "")
     usable = bool(names) and all(v.verdict != "refused" for v in estimate.verdicts)
     return replace(estimate, main=main, status="calibrated" if usable else "not_calibrated")
 

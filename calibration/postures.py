@@ -145,8 +145,7 @@ def read_passing(description: Description, trials: Iterable[Trial], robot: Clock
 
 
 def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
-    start, stop = trial.t_mocap[0] + _REST, trial.t_mocap[-1]
-    rows = np.unique(np.searchsorted(trial.t_mocap, np.arange(start, stop, spacing)))
+    rows = passed_rows(trial.t_mocap, spacing)
     passed = replace(trial, t_mocap=trial.t_mocap[rows], marker_position=trial.marker_position[rows])
     base, hand = (poses_of(body(description), passed) for body in (base_body, hand_body))
     T = inverse(base.T) @ hand.T
@@ -155,6 +154,12 @@ def _passed(description: Description, trial: Trial, robot: Clock, spacing: float
     t = trial.t_mocap[rows]
     label = np.array([f"{trial.id} at {after:.1f} s" for after in t - trial.t_mocap[0]], dtype=str)
     return T, readings_at(trial, robot, t, trial.q_motor), S, np.zeros(len(rows)), label
+
+
+def passed_rows(t: np.ndarray, spacing: float) -> np.ndarray:
+    """A sample every `spacing` of times t (n,) [s], the first second left out."""
+    rows = np.searchsorted(t, np.arange(t[0] + _REST, t[-1], spacing))
+    return np.unique(rows[rows < len(t)])  # arange may pass its end by rounding
 
 
 def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ MEANINGS = {
     "model_3": "model_2 and the published sigmoid-polynomial joint model",
     "registration": "datasheet geometry, marker bodies fitted: the honest baseline",
     "arm_tool": "base frame from spins and drives, then arm base and tool; the arm itself as its factory left it",
-    "full": "one fit of geometry, suspension with stick-slip and a physical joint model",
+    "full": "geometry with gears that give and play that gravity holds, from static postures",
     "floor": "the true parameters and states through the same measurements: what no model can undercut",
 }
 BASES = {

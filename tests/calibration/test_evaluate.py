@@ -63,7 +63,7 @@ def test_rows_of_a_ladder_are_complete_and_named_as_in_the_contract(evaluation, 
     sources = ("fixed", "measured") if estimate.suspension is None else ("fixed", "plate", "dynamics", "measured")
     rows = [("nominal", b, "motor") for b in ("fixed", "measured")]
     rows += [("model_1", b, "motor") for b in sources[1:]] if estimate.suspension is not None else []
-    rows += [(m, b, "motor") for m in ("registration", "model_2") for b in sources]
+    rows += [(m, b, "motor") for m in ("registration", "model_2", "full") for b in sources]
     assert keys == {(m, t, b, e, "mocap") for m, b, e in rows for t in ("dynamic", "static", "all")}
     assert set(found["rows"][0]) == {
         "model", "trials", "base", "encoder", "against", "n", "position_rmse_component_mm", "position_rmse_norm_mm",

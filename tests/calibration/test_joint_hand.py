@@ -15,6 +15,7 @@ from calibration.joint_samples import Samples
 from calibration.joint_selection import Candidate
 from calibration.parameters import nominal_frames
 from calibration.play import play
+from calibration.postures import passed_rows
 from calibration.recording import Trial
 from calibration.robot import Chain
 from tests.calibration import joint_data, matched
@@ -138,3 +139,9 @@ def test_regimes_leave_out_joints_that_are_not_excited(monkeypatch: pytest.Monke
     told = {x.joint for x in (*on_repetitions(models, still, "total"), *on_validation(models, still, ROBOT))}
     assert "arm_7_joint" not in told
     assert "torso_lift_joint" not in told
+
+
+def test_samples_that_are_passed_end_where_the_trial_does():
+    t = 536.174 + np.arange(5061) / 100.0  # the last of the regular times is beyond its end by rounding
+    rows = passed_rows(t, 0.2)
+    assert rows[0] == 100 and rows[-1] <= 5060 and (np.diff(rows) == 20).all()
