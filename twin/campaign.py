@@ -82,7 +82,7 @@ def record(
         TwinError: The simulation failed; said where.
     """
     lab = laboratory(config, seed)
-    later = second_session(lab)
+    later = second_session(lab) if config.campaign.confirmation else lab
     for folder in ("dataset/trials", "truth/trials"):
         (out / folder).mkdir(parents=True, exist_ok=True)
     motions = schedule(config.campaign, mjcf.model(), seed)
@@ -105,7 +105,7 @@ def record(
     description = declaration(config, tuple(entries))
     (out / "dataset/dataset.json").write_text(description.model_dump_json(indent=1) + "\n", encoding="utf-8")
     (out / "dataset/nominal.urdf").write_text(mjcf.urdf(), encoding="utf-8")
-    _write_truth(lab, later if config.campaign.confirmation else None, out / "truth")
+    _write_truth(lab, later if later is not lab else None, out / "truth")
 
 
 def _one(lab: Laboratory, motion: Motion, start: float, out: Path, watch: Watch) -> TrialEntry:
