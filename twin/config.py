@@ -70,7 +70,8 @@ class Widths:
         mount_translation: Where the arm is bolted on, per axis, on top of its first joint's placement [m].
         mount_rotation: The same, per axis [rad].
         spread: Half width of the uniform factor on offsets and gaps [-]; 0 leaves them as written.
-        mass_scales: Mass of a link over the datasheet's, where it is of another make [-]; the others' is 1.
+        makes: Arms of other makes, of which a robot has one: masses of its links over the datasheet's [-], 1 where
+            none is given. Without any, the datasheet's.
     """
 
     placement_translation: NonNegative
@@ -80,7 +81,7 @@ class Widths:
     spread: Annotated[float, Field(ge=0.0, le=0.9), DRAWN] = 0.0
     mount_translation: NonNegative = 0.0
     mount_rotation: NonNegative = 0.0
-    mass_scales: dict[ArmLink, Annotated[float, Field(ge=0.3, le=3.0), DRAWN]] = field(default_factory=dict)
+    makes: tuple[dict[ArmLink, Annotated[float, Field(ge=0.3, le=3.0), DRAWN]], ...] = ()
 
 
 @dataclass(frozen=True, config=STRICT)

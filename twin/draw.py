@@ -88,7 +88,8 @@ def _masses(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> tuple[Lin
         n for n in links if nominal.body(n).mass[0] > 0 and n.startswith(("torso", "head", "arm", "wrist", "gripper"))
     ]
     w = config.widths
-    make: dict[str, float] = {str(link): scale for link, scale in w.mass_scales.items()}
+    which = int(generator(seed, "make").integers(max(1, len(w.makes))))
+    make: dict[str, float] = {str(link): scale for link, scale in (w.makes or ({},))[which].items()}
 
     def one(link: str) -> LinkMass:
         rng = generator(seed, "mass", link)

@@ -69,12 +69,16 @@ def test_masses_and_payload_are_as_declared(lab, nominal):
     assert model.body("payload").mass[0] == payload.mass == 0.437
 
 
-def test_a_link_of_another_make_has_another_mass_and_the_same_scatter(lab):
-    heavier = laboratory(load("humanoids2024", ["twin.widths.mass_scales.arm_5_link=1.5"]).quick().twin, 0)
-    ratio = {d.link: d.scale for d in heavier.robot.defects if isinstance(d, LinkMass)}
-    for d in lab.robot.defects:
-        if isinstance(d, LinkMass):
-            assert ratio[d.link] / d.scale == pytest.approx(1.5 if d.link == "arm_5_link" else 1.0)
+def test_a_robot_has_one_make_of_arm_and_the_same_scatter(lab):
+    makes = [{"arm_5_link": 1.5, "arm_3_link": 1.2}, {"arm_1_link": 0.8}]
+    config = load("humanoids2024", [f"twin.widths.makes={json.dumps(makes)}"]).quick().twin
+    found = []
+    for seed in range(6):
+        plain = {d.link: d.scale for d in draw(replace(config, widths=replace(config.widths, makes=())), seed).defects if isinstance(d, LinkMass)}
+        made = {d.link: d.scale / plain[d.link] for d in draw(config, seed).defects if isinstance(d, LinkMass)}
+        found.append({link: scale for link, scale in made.items() if scale != pytest.approx(1.0)})
+    assert all(any(f == pytest.approx(make) for make in makes) for f in found)
+    assert {len(f) for f in found} == {1, 2}
 
 
 def test_contacts_that_would_chatter_are_refused(lab):
