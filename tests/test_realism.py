@@ -179,7 +179,7 @@ def test_the_log_moves_among_the_draws_where_the_floor_holds_what_the_plate_read
 
 
 @pytest.mark.slow
-def test_figures_of_the_log_lie_among_the_draws():
-    """Seven of fourteen as drawn, where nine were asked for; nine where the arm pulls as the log's did."""
-    assert compare_swings(load("reality"), 20).n_inside >= 7
-    assert compare_swings(load("reality", ["twin.payload.mass=1.2"]), 20).n_inside >= 9
+@pytest.mark.parametrize("seed", [0, 20])
+def test_figures_of_the_log_lie_among_the_draws(seed):
+    """Nine of fourteen, as asked, of the robots of the page and of twenty that no choice had seen."""
+    assert compare_swings(load("reality", [f"seed={seed}"]), 20).n_inside >= 9
