@@ -77,7 +77,10 @@ def test_a_robot_has_one_make_of_arm_and_the_same_scatter(nominal):
     config = load("humanoids2024", [f"twin.widths.makes={json.dumps(makes)}"]).quick().twin
     found = []
     for seed in range(8):
-        usual, made = ({d.link: d.scale for d in draw(c, nominal, seed).defects if isinstance(d, LinkMass)} for c in (plain, config))
+        usual, made = (
+            {d.link: d.scale for d in draw(c, nominal, seed).defects if isinstance(d, LinkMass)}
+            for c in (plain, config)
+        )
         ratio = {link: made[link] / usual[link] for link in usual}
         found.append({link: r for link, r in ratio.items() if r != pytest.approx(1.0)})
     assert all(any(f == pytest.approx(make) for make in makes) for f in found)
