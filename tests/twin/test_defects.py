@@ -8,7 +8,6 @@ import pytest
 import mjcf
 from scenarios import load
 from twin.build import build
-from twin.campaign import laboratory
 from twin.defects.contact import Chatters
 from twin.defects.gear import Gear
 from twin.defects.loads import LinkMass, Payload
