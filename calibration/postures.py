@@ -83,8 +83,13 @@ class Postures:
 
 def dwell_windows(trial: Trial) -> np.ndarray:
     """Start and stop of each dwell without its margins, (n, 2) [s, mocap clock]."""
-    margin = np.minimum(_MARGIN, 0.25 * (trial.dwell_stop - trial.dwell_start))
-    return np.stack([trial.dwell_start + margin, trial.dwell_stop - margin], axis=1)
+    return inner_windows(np.stack([trial.dwell_start, trial.dwell_stop], axis=1))
+
+
+def inner_windows(dwells: np.ndarray) -> np.ndarray:
+    """Start and stop of dwells (n, 2) [s] without their margins."""
+    margin = np.minimum(_MARGIN, 0.25 * (dwells[:, 1] - dwells[:, 0]))
+    return np.stack([dwells[:, 0] + margin, dwells[:, 1] - margin], axis=1)
 
 
 def read_postures(description: Description, trials: Iterable[Trial], robot: Clock) -> Postures:

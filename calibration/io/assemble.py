@@ -16,6 +16,7 @@ from calibration.io.effort_check import check_currents
 from calibration.io.hand_check import check_columns
 from calibration.io.mapping import MappedTrial, MappingFile
 from calibration.io.recorded import Joints, Markers, Plates, Recorded
+from calibration.io.rests import rests_of
 from calibration.means import PostureMeans, write_means
 from calibration.recording import Trial, write_trial
 from calibration.robot import Chain, chain_of_frames
@@ -110,7 +111,8 @@ def _read_all(files: Sequence[Path], reader: Reader, mapping: MappingFile) -> di
     if problems:
         raise InputErrors(problems)
     turned = mapping.content.reversed_effort
-    return {t.id: _placed(t, read[t.stem].with_currents_turned(turned)) for t in trials}
+    placed = {t.id: _placed(t, read[t.stem].with_currents_turned(turned)) for t in trials}
+    return {t.id: rests_of(mapping, t, placed[t.id]) for t in trials}
 
 
 def _placed(trial: MappedTrial, recorded: Recorded) -> Recorded:
