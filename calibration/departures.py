@@ -1,17 +1,16 @@
 """What a robot does that its calibration does not ask for, as nuisances z ~ N(0, I) with widths a datasheet gives.
 
-    reading of joint j      off by  h_j tanh(tau_j / tau_0) z       play h that gravity holds on one flank
-    placement of joint j    turned by  b_j M_j z                    bending under the moment M_j across its axis
+    placement of joint j    turned by  b_j M_j z        bending under the moment M_j across its axis
 
-Both are functions of the posture, not noise: the fit takes them for geometry, and a design that knows only noise goes
-where they are largest. tau is the gravity torque [N.m], M the gravity moment in the joint's frame [N.m].
+It is a function of the posture, not noise: the fit takes it for geometry, and a design that knows only noise goes
+where it is largest. M is the gravity moment in the joint's frame [N.m]. Play that gravity holds is asked for (`gears`).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.hand import HandModel, HandPoses, held_share
+from calibration.hand import HandModel, HandPoses
 from calibration.loads import gravity_moments
 from calibration.robot import Chain
 
@@ -24,29 +23,22 @@ class Departures:
     """Widths of the nuisances.
 
     Attributes:
-        held: (k,) h of the chain's joints, 0 where they slide [rad].
         bending: (k,) b of each joint's placement [rad/(N.m)].
     """
 
-    held: np.ndarray
     bending: np.ndarray
 
     def effects(self, model: HandModel, q: np.ndarray, found: HandPoses) -> np.ndarray:
-        """Local twists of the hand (n, 6, 2 k) at readings q (n, n_measured), for each z = 1; `found` at q."""
-        chain, (n, k) = model.chain, (len(q), len(self.held))
-        flank = found.J_joint * (self.held * held_share(chain.gravity_torques(q)))[:, None, :]
+        """Local twists of the hand (n, 6, k) at readings q (n, n_measured), for each z = 1; `found` at q."""
+        chain, (n, k) = model.chain, (len(q), len(self.bending))
         turns = found.J[:, :, 12 : 12 + 6 * k].reshape(n, 6, k, 6)[:, :, :, 3:]
-        bent = np.einsum("ndkj,nkj->ndk", turns, self.bending[:, None] * moments(chain, q))
-        return np.concatenate([flank, bent], axis=2)
+        return np.asarray(np.einsum("ndkj,nkj->ndk", turns, self.bending[:, None] * moments(chain, q)))
 
 
-def departures_of(chain: Chain, play: np.ndarray, q: np.ndarray) -> Departures:
-    """Those of a robot with such play (k,) [rad, m], its moments as at postures q (n, n_measured)."""
-    slides = np.array([chain.is_prismatic(name) for name in chain.joints])
+def departures_of(chain: Chain, q: np.ndarray) -> Departures:
+    """Those of a robot whose moments are as at postures q (n, n_measured)."""
     largest = np.linalg.norm(moments(chain, q), axis=2).max(axis=0)
-    return Departures(
-        np.where(slides, 0.0, play), np.where(largest > _LEAST, _BENDING / np.maximum(largest, _LEAST), 0.0)
-    )
+    return Departures(np.where(largest > _LEAST, _BENDING / np.maximum(largest, _LEAST), 0.0))
 
 
 def moments(chain: Chain, q: np.ndarray) -> np.ndarray:

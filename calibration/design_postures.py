@@ -12,7 +12,7 @@ from calibration.design_sides import Sides, sides
 from calibration.design_tour import Tour, tour
 from calibration.hand import HandModel, nominal_hand
 from calibration.information import Prospect, departing, prospect
-from calibration.parameters import ParameterSet, geometry_parameters, held_parameters, play_floor, play_start
+from calibration.parameters import ParameterSet, held_parameters, play_floor, play_start
 from calibration.remedy import Posture, Remedy, Sigma
 from calibration.robot import chain_of
 from calibration.schema import Description
@@ -101,26 +101,21 @@ class Plan:
         return Remedy(stage, why, self.postures, sigma=told)
 
 
-def nominal_task(
-    urdf: str, description: Description, rng: np.random.Generator, work: Sample | None = None, gears: bool = False
-) -> Task:
-    """The geometry of a robot of which only the datasheet is known, and its gears' compliance where that is asked for.
+def nominal_task(urdf: str, description: Description, rng: np.random.Generator, work: Sample | None = None) -> Task:
+    """All that row `full` asks static postures for, of a robot of which only the datasheet is known.
 
     Args:
         urdf: Of the robot.
         description: Of the laboratory.
         rng: For what is drawn.
         work: Draws postures like those the robot works in.
-        gears: Whether the postures alone are to tell the gears and their play, as where no motion is recorded.
     """
     chain = chain_of(urdf, description)
     play = np.maximum(play_start(chain, description), play_floor(chain, description))
     room = room_of(shapes_of(urdf, chain, description), description, rng)
     anywhere = room.sample(_ANYWHERE, rng)
-    parameters, held = geometry_parameters(chain, description), play
-    if gears:
-        parameters, held = held_parameters(chain, description, chain.gravity_torques(anywhere)), np.zeros(len(play))
-    departures = departures_of(chain, held, anywhere)
+    parameters = held_parameters(chain, description, chain.gravity_torques(anywhere))
+    departures = departures_of(chain, anywhere)
     hand = nominal_hand(chain, parameters.nominal[:12])
     return Task(room, hand, parameters, play, departures=departures, work=work)
 

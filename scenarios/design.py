@@ -43,9 +43,7 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
 
     description = declaration(scenario.twin, ())
     rng = generator(scenario.seed, "design")
-    motions = scenario.twin.campaign
-    still = motions.sweep == 0.0 and motions.calibration_swing == 0.0
-    found = plan(nominal_task(mjcf.urdf(), description, rng, _work(), still), n, criterion, rng)
+    found = plan(nominal_task(mjcf.urdf(), description, rng, _work()), n, criterion, rng)
     against = compared(found, rng)
     worst, usual = 1e3 * against.designed, 1e3 * float(np.median(against.random))
     why = (

@@ -14,6 +14,7 @@ from calibration.design_sides import sides
 from calibration.design_tour import clear
 from calibration.errors import InputError
 from calibration.information import prospect
+from calibration.parameters import geometry_parameters
 from calibration.remedy import read_remedies, to_text
 from calibration.shapes import shapes_of
 from calibration.sight import in_sight, visible
@@ -30,7 +31,7 @@ DESCRIBED = declaration(load("humanoids2024").twin, ())
 
 @pytest.fixture(scope="module")
 def task():
-    return nominal_task(mjcf.urdf(), DESCRIBED, np.random.default_rng(0), gears=True)
+    return nominal_task(mjcf.urdf(), DESCRIBED, np.random.default_rng(0))
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +189,8 @@ def test_a_file_that_is_none_is_told(tmp_path, text):
 def test_a_robot_without_wheels_or_shapes_is_designed_for_too():
     described = matched.described()
     bare = nominal_task(pin_text_without_shapes(), described, np.random.default_rng(0))
-    at = partial(prospect, bare.model, bare.parameters, described, bare.play)
+    rigid = geometry_parameters(bare.model.chain, described)
+    at = partial(prospect, bare.model, rigid, described, bare.play)
     q = bare.room.pool(80, np.random.default_rng(0))
     assert at(q[:60], q[60:]).B.shape[2] == 36
 
