@@ -79,15 +79,21 @@ class Evidence:
     spread: np.ndarray
 
 
-def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: float) -> Widths:
-    """Widths of highest evidence for the linearised problem, to a change of their logarithms below `same`."""
+def refined(
+    at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: float, free: np.ndarray | None = None
+) -> tuple[Widths, Evidence]:
+    """Widths of highest evidence for the linearised problem, to a change of their logarithms below `same`.
+
+    Only the groups `free` (g,) of those that are, if given, are changed; the evidence, too, is to that accuracy.
+    """
     damping, now = _UNDAMPED, evidence(at, noise, prior, widths)
+    free = noise.free if free is None else free
     for _ in range(_STEPS):
         f = _prior_factors(prior, now, widths.prior)
-        v = _scored(now, noise, widths.noise, damping)
+        v = _scored(now, noise.floor, free, widths.noise, damping)
         moved = max(moved_by(widths.noise, v, _NEGLIGIBLE * noise.floor), moved_by(widths.prior, f, 1e-12) / 2.0)
         if moved < same and damping <= _UNDAMPED:
-            return Widths(v, f)
+            return Widths(v, f), now
         trial = evidence(at, noise, prior, Widths(v, f))
         if trial.value > now.value + 1e-9 * abs(now.value) and damping < 1e6:
             damping = max(10.0 * damping, 1e-2)
@@ -96,7 +102,7 @@ def refined(at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: fl
         widths, now = Widths(v, f), trial
         if moved < same:
             break
-    return widths
+    return widths, now
 
 
 def moved_by(old: np.ndarray, new: np.ndarray, least: np.ndarray | float) -> float:
@@ -132,10 +138,10 @@ def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evid
     )
 
 
-def _scored(now: Evidence, noise: Noise, s: np.ndarray, damping: float) -> np.ndarray:
-    """Standard deviations after one Fisher scoring step of the variances that are not held at their floor."""
-    v, low = s**2, noise.floor**2
-    free = noise.free & ~((v <= low * 1.0000001) & (now.slope > 0.0))
+def _scored(now: Evidence, floor: np.ndarray, free: np.ndarray, s: np.ndarray, damping: float) -> np.ndarray:
+    """Standard deviations after one Fisher scoring step of the variances that are free and not held at their floor."""
+    v, low = s**2, floor**2
+    free = free & ~((v <= low * 1.0000001) & (now.slope > 0.0))
     if not free.any():
         return s
     F = now.fisher[np.ix_(free, free)]

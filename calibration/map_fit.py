@@ -128,7 +128,7 @@ def solve(
         settled = change < same
         old = widths
         if not settled and hasty:
-            widths = refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
+            widths, _ = refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
         elif not settled:
             free, widths = needed(at.rows(some), noise.rows(some), problem.prior, widths, free, same)
         W = noise.whitener(widths.noise)

@@ -8,8 +8,8 @@ one group more or fewer, in the order the curvature of the evidence promises,
 
     by adding     1/2 slope^2 / F_gg        by dropping     -1/2 x_g^2 / (F^-1)_gg,      x = v - least v
 
-F its expected curvature by the variances v. Two sets are tried to begin with, the hand's own errors and what is left of
-all: a marker's noise taken for play of two wrist joints is a maximum of its own, which no single group leads out of.
+F its expected curvature by the variances v. It begins with the better of two sets, the hand's own errors and what is
+left of all: a marker's noise taken for play of two wrist joints is a maximum of its own, and no single group leads out.
 References: Schwarz, Annals of Statistics 1978; Bogdan, Ghosh, Doerge, Genetics 2004 (ln G).
 """
 
@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.evidence import Evidence, Noise, Widths, evidence, refined
+from calibration.evidence import Evidence, Noise, Widths, refined
 from calibration.linearised import Linearised, Prior
 
 _WORTH = 1e-2  # least gain of a change
@@ -38,6 +38,8 @@ class _Set:
 
 @dataclass(frozen=True)
 class _Question:
+    """The linearised problem, and the groups that may be asked: those `noise.free`."""
+
     at: Linearised
     noise: Noise
     prior: Prior
@@ -51,8 +53,7 @@ class _Question:
     def answered(self, free: np.ndarray, widths: Widths) -> _Set:
         """A set with its best widths."""
         least = replace(widths, noise=np.where(self.noise.free & ~free, self.noise.floor, widths.noise))
-        best = refined(self.at, replace(self.noise, free=free), self.prior, least, self.same)
-        now = evidence(self.at, self.noise, self.prior, best)
+        best, now = refined(self.at, self.noise, self.prior, least, self.same, free)
         return _Set(free, best, now.value + self.price * int(free.sum()), now)
 
 
@@ -65,12 +66,12 @@ def needed(
     """
     question = _Question(at, noise, prior, same)
     if free is not None:
-        best = _searched(question, question.answered(free, widths))
+        start = question.answered(free, widths)
     else:
-        everything = question.answered(noise.free, widths)
         of_the_hand = noise.free & (np.arange(len(noise.free)) >= at.J_joint.shape[2])
-        starts = (_thinned(question, everything), question.answered(of_the_hand, widths))
-        best = min((_searched(question, start) for start in starts), key=lambda found: found.cost)
+        hand, everything = (question.answered(some, widths) for some in (of_the_hand, noise.free))
+        start = min(hand, _thinned(question, everything), key=lambda found: found.cost)
+    best = _searched(question, start)
     return best.free, best.widths
 
 
@@ -113,7 +114,7 @@ def _thinned(question: _Question, found: _Set) -> _Set:
             break
         x[left] = np.maximum(x[left] - inverse[:, k] / inverse[k, k] * x[left[k]], 0.0)
         free[left[k]] = False
-    if free.all() or np.array_equal(free, found.free):
+    if np.array_equal(free, found.free):
         return found
     sizes = np.sqrt(question.noise.floor**2 + np.maximum(x, 0.0))
     return question.answered(free, replace(found.widths, noise=np.where(free, sizes, found.widths.noise)))

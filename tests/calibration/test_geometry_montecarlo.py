@@ -56,7 +56,7 @@ def judged(chain, seed, soft):
     truth, q = matched.Truth(xi=xi, offset=zeros), reading - zeros - soft * gives * tau
     found = fit_chain(chain, reading[:POSTURES], measured(truth, q[:POSTURES], rng), Widths())
     true = body_poses(found.markers, matched.positions(LAB @ matched.hand_in_base(truth, q[POSTURES:]), X)).T
-    predicted = found.hand.poses_and_derivatives(reading[POSTURES:])
+    predicted = found.hand.poses_and_derivatives(reading[POSTURES:], n_parameters=len(found.parameters))
     J, scale = predicted.J, found.parameters.scale[:KNOWN]
     # The bound: the markers' noise alone is known, nothing is believed beforehand, no gear gives.
     noise = found.fit.noise.B[:, :, -6:]
