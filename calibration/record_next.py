@@ -5,14 +5,15 @@
 
 A direction is untold where the data shrink its prior variance by less than a tenth, while postures elsewhere inside the
 limits would shrink it. Directions no posture tells, the gauge, do not move the hand and are not counted. They are
-chosen by D, which looks for untold directions first. After a refused fit nothing of it is used: the postures are taken
-at the datasheet's random errors.
+chosen by D, which looks for untold directions first. After a refused fit the robot is taken as drawn, and its random
+errors as the recorded postures let believe (`believed_play`).
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.believed_play import believed_play
 from calibration.design_pool import room_of
 from calibration.design_postures import Plan, Task, plan
 from calibration.errors import NotEnoughData
@@ -64,19 +65,20 @@ def record_next(
 ) -> tuple[Remedy | None, tuple[Verdict, ...]]:
     """Postures to record after the geometry `model` from `postures`; None where they would tell nothing new."""
     rng = np.random.default_rng(_SEED)
-    known = _known(chain, description, postures, None if refused else model, rng)
+    known = _known(chain, description, postures, model, refused, rng)
     lost = tuple(
         p.name for p in model.parameters if p.status == "not_identifiable" and p.name in known.parameters.names
     )
-    if not known.untold and not lost:
+    short = _short(chain, postures)
+    if not known.untold and not lost and short <= 0:
         return None, ()
     try:
         room = room_of(shapes_of(urdf, chain, description), known.description, rng)
         task = Task(room, known.hand, known.parameters, known.play, known.C)
-        found = plan(task, max(N, _short(chain, postures)), "D", rng)
+        found = plan(task, max(N, short), "D", rng)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "warning", f"no postures to suggest: {error}"),)
-    remedy = _remedy(found, known, lost)
+    remedy = _remedy(found, known, lost, short)
     sigma = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in remedy.sigma[:3])
     return remedy, (
         Verdict(STAGE, "warning", f"{remedy.why}; {len(remedy.postures)} postures that would tell, in {FILE}: {sigma}"),
@@ -84,13 +86,18 @@ def record_next(
 
 
 def _known(
-    chain: Chain, description: Description, postures: Postures, model: Model | None, rng: np.random.Generator
+    chain: Chain, description: Description, postures: Postures, model: Model, refused: bool, rng: np.random.Generator
 ) -> Known:
-    """From a fit, or from the datasheet where there is none to rely on."""
+    """From a fit, or from the datasheet where it must not be relied on."""
     parameters = geometry_parameters(chain, description)
     hand, p = nominal_hand(chain, parameters.nominal[:12]), len(parameters)
+    names = [x.name for x in model.parameters]
+    rows = [names.index(name) for name in parameters.names]
     play = np.maximum(play_start(chain, description), play_floor(chain, description))
-    if model is not None:
+    if refused:
+        theta = np.array([model.parameters[row].value for row in rows])
+        play = believed_play(hand, parameters, postures, theta, play)
+    else:
         hand = model.hand(chain, parameters.nominal[:12])
         play = model.play if len(model.play) else play
     description = _as_measured(description, postures)
@@ -99,9 +106,7 @@ def _known(
     V = told_directions(prospect(hand, parameters, description, play, anywhere, anywhere[:1], np.eye(p)).B)
     told = prospect(hand, parameters, description, play, postures.q, anywhere[:1], np.eye(p))
     C = by_tolerance = told.after(np.arange(len(postures)))
-    if model is not None:
-        names = [x.name for x in model.parameters]
-        rows = [names.index(name) for name in parameters.names]
+    if not refused:
         C = model.covariance[np.ix_(rows, rows)] / np.outer(parameters.scale, parameters.scale)
     untold = int((np.linalg.eigvalsh(V.T @ by_tolerance @ V) > _UNTOLD).sum())
     return Known(hand, parameters, play, description, C, untold)
@@ -123,13 +128,15 @@ def _as_measured(description: Description, postures: Postures) -> Description:
     return description.model_copy(update={"sigmas": description.sigmas.model_copy(update={"marker": sigma})})
 
 
-def _remedy(found: Plan, known: Known, lost: tuple[str, ...]) -> Remedy:
+def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> Remedy:
     """The postures with what they do to the hand, to what was lost, and to what they tell most."""
     hand = [float(found.design.prospect.hand(C).max()) for C in (found.design.prospect.C, found.design.C)]
     whole = found.remedy(STAGE, "").sigma
     most = sorted((s for s in whole if s.after < _FALLS * s.before), key=lambda s: s.after / s.before)[:_NAMED]
     named = {s.name for s in most} | set(lost)
     why = f"{known.untold} of {_directions(found)} combinations are told by the datasheet's tolerances alone"
+    if short > 0:
+        why = f"{short} distinct postures are lacking; {why}"
     never = [s.name for s in whole if s.name in lost and s.after > _NEVER * s.before]
     if set(lost) - set(never):
         why += f"; not identifiable: {', '.join(name for name in lost if name not in never)}"

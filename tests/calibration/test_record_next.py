@@ -8,6 +8,7 @@ import pytest
 import mjcf
 from calibration import load_estimate, save_estimate
 from calibration.base_frame_stage import locate_base
+from calibration.believed_play import believed_play
 from calibration.estimate import Estimate, Parameter, RobotNames
 from calibration.geometry import calibrate_geometry
 from calibration.hand import nominal_hand
@@ -15,6 +16,7 @@ from calibration.hand_fit import linearised
 from calibration.information import dwell_noise
 from calibration.joint_model import JointModel, Quality
 from calibration.joint_projection import RHO, Problem, search
+from calibration.parameters import geometry_parameters, play_start
 from calibration.record_next import N, record_next
 from calibration.record_next_base import drive_next
 from calibration.record_next_joints import predicted_sigma, sweep, sweeps_next
@@ -93,14 +95,36 @@ def test_enough_postures_ask_for_no_more(chain):
     assert record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, False) == (None, ())
 
 
-def test_a_refused_fit_ends_with_postures_too(chain):
-    postures = recorded(matched.near_postures(np.random.default_rng(0), 4), 1)
+@pytest.mark.parametrize("n, widest", [(4, 2.5), (8, 1.5)])
+def test_a_refused_fit_ends_with_postures_too(chain, n, widest):
+    """Their sigmas are those of the recorded errors; at the datasheet's play, which is not there, up to nine times."""
+    postures = recorded(matched.near_postures(np.random.default_rng(0), n), 1)
     model, said = calibrate_geometry(chain, DESCRIBED, postures)
     assert any(v.verdict == "refused" for v in said)
-    remedy, _ = record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, True)
-    assert len(remedy.postures) == 13 - 4 and remedy.sigma[0].after < 0.6 * remedy.sigma[0].before
+    remedy, told = record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, True)
+    assert f"{13 - n} distinct postures are lacking" in told[0].message
+    assert len(remedy.postures) == max(N, 13 - n) and remedy.sigma[0].after < 0.6 * remedy.sigma[0].before
     more = recorded(np.array([p.q for p in remedy.postures]) - TRUTH.offset, 2)
-    assert not [v for v in calibrate_geometry(chain, DESCRIBED, postures.joined(more))[1] if v.verdict == "refused"]
+    after, said = calibrate_geometry(chain, DESCRIBED, postures.joined(more))
+    assert not [v for v in said if v.verdict == "refused"]
+    sigma = {p.name: p.sigma for p in after.parameters}
+    ratio = np.array([s.after / sigma[s.name] for s in remedy.sigma[1:]])
+    assert (ratio > 0.8).all() and (ratio < widest).all()
+
+
+@pytest.mark.parametrize("size", [0.0, 0.5, 1.0])
+def test_play_is_believed_as_the_postures_tell(chain, size):
+    """Ten postures of six robots: a factor of the datasheet's play; the markers' noise is worth 0.04 of it."""
+    parameters, datasheet, found = geometry_parameters(chain, DESCRIBED), play_start(chain, DESCRIBED), []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        q = matched.near_postures(rng, 10)
+        postures = recorded(q + size * datasheet * rng.normal(size=q.shape), seed)
+        postures = replace(postures, q=q + TRUTH.offset)
+        nominal = nominal_hand(chain, parameters.nominal[:12])
+        theta = np.array([p.value for p in calibrate_geometry(chain, DESCRIBED, postures)[0].parameters])
+        found.append(believed_play(nominal, parameters, postures, theta, datasheet)[1] / datasheet[1])
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(size, rel=0.4, abs=0.05)
 
 
 @pytest.mark.slow
@@ -111,7 +135,6 @@ def test_the_same_data_get_the_same_postures(chain, still, suggested):
 def test_what_is_predicted_of_a_dwell_is_its_derivative(chain):
     """B of the recorded postures is the fit's own whitened Jacobian, play none."""
     from calibration.information import prospect
-    from calibration.parameters import geometry_parameters
 
     parameters = geometry_parameters(chain, DESCRIBED)
     hand = nominal_hand(chain, parameters.nominal[:12])
