@@ -69,6 +69,7 @@ class TrialLag:
         drift_sigma: Its standard deviation [-]; infinite where the trial alone does not tell.
         duration: Of the trial [s].
         wound: Mean lateness that the fit laid to gears wound by friction, not in the lag [s].
+        unseen: What the fit would lay to the lag of a winding by 0.1 mrad in all loaded joints [s].
     """
 
     trial_id: str
@@ -78,6 +79,7 @@ class TrialLag:
     drift_sigma: float = np.inf
     duration: float = np.inf
     wound: float = 0.0
+    unseen: float = 0.0
 
 
 def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> tuple[Clock, tuple[str, ...]]:

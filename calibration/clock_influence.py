@@ -48,6 +48,11 @@ class Reduced:
         m = 6 * len(self.t)
         return self.S[m:] @ x - self.r[m:]
 
+    def taken_for(self, r: np.ndarray) -> float:
+        """Lag [s] that residuals r (6 n,) beside those there are would be taken for, were the drift known."""
+        lag = self.S[:, 0]
+        return float(lag[: len(r)] @ r / (lag @ lag))
+
 
 def without_nuisances(A: np.ndarray, B: np.ndarray, r: np.ndarray, S: np.ndarray, t: np.ndarray) -> Reduced:
     """Eliminate columns A (6 n, a), free, and B (6 n, b), with coefficients N(0, 1), from r (6 n,) and S (6 n, 2)."""

@@ -139,7 +139,8 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     played = np.concatenate(known, axis=2).reshape(len(S), -1)
     wound = played @ reduced.coefficients(change)[-played.shape[1] :]
     late = float(S[:, 0] @ wound / (S[:, 0] @ S[:, 0]))
-    return replace(_told(change, C, x.t, middle, trial_id, clock), wound=late)
+    unseen = -reduced.taken_for(known[0].sum(axis=2).ravel())
+    return replace(_told(change, C, x.t, middle, trial_id, clock), wound=late, unseen=unseen)
 
 
 def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:

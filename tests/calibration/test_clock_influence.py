@@ -66,6 +66,8 @@ def test_values_are_those_of_least_squares_with_all_columns_at_once():
     everything = np.linalg.lstsq(rows, np.concatenate([r, np.zeros(5)]), rcond=None)[0]
     np.testing.assert_allclose(found, everything[:2], rtol=1e-8)
     np.testing.assert_allclose(x.coefficients(found), everything[-5:], rtol=1e-6)
+    known = np.linalg.lstsq(rows[:, [0, *range(2, rows.shape[1])]], np.concatenate([r, np.zeros(5)]), rcond=None)[0]
+    assert np.isclose(x.taken_for(r), known[0], rtol=1e-8)  # drift known to be none
 
 
 def test_a_block_that_nuisances_explain_whatever_it_was_says_nothing():
