@@ -23,6 +23,10 @@ def reality(  # noqa: PLR0913  an option each
     grip: Annotated[
         list[float] | None, typer.Option(metavar="F", help="Replay with F times the drawn friction; repeatable.")
     ] = None,
+    turning: Annotated[
+        bool,
+        typer.Option("--turning", help="Replay, too, with casters that turn, wheels that differ and drives that hold."),
+    ] = False,
     swings: Annotated[bool, typer.Option(help="Swing their arms.")] = True,
     seed: Seed = None,
     overrides: Overrides = None,
@@ -30,11 +34,13 @@ def reality(  # noqa: PLR0913  an option each
     """Compare drawn robots with a real one: swings by the figures of its log, and its wrench replayed."""
     from scenarios import folder, steps
     from scenarios.realism.compare import as_json, compare_replay, compare_swings
+    from scenarios.realism.replayed import Condition
 
     loaded = steps.load(scenario, overriding(overrides, seed))
     recordings = () if log is None else _recordings(log)
     swung = [compare_swings(loaded, n)] if swings else []
-    replays = [compare_replay(loaded, recordings, n, f) for f in (grip or [1.0]) if recordings]
+    conditions = [Condition(f) for f in grip or [1.0]] + [Condition(turning=True)] * turning
+    replays = [compare_replay(loaded, recordings, n, condition) for condition in conditions if recordings]
     for one in swung:
         _show_swings(one)
     for each in replays:
@@ -83,10 +89,10 @@ def _show_replay(found: "Replayed") -> None:
     rows = [
         {
             "trial": t.trial_id,
-            "friction x": f"{found.grip:g}",
+            "condition": found.condition.name,
             **dict(zip(AXES, (f"{v:.0%}" for v in t.share), strict=True)),
         }
         for t in found.trials
     ]
     whole = dict(zip(AXES, (f"{v:.0%}" for v in found.share), strict=True))
-    console.show(console.records([*rows, {"trial": "all", "friction x": f"{found.grip:g}", **whole}]))
+    console.show(console.records([*rows, {"trial": "all", "condition": found.condition.name, **whole}]))

@@ -18,7 +18,7 @@ from scenarios import cli, exchange, load
 from scenarios.realism.arms import AS_LOGGED
 from scenarios.realism.compare import compare_replay, compare_swings
 from scenarios.realism.recorded import Recorded, recorded, referred
-from scenarios.realism.replayed import gripping, inside, together
+from scenarios.realism.replayed import Condition, floor_of, gripping, inside, together
 from scenarios.realism.swings import LOG, Figures, Sway, figures, yaw_from_moment
 from twin import motions
 
@@ -86,6 +86,14 @@ def test_grip_scales_friction_and_nothing_else():
         and more.caster_back.friction == 2.0 * base.caster_back.friction
     )
     assert more.drive.stiffness == base.drive.stiffness and more.pose == base.pose
+
+
+def test_wheels_under_turning_casters_are_drawn_each_on_its_own():
+    config = load("reality").twin
+    right, left, front, other, back, _ = floor_of(config, 3, Condition(turning=True), 600.0)
+    assert front.turning_force != other.turning_force and right.bushing != left.bushing
+    assert front.turning_force == pytest.approx(front.footing.friction / 10.0 * 100.0)
+    assert back.turning_force > 0.0 and left.turning_force == 0.0 and left.footing.friction > 2.0
 
 
 def test_a_recording_gives_the_wrench_on_a_floor_that_feels_no_offset(log):
@@ -172,10 +180,18 @@ def test_the_swings_start_at_full_speed_under_the_joints_limits():
 def test_the_log_moves_among_the_draws_where_the_floor_holds_what_the_plate_read(log):
     """y, z and pitch as drawn; roll and yaw with twice the friction: the drawn is less than the jerk needs."""
     trials = recorded(load_dataset(log))
-    drawn, held = (compare_replay(load("reality"), trials, 20, grip) for grip in (1.0, 2.0))
+    drawn, held = (compare_replay(load("reality"), trials, 20, Condition(grip)) for grip in (1.0, 2.0))
     assert min(drawn.share[k] for k in (1, 2, 4)) >= 0.8
     assert min(held.share[k] for k in (3, 4, 5)) >= 0.8
     assert drawn.share[5] < held.share[5]
+
+
+@pytest.mark.slow
+def test_the_log_goes_back_among_bases_whose_casters_turn(log):
+    """x is missed as drawn; where casters hold what they hold whatever their load it is inside, roll, pitch and yaw too."""
+    trials = recorded(load_dataset(log))
+    drawn, turned = (compare_replay(load("reality"), trials, 20, c) for c in (Condition(), Condition(turning=True)))
+    assert drawn.share[0] < 0.8 <= min(turned.share[k] for k in (0, 3, 4, 5))
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ class WheelType:
         torsional_friction: Of the contact, moment about the normal over normal force [m].
         rolling_friction: Of the contact, moment about a tangent over normal force [m].
         guide_friction: Coulomb's, of the bushing along z [N]: a vertical load below it moves the contact alone.
+        turning_force: Along x and along y at which a caster turns instead of sliding, whatever its load [N]; 0: never.
     """
 
     stiffness: tuple[Positive, Positive, Positive]
@@ -35,6 +36,7 @@ class WheelType:
     torsional_friction: NonNegative = 0.02
     rolling_friction: NonNegative = 0.02
     guide_friction: NonNegative = 0.0
+    turning_force: NonNegative = 0.0
 
     @field_validator("torsion")
     @classmethod
@@ -67,8 +69,10 @@ class Base:
     @field_validator("wheels")
     @classmethod
     def _guided(cls, wheels: str, info: ValidationInfo) -> str:
-        """Anchored wheels are linear, rigid ones have no guides."""
-        types = (info.data.get(k) for k in ("drive", "caster_front", "caster_back"))
-        if wheels != "contact" and any(t is not None and t.guide_friction > 0.0 for t in types):
+        """Anchored wheels are linear, rigid ones have no guides, braked ones do not turn."""
+        types = [(k, info.data.get(k)) for k in ("drive", "caster_front", "caster_back")]
+        if wheels != "contact" and any(t is not None and t.guide_friction > 0.0 for _, t in types):
             raise ValueError(f"guide_friction needs wheels: contact, found {wheels}; set it to 0 for all three types")
+        if any(t is not None and t.turning_force > 0.0 and (wheels != "contact" or k == "drive") for k, t in types):
+            raise ValueError(f"turning_force is of casters and needs wheels: contact, found {wheels}; set it to 0")
         return wheels

@@ -34,6 +34,7 @@ def _wheel(nominal: mjcf.Wheel, of: WheelType, ground: str) -> Wheel:
         nominal.contact,
         bushing=None if ground == "rigid" else _bushing(of),
         footing=None if ground == "anchored" else _contact(of),
+        turning_force=of.turning_force,
     )
 
 

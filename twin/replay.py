@@ -9,6 +9,7 @@ remains below is the wheels' springs, dampers and friction. w acts on the base f
 without end: nothing tells it when to stop.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -20,6 +21,7 @@ import mjcf
 from twin.build import Twin, build
 from twin.config_base import Base
 from twin.conventions import states_with_their_sensors, transform
+from twin.defects.base import Defect
 from twin.draw_base import ground, wheels_of
 from twin.errors import Diverged
 from twin.root import ROOT, base_poses, put_down
@@ -32,6 +34,11 @@ _PLACE = (0.9, 0.45, 0.0)  # on the plate [m, lab]
 
 def carriage(base: Base, timestep: float = 0.001) -> Twin:
     """Base and wheels without weight; no value of `base` may be uncertain."""
+    return carriage_on(ground(base, wheels_of(base)), timestep)
+
+
+def carriage_on(floor: Sequence[Defect], timestep: float = 0.001) -> Twin:
+    """The base without weight on wheels of their own."""
     spec = mjcf.spec()
     for element in (*spec.actuators, *spec.keys):
         spec.delete(element)
@@ -40,7 +47,7 @@ def carriage(base: Base, timestep: float = 0.001) -> Twin:
     chassis.mass, chassis.fullinertia = _MASS, np.full(6, np.nan)
     chassis.ipos, chassis.iquat, chassis.inertia = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, _INERTIA)
     spec.option.gravity = np.zeros(3)
-    return build(spec, ground(base, wheels_of(base)), timestep=timestep)
+    return build(spec, floor, timestep=timestep)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from scenarios.realism.recorded import Recorded
-from scenarios.realism.replayed import AXES, BAND, Inside, inside, replayed, together
+from scenarios.realism.replayed import AS_DRAWN, AXES, BAND, Condition, Inside, inside, replayed, together
 from scenarios.realism.swings import LOG, Figures, YawFromMoment, figures, matrix, swung, yaw_from_moment
 from scenarios.schema import Scenario
 from twin.errors import TwinError
@@ -61,13 +61,13 @@ class Replayed:
     """Draws under a recorded wrench.
 
     Attributes:
-        grip: Factor on the drawn friction.
+        condition: What is not as drawn.
         n: Robots.
         trials: Share of the time inside the band, by trial.
         share: Of all of them, by axis.
     """
 
-    grip: float
+    condition: Condition
     n: int
     trials: tuple[Inside, ...]
     share: tuple[float, ...]
@@ -91,17 +91,17 @@ def compare_swings(scenario: Scenario, n: int) -> Swings:
     return Swings(len(good), tuple(f for f in found if isinstance(f, str)), rows, linear, hysteretic)
 
 
-def compare_replay(scenario: Scenario, trials: Sequence[Recorded], n: int, grip: float = 1.0) -> Replayed:
+def compare_replay(scenario: Scenario, trials: Sequence[Recorded], n: int, condition: Condition = AS_DRAWN) -> Replayed:
     """Replay the wrench of each trial on the bases of n drawn robots."""
     seeds, found = range(scenario.seed, scenario.seed + n), []
     for trial in trials:
-        draws = _each(partial(_base, scenario, trial, grip), seeds)
+        draws = _each(partial(_base, scenario, trial, condition), seeds)
         found.append(inside(trial, np.array(draws)))
-    return Replayed(grip, n, tuple(found), tuple(map(float, together(found))))
+    return Replayed(condition, n, tuple(found), tuple(map(float, together(found))))
 
 
-def _base(scenario: Scenario, trial: Recorded, grip: float, seed: int) -> np.ndarray:
-    return replayed(scenario.twin, seed, trial, grip)
+def _base(scenario: Scenario, trial: Recorded, condition: Condition, seed: int) -> np.ndarray:
+    return replayed(scenario.twin, seed, trial, condition)
 
 
 def _each(one: Callable[[int], T], seeds: range) -> list[T]:
@@ -132,7 +132,7 @@ def as_json(swings: Sequence[Swings], replays: Sequence[Replayed]) -> dict[str, 
         "swings": [asdict(s) | {"n_inside": s.n_inside} for s in swings],
         "replays": [
             {
-                "grip": r.grip,
+                **asdict(r.condition),
                 "n": r.n,
                 "share": dict(zip(AXES, r.share, strict=True)),
                 "trials": [

@@ -11,13 +11,37 @@ import numpy as np
 from scenarios.realism.recorded import Recorded
 from twin.config import TwinConfig
 from twin.config_base import Base
+from twin.defects.base import Defect
+from twin.draw_base import ground, wheels_of
 from twin.instruments.plate import draw
 from twin.randomness import generator
-from twin.replay import Pull, carriage, replay
+from twin.replay import Pull, carriage_on, replay
 from twin.uncertain import drawn
 
+_HOLDS = 10.0  # times the drawn friction: no wheel slides
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 BAND = (0.05, 0.95)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What of the base is not as drawn.
+
+    Attributes:
+        grip: Factor on the friction of the floor.
+        turning: Casters turn (`turning`), each wheel is drawn on its own, the floor holds.
+    """
+
+    grip: float = 1.0
+    turning: bool = False
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return "casters turn" if self.turning else f"friction x {self.grip:g}"
+
+
+AS_DRAWN = Condition()
 
 
 @dataclass(frozen=True)
@@ -58,7 +82,23 @@ def gripping(base: Base, factor: float) -> Base:
     return replace(base, **{k: replace(w, friction=factor * w.friction) for k, w in kinds.items()})
 
 
-def replayed(config: TwinConfig, seed: int, trial: Recorded, grip: float = 1.0) -> np.ndarray:
+def turning(base: Base, weight: float) -> Base:
+    """The same base on a floor that holds, its casters turning at the friction of a sixth of the weight [N]."""
+    held = gripping(base, _HOLDS)
+    kinds = {k: getattr(base, k).friction * weight / 6.0 for k in ("caster_front", "caster_back")}
+    return replace(held, **{k: replace(getattr(held, k), turning_force=f) for k, f in kinds.items()})
+
+
+def floor_of(config: TwinConfig, seed: int, condition: Condition, weight: float) -> tuple[Defect, ...]:
+    """The wheels of one drawn robot under a condition, each drawn on its own where they turn."""
+    if not condition.turning:
+        base = gripping(drawn(config, seed).base, condition.grip)
+        return ground(base, wheels_of(base))
+    apart = (turning(drawn(config.base, seed, "wheel", str(k)), weight) for k in range(6))
+    return tuple(wheels_of(base)[k] for k, base in enumerate(apart))
+
+
+def replayed(config: TwinConfig, seed: int, trial: Recorded, condition: Condition = AS_DRAWN) -> np.ndarray:
     """What one drawn robot's base does under a trial's wrench, as motion capture would see it (n, 6) [m, rad].
 
     The plate's errors are drawn too: what it read is not what it felt.
@@ -69,5 +109,6 @@ def replayed(config: TwinConfig, seed: int, trial: Recorded, grip: float = 1.0) 
     robot = drawn(config, seed)
     plate = draw("plate", robot.instruments.plate, generator(seed, "plate"))
     felt = (trial.w - plate.drift * trial.t[:, None]) @ np.linalg.inv(plate.gain).T
-    x = replay(carriage(gripping(robot.base, grip), robot.timestep), Pull(trial.t, trial.rest + felt))
+    floor = floor_of(config, seed, condition, -float(trial.rest[2]))
+    x = replay(carriage_on(floor, robot.timestep), Pull(trial.t, trial.rest + felt))
     return trial.seen(x, robot.instruments.marker_noise, generator(seed, "seen", trial.trial_id))

@@ -55,3 +55,17 @@ def test_nothing_moves_before_the_wrench_changes(config):
 def test_a_replay_repeats_bit_for_bit(config):
     twin, load = carriage(config.base), pull(np.array([0, 9.0, 0, 8.0, 0, 9.0]), hump())
     np.testing.assert_array_equal(replay(twin, load), replay(twin, load))
+
+
+@pytest.mark.parametrize("weight", [400.0, 730.0])
+def test_casters_that_turn_hold_the_same_force_under_any_load(config, weight):
+    """4 f along x, all four being alike; the drives slide freely."""
+    force, caster = 8.0, replace(config.base.caster_front, friction=2.0, turning_force=8.0)
+    drive = replace(config.base.drive, friction=0.0)
+    twin = carriage(replace(config.base, drive=drive, caster_front=caster, caster_back=caster))
+    standing, slow = np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0]), hump(start=1.0, stop=5.0, ramp=2.0)
+    held, turned = (
+        replay(twin, Pull(T, standing + np.outer(slow, [4.0 * force * share, 0, 0, 0, 0, 0]))) for share in (0.9, 1.1)
+    )
+    assert abs(held[-1, 0]) < 0.02 * np.abs(held[:, 0]).max()
+    assert turned[-1, 0] > 1e-3

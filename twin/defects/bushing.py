@@ -19,7 +19,9 @@ from twin.errors import TwinError
 Vector = tuple[float, float, float]
 DIRECTIONS = "xyz"
 _Z = 2
-_RUBS = (0.002, 1.0)  # MuJoCo's default, 0.02 s, lets a guide creep at half its friction
+RUBS = (0.002, 1.0)
+"""Reference of a friction that holds: MuJoCo's default, 0.02 s, lets a guide creep at half its friction."""
+
 _AHEAD = 0.5  # h k / (m b), at most
 _NONE = (0.0, 0.0, 0.0)
 
@@ -75,7 +77,7 @@ class Bushing:
                     stiffness=np.array([k, 0.0, 0.0]),
                     damping=np.array([c, 0.0, 0.0]),
                     frictionloss=self.guide_friction if i == _Z else 0.0,
-                    solref_friction=_RUBS,
+                    solref_friction=RUBS,
                 )
 
     def tune_held(self, model: mujoco.MjModel, name: str, body_name: str, geom_name: str) -> None:

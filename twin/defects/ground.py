@@ -4,7 +4,8 @@
     anchored:  bushing alone          its lower end fixed in the floor: linear, see `anchored`
     rigid:     contact alone          soft in heave and tilt, held by friction in the floor's plane
 
-Wheels are braked: they do not roll.
+Drives are braked: they do not roll. Casters slide as they stand, or, with a turning force f, turn first: two slides
+behind the bushing, each held by f whatever the load. What they hold then is bearing and scrub, not Coulomb's.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.defects.base import Defect, Parameter, body
-from twin.defects.bushing import DIRECTIONS, Bushing
+from twin.defects.bushing import DIRECTIONS, RUBS, Bushing
 from twin.defects.contact import Contact, TurnsLate
 
 Vector = tuple[float, float, float]
@@ -39,6 +40,7 @@ class Wheel(Defect):
         contact: Its point on the floor, in the base frame [m].
         bushing: Between base and wheel; None: fixed to the base.
         footing: Between wheel and floor; None: anchored.
+        turning_force: Of a caster along x and along y [N]; 0: it does not turn.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Wheel(Defect):
     contact: Vector
     bushing: Bushing | None
     footing: Contact | None
+    turning_force: float = 0.0
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Replace the wheel's joints by its bushing."""
@@ -56,6 +59,21 @@ class Wheel(Defect):
             T_base_wheel = _pose_in_base(wheel)
             R = T_base_wheel[:3, :3]
             self.bushing.hang(wheel, self.name, R.T, R.T @ (np.array(self.centre) - T_base_wheel[:3, 3]))
+        if self.turning_force > 0.0:
+            self._let_turn(wheel)
+
+    def _let_turn(self, fork: mujoco.MjsBody) -> None:
+        """Slides along x and y between a caster's fork and what stands on the floor."""
+        (hub,) = fork.bodies
+        axes = _pose_in_base(hub)[:2, :3]
+        for axis, letter in zip(axes, DIRECTIONS, strict=False):
+            hub.add_joint(
+                name=f"{self.name}.turn_{letter}",
+                type=mujoco.mjtJoint.mjJNT_SLIDE,
+                axis=axis,
+                frictionloss=self.turning_force,
+                solref_friction=RUBS,
+            )
 
     def fixed(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Delete the wheel's joints."""
@@ -99,6 +117,8 @@ class Wheel(Defect):
                     found += [Parameter(f"{s}r{a}", f"N.m{unit}/rad", float(v)) for a, v in turning]
             if self.bushing.guide_friction > 0.0:
                 found.append(Parameter(f"suspension.{self.name}.guide_friction", "N", self.bushing.guide_friction))
+        if self.turning_force > 0.0:
+            found.append(Parameter(f"suspension.{self.name}.turning_force", "N", self.turning_force))
         if self.footing is not None:
             found += self.footing.parameters(self.name)
         return tuple(found)
