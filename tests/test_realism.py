@@ -188,7 +188,7 @@ def test_the_log_moves_among_the_draws_where_the_floor_holds_what_the_plate_read
 
 @pytest.mark.slow
 def test_the_log_goes_back_among_bases_whose_casters_turn(log):
-    """x is missed as drawn; where casters hold what they hold whatever their load it is inside, roll, pitch and yaw too."""
+    """x is missed as drawn, inside where casters turn whatever their load; roll, pitch and yaw are, too."""
     trials = recorded(load_dataset(log))
     drawn, turned = (compare_replay(load("reality"), trials, 20, c) for c in (Condition(), Condition(turning=True)))
     assert drawn.share[0] < 0.8 <= min(turned.share[k] for k in (0, 3, 4, 5))
