@@ -40,7 +40,8 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     """The geometric model; a verdict `refused` says that it must not be used."""
     parameters = geometry_parameters(chain, description)
     start, floor = play_start(chain, description), play_floor(chain, description)
-    robust = fit_robustly(chain, parameters, postures, Errors(np.maximum(start, floor), floor, np.zeros(0)))
+    errors = Errors(np.maximum(start, floor), floor, np.zeros(0), stated=True)
+    robust = fit_robustly(chain, parameters, postures, errors)
     found = robust.fit
     known = identifiability(found.J_white, parameters)
     oriented = postures.components == 6

@@ -7,6 +7,7 @@ Random errors: each joint's reading along its lever arms, the hand's position an
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -29,11 +30,13 @@ class Errors:
         play: (k,) of the joints' readings [rad, m].
         floor: (k,) least of them: the encoders' own noise.
         pose: Of the hand's position [m] and rotation [rad], (2,); empty where all is left to joints and markers.
+        stated: The joints' are a datasheet's, so that none is dropped as needless.
     """
 
     play: np.ndarray
     floor: np.ndarray
     pose: np.ndarray
+    stated: bool = False
 
 
 def fit(model: HandModel, parameters: ParameterSet, postures: Postures, play: np.ndarray, floor: np.ndarray) -> Fit:
@@ -69,7 +72,8 @@ def hand_problem(
         return Noise(np.concatenate([at.J_joint, still, roots], axis=2), group, floor, free, np.ones(len(at.r)))
 
     widths = Widths(np.concatenate([errors.play, errors.pose, [1.0]]), np.ones(parameters.prior.n_groups))
-    return Problem(lambda theta: linearised(model, theta, postures, tau), sources, parameters.prior, widths)
+    at = partial(linearised, model, postures=postures, tau=tau)
+    return Problem(at, sources, parameters.prior, widths, errors.stated)
 
 
 def fit_weighted(model: HandModel, parameters: ParameterSet, postures: Postures, W: np.ndarray) -> Fit:

@@ -41,12 +41,14 @@ class Problem:
         sources: Sources of noise of a linearised problem.
         prior: Of the parameters.
         widths: Start values.
+        stated: The random errors are stated beforehand, by a datasheet: all of them are believed, none dropped.
     """
 
     linearise: Callable[[np.ndarray], Linearised]
     sources: Callable[[Linearised], Noise]
     prior: Prior
     widths: Widths
+    stated: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def solve(
     for _ in range(_OUTER):
         settled = change < same
         old = widths
-        if not settled and hasty:
+        if not settled and (hasty or problem.stated):
             widths, _ = refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
         elif not settled:
             free, widths = needed(at.rows(some), noise.rows(some), problem.prior, widths, free, same)
