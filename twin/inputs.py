@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from mujoco import rollout
 
 from twin.build import PUSH, Twin
 from twin.defects.gear import rotor_joint
@@ -15,8 +14,6 @@ from twin.defects.rolling import DRIVES, roll_joint
 from twin.driving import differential_drive
 from twin.motions import JOINTS, RATE, SETTLE, Motion
 from twin.root import put_down
-
-_LET_DOWN = 10, 0.05  # how often, and each time how long [s]
 
 
 @dataclass(frozen=True)
@@ -51,8 +48,7 @@ def prepare(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> Inputs:
         angles = _interpolated(motion.base.wheel_angles(*differential_drive()), step)
         control[:, [model.actuator(roll_joint(name)).id for name in DRIVES]] = angles
     settling = len(command) - round(motion.duration / step) - 1
-    first = _let_down(model, _first_state(model, data, motion.command[0]), control[0])
-    return Inputs(model, first, control, command, settling)
+    return Inputs(model, _first_state(model, data, motion.command[0]), control, command, settling)
 
 
 def driven(joint: str) -> str:
@@ -75,20 +71,4 @@ def _first_state(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray) -> n
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     state = np.empty(mujoco.mj_stateSize(model, kind))
     mujoco.mj_getState(model, data, state, kind)
-    return state
-
-
-def _let_down(model: mujoco.MjModel, state: np.ndarray, control: np.ndarray) -> np.ndarray:
-    """A state (ns,) close to rest under its weight: let go from rest for a moment, again and again.
-
-    Each time a mode of frequency f keeps cos(2 pi f T) of its distance; left to themselves they would ring for seconds
-    (kinetic damping, Cundall 1976).
-    """
-    times, moment = _LET_DOWN
-    held = np.tile(control, (round(moment / model.opt.timestep), 1))
-    for _ in range(times):
-        states, _ = rollout.rollout(model, mujoco.MjData(model), state[None], held[None])
-        state = states[0, -1]
-        state[0] = 0.0
-        state[1 + model.nq : 1 + model.nq + model.nv] = 0.0
     return state

@@ -17,7 +17,7 @@ from twin.config import Campaign
 
 JOINTS = ("torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8)))
 RATE = 100.0  # [Hz] of the set-points
-SETTLE = 0.3  # [s] at rest before a recording starts, not recorded
+SETTLE = 2.0  # [s] before a recording starts, not recorded
 TAU = 2.0 * np.pi
 BEYOND = np.array([5e-3, *7 * [5e-2]])  # how far off a joint turns to approach from a given side [m, rad]
 _SWEEP_SPEED = 0.2 * np.pi  # [rad/s]

@@ -60,9 +60,9 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
         Diverged: It is not stable.
         NotStanding: The robot tipped over or left its plate.
     """
-    mujoco.set_mju_user_warning(_log.debug)  # or it writes MUJOCO_LOG.TXT where the user stands
     inputs = prepare(twin, motion, T_lab_base)
     model, first = inputs.model, inputs.first
+    mujoco.set_mju_user_warning(_log.debug)  # or it writes MUJOCO_LOG.TXT where the user stands
     after, sensors = rollout.rollout(model, mujoco.MjData(model), first[None], inputs.control[None])
     states = states_with_their_sensors(first, after[0])
     check(inputs, motion, states)

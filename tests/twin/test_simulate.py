@@ -4,10 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from scenarios import load
 from twin import motions
 from twin.build import Twin
-from twin.campaign import laboratory
 from twin.simulate import simulate
 
 
@@ -122,16 +120,3 @@ def test_a_payload_weighs_what_its_trial_says(lab, config, nominal):
     }
     assert masses["xyz_0kg"] == pytest.approx(masses["xyz"] - 0.437)
     assert masses["xyz_2kg"] == pytest.approx(masses["xyz"] + 2.0 - 0.437)
-
-
-@pytest.mark.parametrize("ground", ["contact", "anchored"])
-def test_a_recording_starts_at_rest(ground, sweep):
-    """Within 0.25 N and 2 um of where the robot stands seconds later, well below what instruments tell."""
-    config = load("humanoids2024", [f"twin.base.wheels={ground}"]).twin
-    lab = laboratory(config, 0)
-    rest = replace(sweep, command=np.tile(sweep.command[:1], (301, 1)))
-    states = simulate(lab.twin, rest, lab.T_lab_base)
-    early, late = states.t < 0.5, states.t > 2.5
-    base = states.poses["base_footprint"][:, :3, 3]
-    assert np.abs(states.wrench[early, :3] - states.wrench[late, :3].mean(axis=0)).max() < 0.25
-    assert np.abs(base[early] - base[late].mean(axis=0)).max() < 2e-6

@@ -43,7 +43,7 @@ def test_what_runs_away_is_named_with_trial_time_and_joint(lab, sweep, edit, joi
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Diverged, match=rf"trial 's' diverged at -?\d+\.\d+ s in joint '{joint}'") as told:
         simulate(edited(lab.twin, edit), sweep, lab.T_lab_base)
-    assert -motions.SETTLE <= told.value.time < sweep.duration
+    assert -2.0 <= told.value.time < sweep.duration
     assert not list(tmp_path.iterdir())  # no log of MuJoCo's
 
 
@@ -67,5 +67,5 @@ def test_tipping_is_told(lab, sweep):
 def test_a_wheel_off_the_plate_is_told(sweep, ground):
     lab = laboratory(load("humanoids2024", [f"twin.base.wheels={ground}"]).quick().twin, 0)
     beyond = exp6(np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])) @ lab.T_lab_base
-    with pytest.raises(NotStanding, match=r"'s': (caster|wheel)_\w+ is off the plate at -0\.30 s"):
+    with pytest.raises(NotStanding, match=r"'s': (caster|wheel)_\w+ is off the plate at -2\.00 s"):
         simulate(lab.twin, sweep, beyond)
