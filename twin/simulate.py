@@ -11,7 +11,7 @@ from twin import wrenches
 from twin.build import Twin
 from twin.conventions import states_with_their_sensors, transform
 from twin.inputs import driven, prepare
-from twin.instruments.tiles import felt
+from twin.instruments.tiles import PLATE, felt
 from twin.motions import JOINTS, Motion
 from twin.root import anchored, floor_wrench
 from twin.stability import check
@@ -79,8 +79,8 @@ def _unpack(
     velocity = np.stack([qvel[:, model.joint(driven(j)).dofadr[0]] for j in JOINTS], axis=1)
     servos = [model.actuator(driven(j)).id for j in JOINTS]
     kp, kv = model.actuator_gainprm[servos, 0], -model.actuator_biasprm[servos, 2]
-    wrench = _floor_wrench(model, qpos, qvel) if anchored(model) else wrenches.on_plate(model, sensors, wrenches.PLATE)
-    several = felt(model)
+    wrench = _floor_wrench(model, qpos, qvel) if anchored(model) else wrenches.on_plate(model, sensors, PLATE)
+    each = [wrenches.on_plate(model, sensors, tile) for tile in felt(model)] or [wrench]
     return States(
         t=np.arange(len(states)) * model.opt.timestep,
         motor=motor,
@@ -90,9 +90,7 @@ def _unpack(
         command=command,
         poses={name: _pose(model, sensors, name) for name in links},
         wrench=wrench,
-        plates=np.stack([wrenches.on_plate(model, sensors, n) for n in several], axis=1)
-        if several
-        else wrench[:, None],
+        plates=np.stack(each, axis=1),
         wrist=wrenches.on_wrist(model, sensors),
     )
 
@@ -105,4 +103,4 @@ def _pose(model: mujoco.MjModel, sensors: np.ndarray, link: str) -> np.ndarray:
 def _floor_wrench(model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    return floor_wrench(model, qpos, qvel, data.site(wrenches.PLATE).xpos)
+    return floor_wrench(model, qpos, qvel, data.site(PLATE).xpos)

@@ -11,12 +11,10 @@ import numpy as np
 
 from twin.instruments.tiles import PLATE
 
-HUNG = "wrist_ft_tool_link"
-"""What hangs on the wrist's force-torque sensor, whose link is its parent."""
-
 WRIST_SENSOR = "wrist_ft_link"
-"""In whose axes it reads."""
+"""The link in whose axes the wrist's force-torque sensor reads."""
 
+_HUNG = "wrist_ft_tool_link"  # what hangs on it
 _WRIST = "wrist"
 _HELD = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
 _FIELD = mujoco.mjtConDataField
@@ -39,7 +37,7 @@ def add_plates(spec: mujoco.MjSpec) -> None:
 
 def add_wrist(spec: mujoco.MjSpec) -> None:
     """The wrist's sensor; none on a bench without a wrist."""
-    hung = spec.body(HUNG)
+    hung = spec.body(_HUNG)
     if hung is None:
         return
     quat, back = np.asarray(hung.quat) * [1.0, -1.0, -1.0, -1.0], np.zeros(3)
