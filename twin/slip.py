@@ -1,9 +1,9 @@
-"""The load at which the first wheel of a resting base slips, along x, along y and about z.
+"""The load at which the first wheel of a resting base slips, or caster turns, along x, along y and about z.
 
     N_i = m_i g - k_z,i ((A_i x_g)_z + m_i g / Kc_i)            each wheel's own weight and its share of the base's, at
                                                                 the deflection x_g where they balance its weight
     f_i = k_t,i (A_i K^-1 e)_t                                  its share of a unit load along e, in the floor's plane
-    w   = min_i mu_i N_i / |f_i|
+    w   = min_i min(mu_i N_i / |f_i|, T_i / max |f_i|_xy)       T_i the force at which a caster turns
 
 from a rest without horizontal forces in the wheels. A wheel presses its own contact in before the base rests on it.
 Beyond that load the base slips wheel by wheel, and leaves a set.
@@ -39,12 +39,13 @@ def normal_forces(twin: Twin, wheels: Sequence[Wheel]) -> np.ndarray:
 
 
 def slip_loads(twin: Twin, wheels: Sequence[Wheel]) -> np.ndarray:
-    """Loads (3,) along x, along y [N] and about z [N.m] at which the first wheel slips."""
+    """Loads (3,) along x, along y [N] and about z [N.m] at which the first wheel slips or turns."""
     K, _ = spatial_stiffness(wheels)
     N = normal_forces(twin, wheels)
     mu = np.array([w.footing.friction if w.footing else np.inf for w in wheels])
+    turns = np.array([w.turning_force or np.inf for w in wheels])
     found = []
     for unit in np.linalg.inv(K)[:, HELD].T:
-        shares = [np.linalg.norm((springs(w)[0] * (lever(w) @ unit))[:2]) for w in wheels]
-        found.append(np.min(mu * N / shares))
+        shares = np.array([(springs(w)[0] * (lever(w) @ unit))[:2] for w in wheels])
+        found.append(min(np.min(mu * N / np.linalg.norm(shares, axis=1)), np.min(turns / np.abs(shares).max(axis=1))))
     return np.array(found)

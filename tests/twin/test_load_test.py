@@ -6,6 +6,7 @@ import pytest
 
 import mjcf
 from scenarios import load
+from tests.twin.grounds import GROUNDS
 from twin import build, load_test, release_test
 from twin.defects.bushing import RunsAhead
 from twin.defects.contact import TurnsLate
@@ -50,9 +51,9 @@ def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
     np.testing.assert_allclose(C[2, 2], sum(series).imag / h, rtol=1e-9)
 
 
-@pytest.mark.parametrize("ground", ["contact", "anchored"])
+@pytest.mark.parametrize("ground", ["contact", "anchored", "turning"])
 def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
-    twin, wheels = standing(nominal, f"twin.base.wheels={ground}")
+    twin, wheels = standing(nominal, *GROUNDS[ground])
     K, C = spatial_stiffness(wheels)
     found = load_test(twin)
     assert error(found.K, K) < 1e-3

@@ -2,6 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.twin.grounds import GROUNDS
 from tests.twin.test_load_test import standing
 from twin.load_test import bench
 from twin.slip import normal_forces, slip_loads
@@ -10,9 +11,9 @@ from twin.stiffness import HELD, spatial_stiffness
 UNIT = np.eye(6)[list(HELD)]
 
 
-@pytest.fixture(scope="module")
-def stood(nominal):
-    twin, wheels = standing(nominal)
+@pytest.fixture(scope="module", params=["contact", "turning"])
+def stood(nominal, request):
+    twin, wheels = standing(nominal, *GROUNDS[request.param])
     return twin, wheels, bench(twin)
 
 
@@ -37,7 +38,7 @@ def test_normal_forces_are_those_of_the_contacts(stood):
 
 
 def grip(b, state, wrench):
-    """Largest share of its friction that a wheel uses."""
+    """Largest share that a wheel uses of its friction, or a caster of the force at which it turns."""
     data, share, force = mujoco.MjData(b.bare), [], np.zeros(6)
     mujoco.mj_setState(b.bare, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     base = b.bare.body("base_footprint")
@@ -47,6 +48,10 @@ def grip(b, state, wrench):
     for i in range(data.ncon):
         mujoco.mj_contactForce(b.bare, data, i, force)
         share.append(np.linalg.norm(force[1:3]) / force[0] / data.contact[i].friction[0])
+    rubs = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+    for dof, held in zip(data.efc_id[rubs], data.efc_force[rubs], strict=True):
+        if ".turn_" in b.bare.joint(b.bare.dof_jntid[dof]).name:
+            share.append(abs(held) / b.bare.dof_frictionloss[dof])
     return max(share)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scenarios import load
+from tests.twin.grounds import GROUNDS
 from twin import motions
 from twin.campaign import laboratory
 from twin.conventions import rotation_vector
@@ -21,7 +22,7 @@ SOUGHT = ("base", "tilt and yaw", "hand", "force", "moment")
 
 def observed(step, name, ground="contact", duration=10.0):
     """What is sought in one trial, each (n, 3)."""
-    lab = laboratory(load("humanoids2024", [f"twin.timestep={step}", f"twin.base.wheels={ground}"]).twin, 4)
+    lab = laboratory(load("humanoids2024", [f"twin.timestep={step}", *GROUNDS[ground]]).twin, 4)
     path = (motions.VALIDATION_SWINGS | motions.CALIBRATION_SWINGS)[name]
     motion = motions.swing(name, "validation", "swing", path, duration, lab.config.campaign)
     states = simulate(lab.twin, motion, lab.T_lab_base)
@@ -51,7 +52,7 @@ def test_halving_the_step_changes_a_trial_by_less_than_a_hundredth():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ground", ["contact", "anchored"])
+@pytest.mark.parametrize("ground", ["contact", "anchored", "turning"])
 @pytest.mark.parametrize("name", ["xyz", "xyz_mirror", "around_z", "x_fold"])
 def test_steps(ground, name):
     """The table of docs/physics.md."""

@@ -15,8 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.defects.base import Defect, Parameter, body
-from twin.defects.bushing import DIRECTIONS, RUBS, Bushing
+from twin.defects.bushing import DIRECTIONS, Bushing
 from twin.defects.contact import Contact, TurnsLate
+from twin.defects.turning import let_turn
 
 Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
@@ -25,6 +26,7 @@ _ROOT = "base_footprint"
 _OWN = 1e-4, 20, 1e-9
 _TURNING = 1e-6, 20, 1e-9  # where wheels turn in their bushings, their contacts hold a moment too
 _SHARED = 1e-10, 3, 1e-6
+_SERIES = 1e-14  # tolerance against slip where a caster's friction in turning is in series with the floor's
 _LATE = 0.1  # torsional damping times step over inertia of the wheel [-]
 
 
@@ -60,20 +62,8 @@ class Wheel(Defect):
             R = T_base_wheel[:3, :3]
             self.bushing.hang(wheel, self.name, R.T, R.T @ (np.array(self.centre) - T_base_wheel[:3, 3]))
         if self.turning_force > 0.0:
-            self._let_turn(wheel)
-
-    def _let_turn(self, fork: mujoco.MjsBody) -> None:
-        """Slides along x and y between a caster's fork and what stands on the floor."""
-        (hub,) = fork.bodies
-        axes = _pose_in_base(hub)[:2, :3]
-        for axis, letter in zip(axes, DIRECTIONS, strict=False):
-            hub.add_joint(
-                name=f"{self.name}.turn_{letter}",
-                type=mujoco.mjtJoint.mjJNT_SLIDE,
-                axis=axis,
-                frictionloss=self.turning_force,
-                solref_friction=RUBS,
-            )
+            (hub,) = wheel.bodies
+            let_turn(hub, self.name, _pose_in_base(hub)[:2, :3], self.turning_force)
 
     def fixed(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Delete the wheel's joints."""
@@ -91,8 +81,12 @@ class Wheel(Defect):
             option = model.opt
             turning = torsion is not None and torsion.any()
             solver = _SHARED if torsion is None else _TURNING if turning else _OWN
-            option.tolerance, option.noslip_iterations, option.noslip_tolerance = solver
-            if self.bushing is not None:
+            option.tolerance, option.noslip_iterations, noslip = solver
+            if self.bushing is None:
+                option.noslip_tolerance = noslip
+            else:
+                noslip = _SERIES if self.turning_force > 0.0 else noslip
+                option.noslip_tolerance = min(option.noslip_tolerance, noslip)  # wheels differ, the finest decides
                 self.bushing.tune_held(model, self.name, self.body_name, self.contact_geom)
 
     def _check_torsion(self, model: mujoco.MjModel) -> None:

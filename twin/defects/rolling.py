@@ -14,12 +14,12 @@ import numpy as np
 from twin.defects.base import Defect, Parameter, body
 from twin.defects.gear import add_servo
 from twin.defects.ground import Wheel
+from twin.defects.turning import CASTER_INERTIA
 
 DRIVES = ("wheel_left", "wheel_right")
 _AXIS = np.array([0.0, 0.0, 1.0])  # of every hub and swivel, in its own body
 _SERVO = (2000.0, 60.0)  # of a drive [N.m/rad, N.m.s/rad]
 _ROTOR = 0.05  # motor of a drive, reflected [kg.m2]
-_CASTER_INERTIA = 5e-4  # of wheel and swivel each, bearings and tyre included [kg.m2]
 _SWIVEL = (0.02, 0.01)  # dry friction [N.m] and damping [N.m.s/rad] of a swivel, the tyre's scrub included
 _ROLL = (0.02, 1e-3)  # of a caster's wheel
 
@@ -61,5 +61,5 @@ class Rolling(Defect):
 
 
 def _free(carrier: mujoco.MjsBody, name: str, friction: float, damping: float) -> None:
-    joint = carrier.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXIS, armature=_CASTER_INERTIA)
+    joint = carrier.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXIS, armature=CASTER_INERTIA)
     joint.frictionloss, joint.damping = friction, np.array([damping, 0.0, 0.0])

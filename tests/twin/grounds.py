@@ -1,0 +1,15 @@
+"""What a base may stand on, as settings of a scenario."""
+
+GROUNDS = {
+    "contact": ["twin.base.wheels=contact"],
+    "anchored": ["twin.base.wheels=anchored"],
+    "rigid": ["twin.base.wheels=rigid"],
+    "turning": [
+        "twin.base.drive.friction=5.0",
+        "twin.base.caster_front.friction=2.5",
+        "twin.base.caster_front.turning_force=30.4",
+        "twin.base.caster_back.friction=0.6",
+        "twin.base.caster_back.turning_force=7.3",
+    ],
+}
+"""`turning`: the default's friction times a sixth of 730 N, on a floor that holds, as `reality --turning` makes it."""
