@@ -18,7 +18,7 @@ from calibration.hand import nominal_hand
 from calibration.hand_fit import Errors, hand_problem
 from calibration.identifiability import Identifiability, identifiability
 from calibration.map_fit import Fit
-from calibration.marker_shape import ODD
+from calibration.marker_shape import of_one_shape
 from calibration.parameters import ParameterSet, geometry_parameters, play_floor, play_start
 from calibration.postures import Postures
 from calibration.registration_start import registration_start
@@ -71,7 +71,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
 def fit_robustly(chain: Chain, parameters: ParameterSet, postures: Postures, errors: Errors) -> RobustFit:
     """The fit of the postures that agree, from nominal values; none whose markers do not have their body's shape."""
     nominal, n = nominal_hand(chain, parameters.nominal[:12]), len(postures)
-    rigid = np.flatnonzero(postures.misfit <= ODD * np.median(postures.misfit))
+    rigid = np.flatnonzero(of_one_shape(postures.misfit))
     found = robust_fit(
         lambda some: hand_problem(nominal, parameters, postures.rows(rigid[some]), errors),
         len(rigid),

@@ -17,7 +17,7 @@ from calibration.bodies import body_poses
 
 _MANY = 200  # postures the first guess is made from
 _FEW = 50  # that tell whether it is to be mirrored
-ODD = 6.0  # a posture's misfit over the median one's beyond which its markers are not that body's [-]
+_ODD = 6.0  # a posture's misfit over the median one's beyond which its markers are not that body's [-]
 _FLAT = 1e-3  # third-largest-but-one extent over the largest below which markers stand in line [-]
 
 
@@ -53,23 +53,26 @@ def cluster(positions: np.ndarray) -> Cluster:
     values, vectors = _scaled(positions)
     xyz = vectors * np.sqrt(np.maximum(values, 0.0))
     m, some = positions.shape[1], _some(positions, _FEW)
-    mirrored, upright = (_misfit(body_poses(xyz * [1.0, 1.0, z], some).residual) for z in (-1.0, 1.0))
+    mirrored, upright = (misfit(body_poses(xyz * [1.0, 1.0, z], some).residual) for z in (-1.0, 1.0))
     if np.nanmedian(mirrored) < np.nanmedian(upright):
         xyz = xyz * [1.0, 1.0, -1.0]
     found = body_poses(xyz, positions)
-    fit = _misfit(found.residual)
-    good = fit <= ODD * np.nanmedian(fit)
+    good = of_one_shape(misfit(found.residual))
     R, p = found.T[good, :3, :3], found.T[good, :3, 3]
     xyz = np.nanmean((positions[good] - p[:, None]) @ R, axis=0)
     found = body_poses(xyz, positions)
-    fit = _misfit(found.residual)
-    odd = ~(fit <= ODD * np.nanmedian(fit))
+    odd = ~of_one_shape(misfit(found.residual))
     dof = np.isfinite(found.residual[~odd]).sum() - 6 * (~odd).sum() - (3 * m - 6)
     sigma = float(np.sqrt(np.nansum(found.residual[~odd] ** 2) / max(1, dof)))
     return Cluster(xyz, found.T, found.covariance * sigma**2, sigma, odd)
 
 
-def _misfit(residual: np.ndarray) -> np.ndarray:
+def of_one_shape(misfit: np.ndarray) -> np.ndarray:
+    """Whether each of the clusters with these misfits (n,) has the shape that most have."""
+    return np.asarray(misfit <= _ODD * np.nanmedian(misfit))
+
+
+def misfit(residual: np.ndarray) -> np.ndarray:
     """Root mean squared residual (n,) of residuals (n, m, 3); NaN where there are none."""
     seen = np.isfinite(residual)
     count = seen.sum(axis=(1, 2))

@@ -3,13 +3,16 @@
     w = (nu + d) / (nu + distance^2)        Student's t, iteratively weighted, scale from the evidence
 
 finds where most postures agree; a posture farther from what all others predict than `limit` is left out, the rest
-fitted by least squares, and every posture judged again until the set stands. Weights alone would discard the real,
+fitted by least squares, and every posture judged again until the set stands. What was left out then has decided where the
+search ended: it begins anew with the postures kept, so that the fit is the one that would have been without the others,
+and one wrong posture that hid behind another is found. Weights alone would discard the real,
 configuration-dependent errors of a robot; leaving out is for what no robot does.
 Reference: Lange, Little, Taylor, JASA 1989.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.stats import chi2
@@ -41,10 +44,34 @@ class RobustFit:
 
 def robust_fit(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.ndarray) -> RobustFit:
     """Fit from theta (p,); `problem` makes that of some of the n postures of d components, given as a mask."""
+    limit, asked = float(chi2.isf(_RARE, d)), np.ones(n, dtype=bool)
+    for _ in range(_ROUNDS):
+        rows = np.flatnonzero(asked)
+        found = _agreed(partial(_of_these, problem, n, rows), len(rows), d, theta, limit)
+        kept = _mask(n, rows[found.kept])
+        if kept.all():
+            return found
+        _, distance = _judged(problem(np.ones(n, dtype=bool)), found.fit, kept.astype(float))
+        before, asked = asked, _near(distance, limit)
+        if np.array_equal(asked, before):
+            break
+    return RobustFit(found.fit, kept, distance)
+
+
+def _of_these(problem: Callable[[np.ndarray], Problem], n: int, rows: np.ndarray, some: np.ndarray) -> Problem:
+    """The problem of some, a mask, of the rows of n."""
+    return problem(_mask(n, rows[some]))
+
+
+def _mask(n: int, rows: np.ndarray) -> np.ndarray:
+    return np.isin(np.arange(n), rows)
+
+
+def _agreed(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.ndarray, limit: float) -> RobustFit:
+    """The fit of those n postures that lie within the limit of it."""
     everything, some = problem(np.ones(n, dtype=bool)), spread(n, d, _FEW)
-    mask = np.isin(np.arange(n), some)
+    mask = _mask(n, some)
     few = everything if mask.all() else problem(mask)
-    limit = float(chi2.isf(_RARE, d))
     found = solve(few, few.linearise(theta), lambda distance: (_NU + d) / (_NU + distance), hasty=True)
     weight = np.zeros(n)
     weight[some] = found.noise.weight

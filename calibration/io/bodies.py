@@ -10,6 +10,7 @@ from calibration.errors import InputError, NotEnoughData
 from calibration.io.mapping import MappedBody, MappingFile
 from calibration.io.place_bodies import hand_eye, mean_shape, standing_shape
 from calibration.io.recorded import Recorded
+from calibration.marker_shape import misfit, of_one_shape
 from calibration.markers import BASE, HAND
 from calibration.point_body import is_point
 from calibration.registration_start import registration_start
@@ -128,6 +129,8 @@ def unmatched(found: Sequence[str], wanted: Sequence[str]) -> tuple[list[str], l
 
 
 def _poses(body: Body, recorded: Recorded) -> np.ndarray:
+    """Poses (n, 4, 4); NaN where its markers do not have its shape: labels exchanged, a ghost."""
     if not body.markers:
         return np.eye(4)[None]
-    return body_poses(np.array([m.xyz for m in body.markers]), _positions(recorded, [m.name for m in body.markers])).T
+    found = body_poses(np.array([m.xyz for m in body.markers]), _positions(recorded, [m.name for m in body.markers]))
+    return np.where(of_one_shape(misfit(found.residual))[:, None, None], found.T, np.nan)

@@ -22,6 +22,7 @@ from calibration.errors import InputError, NotEnoughData
 from calibration.io.hand_readings import MOST, Frames, Pairs, Reading, Shown, as_declared, distance, readings
 from calibration.io.place_bodies import hand_eye
 from calibration.labels import with_right_labels
+from calibration.marker_shape import of_one_shape
 from calibration.markers import base_body, hand_body
 from calibration.means import PostureMeans
 from calibration.postures import mean_postures
@@ -74,6 +75,7 @@ def _shown(description: Description, file: str, trial: Trial | PostureMeans) -> 
     none = np.zeros(0)
     if isinstance(trial, PostureMeans):
         postures = mean_postures(description, trial)
+        postures = postures.rows(of_one_shape(postures.misfit))
         return Shown(file, postures.T_base_hand, none, postures.q, none, postures.components == 6)
     if len(trial.t_robot) < 2 or not len(trial.marker):
         raise NotEnoughData("readings or markers are missing")

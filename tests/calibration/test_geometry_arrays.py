@@ -11,6 +11,7 @@ from calibration.geometry_arrays import GeometryFit, Session, fit_geometry
 from calibration.marker_shape import cluster
 from calibration.registration_start import registration_start
 from tests.calibration import matched
+from tests.calibration.real_postures import KINDS, spoilt
 
 TOOL = "gripper_grasping_frame"
 X = np.array(matched.BODIES["gripper"][1])
@@ -77,18 +78,12 @@ def test_markers_that_were_not_seen_are_no_error(good):
     assert np.sqrt(((found.predict(new + truth.offset) - markers(truth, new, 0.0)) ** 2).mean()) < 1.5e-3
 
 
-@pytest.mark.parametrize("kind", [0.02, 0.05, 0.3, "labels"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_four_wrong_postures_of_forty_are_named_and_change_nothing(good, kind):
     q, positions, _ = good
-    rng, wrong = np.random.default_rng(3), positions.copy()
-    rows = sorted(rng.choice(40, 4, replace=False).tolist())
-    for row in rows:
-        if kind == "labels":
-            wrong[row, [0, 2]] = wrong[row, [2, 0]]
-        else:
-            way = rng.normal(size=3)
-            wrong[row] += kind * way / np.linalg.norm(way)
-    found = fitted(q, wrong)
+    rng = np.random.default_rng(3)
+    rows = np.sort(rng.choice(40, 4, replace=False))
+    found = fitted(q, spoilt(positions, rows, kind, rng))
     assert found.left_out == tuple(rows)
     assert any(", ".join(map(str, rows)) in v.message for v in found.verdicts if v.verdict == "warning")
     rest = np.setdiff1d(np.arange(40), rows)

@@ -32,28 +32,35 @@ SEEDS = range(1000, 2000)  # not used for development
 LEAST = 1e-2  # of the widths random errors begin with: the least that is believed of them
 
 
-def measured(truth, q, rng):
-    """Marker positions (n, 4, 3) [m] of a robot at joint angles q (n, 8), with the least random errors and noise."""
+def measured(truth, q, rng, share=LEAST):
+    """Marker positions (n, 4, 3) [m] of a robot at joint angles q (n, 8), with noise and a share of the random errors
+    that are expected."""
     w = Widths()
-    q = q + LEAST * w.reading * np.r_[0.1, np.ones(7)] * rng.normal(size=q.shape)
-    hand = LEAST * np.repeat([w.position, w.orientation], 3) * rng.normal(size=(len(q), 6))
+    q = q + share * w.reading * np.r_[0.1, np.ones(7)] * rng.normal(size=q.shape)
+    hand = share * np.repeat([w.position, w.orientation], 3) * rng.normal(size=(len(q), 6))
     return matched.positions(LAB @ matched.hand_in_base(truth, q) @ exp6(hand), X) + SIGMA * rng.normal(
         size=(len(q), 4, 3)
     )
+
+
+def drawn(chain, rng, soft=False):
+    """A robot, readings (POSTURES + NEW, 8) of it, and the joint angles then; `soft`: a share of its gears gives, by as
+    much as is believed of one that does."""
+    xi, zeros = rng.normal(size=(8, 6)) * np.repeat([4e-3, 8e-3], 3), rng.normal(size=8) * np.r_[4e-3, np.full(7, 4e-2)]
+    reading = matched.random_angles(rng, POSTURES + NEW) + zeros
+    tau = chain.gravity_torques(reading)
+    gives = gear_tolerances(chain, tau[:POSTURES], DEFLECTION) * rng.normal(size=8) * (rng.random(8) < rng.random())
+    return matched.Truth(xi=xi, offset=zeros), reading, reading - zeros - soft * gives * tau
 
 
 def judged(chain, seed, soft):
     """Of one robot, over NEW unseen hand poses: mean squared error and Cramer-Rao bound of position and rotation
     (2, 2), share of 95 % intervals that hold the truth, NEES, and the variance NEES would have.
 
-    `soft`: gears give, by as much as is believed of one that does; the bound is that of stiff gears.
+    The bound is that of stiff gears.
     """
     rng = np.random.default_rng([seed, 31])
-    xi, zeros = rng.normal(size=(8, 6)) * np.repeat([4e-3, 8e-3], 3), rng.normal(size=8) * np.r_[4e-3, np.full(7, 4e-2)]
-    reading = matched.random_angles(rng, POSTURES + NEW) + zeros
-    tau = chain.gravity_torques(reading)
-    gives = gear_tolerances(chain, tau[:POSTURES], DEFLECTION) * rng.normal(size=8) * (rng.random(8) < rng.random())
-    truth, q = matched.Truth(xi=xi, offset=zeros), reading - zeros - soft * gives * tau
+    truth, reading, q = drawn(chain, rng, soft)
     found = fit_chain(chain, reading[:POSTURES], measured(truth, q[:POSTURES], rng), Widths())
     true = body_poses(found.markers, matched.positions(LAB @ matched.hand_in_base(truth, q[POSTURES:]), X)).T
     predicted = found.hand.poses_and_derivatives(reading[POSTURES:], n_parameters=len(found.parameters))

@@ -9,8 +9,8 @@ import pytest
 from calibration import calibrate, evaluate, load
 from calibration.errors import InputError
 from scenarios import exchange
+from tests.calibration.real_postures import KINDS, ROOT, TWO_DAYS, one_marker, real_rows, spoilt_rows, written
 
-ROOT = Path(__file__).parents[3]
 REAL = ROOT.parent / "shared/data/real"
 
 
@@ -30,24 +30,11 @@ def test_static_postures_are_calibrated_and_say_what_is_missing(tmp_path):
     assert (said["suspension"].verdict, said["joints"].verdict) == ("missing", "missing")
 
 
-def real_rows() -> tuple[str, np.ndarray]:
-    path = REAL / "qualisys_2021-11-30_postures.csv"
-    if not path.is_file():
-        pytest.skip(f"{path.name} is not beside the checkout")
-    return path.read_text().splitlines()[0], np.loadtxt(path, delimiter=",", skiprows=1)
-
-
-def written(path: Path, head: str, rows: np.ndarray) -> Path:
-    np.savetxt(path, rows, delimiter=",", header=head, comments="", fmt="%.6f")
-    return path
-
-
 def test_a_second_file_is_predicted_within_its_band(tmp_path):
     head, rows = real_rows()
     order = np.random.default_rng(0).permutation(len(rows))
     files = [written(tmp_path / f"day{k + 1}.csv", head, rows[part]) for k, part in enumerate((order[:25], order[25:]))]
-    mapping = ROOT / "docs/mappings/qualisys_two_days.yaml"
-    exchange.import_files("csv", files, mapping, tmp_path / "dataset")
+    exchange.import_files("csv", files, TWO_DAYS, tmp_path / "dataset")
     dataset = load(tmp_path / "dataset")
     found = evaluate(calibrate(dataset), dataset)
     row = {p.marker: p for p in found.points}["all"]
@@ -55,17 +42,6 @@ def test_a_second_file_is_predicted_within_its_band(tmp_path):
     assert row.model == "full" and row.n == 48
     assert norm["full"] < norm["model_2"] < 0.7 * norm["registration"]
     assert row.rmse_norm_mm < 3.2 and row.inside >= 0.75 and row.band_95_mm < 9.0
-
-
-def one_marker(tmp_path, names: str = "BL") -> Path:
-    text = (ROOT / "docs/mappings/qualisys_two_days.yaml").read_text()
-    text = text.replace("undrawn: [BL, BR, TR, TL]", f"undrawn: [{names}]").replace(
-        "TR: [x3, y3, z3], TL: [x4, y4, z4]", ""
-    )
-    if names == "BL":
-        text = text.replace("BR: [x2, y2, z2], ", "")
-    (tmp_path / "one.yaml").write_text(text)
-    return tmp_path / "one.yaml"
 
 
 def test_one_marker_on_the_hand_is_a_place_and_no_pose(tmp_path):
@@ -96,15 +72,12 @@ def test_two_undrawn_markers_are_refused(tmp_path):
         exchange.import_files("csv", files, one_marker(tmp_path, "BL, BR"), tmp_path / "dataset")
 
 
-@pytest.mark.parametrize("kind", [0.02, 0.05, 0.3, "labels"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_wrong_rows_are_imported_and_named(tmp_path, kind):
     head, rows = real_rows()
     rng = np.random.default_rng(3)
-    wrong = sorted(rng.choice(len(rows), 4, replace=False).tolist())
-    for k in wrong:
-        p = rows[k, :12].reshape(4, 3)
-        way = rng.normal(size=3)
-        rows[k, :12] = (p[[1, 0, 2, 3]] if kind == "labels" else p + kind * way / np.linalg.norm(way)).ravel()
+    wrong = np.sort(rng.choice(len(rows), 4, replace=False))
+    rows = spoilt_rows(rows, wrong, kind, rng)
     file = written(tmp_path / "qualisys_2021-11-30_postures.csv", head, rows)
     exchange.import_files("csv", [file], ROOT / "docs/mappings/qualisys_postures.yaml", tmp_path / "dataset")
     estimate = calibrate(load(tmp_path / "dataset"))
