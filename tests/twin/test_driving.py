@@ -9,7 +9,7 @@ from scenarios import load
 from scenarios.errors import ScenarioError
 from twin import driving, schedule
 from twin.base_path import BasePath
-from twin.campaign import _states, laboratory, measure  # noqa: PLC2701
+from twin.campaign import _in_trial, _states, laboratory, measure  # noqa: PLC2701
 from twin.conventions import rotation_vector
 from twin.kinematic import carried
 from twin.motions import RATE
@@ -54,6 +54,14 @@ def test_a_spin_and_a_drive_rest_where_they_say(moves):
         for k, (start, stop) in enumerate(motion.dwells):
             rest = motion.base.planar[round(start * RATE) + 1 : round(stop * RATE) + 1]
             np.testing.assert_allclose(rest, np.tile(k * np.array(step), (len(rest), 1)), atol=1e-12)
+
+
+def test_casters_that_turn_where_they_stand_roll_in_a_drive(robot, moves):
+    casters = [f"twin.base.caster_{k}.turning_force=8.0" for k in ("front", "back")]
+    lab = laboratory(load("heins2022", casters).twin, 0)
+    driven = [_in_trial(which, moves["spin_wheels"], 0.0).model for which in (lab, robot)]
+    assert driven[0].nv == driven[1].nv
+    assert not any(".turn_" in driven[0].joint(j).name for j in range(driven[0].njnt))
 
 
 def test_a_carried_spin_turns_about_the_base_frame_and_nothing_else_moves(robot, moves):

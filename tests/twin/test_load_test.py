@@ -87,6 +87,18 @@ def test_the_springs_and_dampers_of_random_bases_are_found(nominal, seed):
     assert errors[1] < 0.05
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+def test_the_springs_and_dampers_of_random_bases_whose_casters_turn_are_found(nominal, seed):
+    settings = [s for s in random_base(seed) if ".friction" not in s]
+    twin, wheels = standing(nominal, *settings, *GROUNDS["turning"])
+    K, C = spatial_stiffness(wheels)
+    errors = error(load_test(twin).K, K), error(release_test(twin), C)
+    print("K, C", errors)
+    assert errors[0] < 1e-2
+    assert errors[1] < 0.05
+
+
 def test_a_wheel_that_slips_under_the_test_is_told(nominal):
     twin, _ = standing(nominal, "twin.base.caster_back.friction=0.005")
     with pytest.raises(Restless, match="a wheel slips under"):

@@ -3,10 +3,11 @@
     drive     the wheel turns on its hub; servo torque kp (u - a) - kv da/dt: a velocity loop with integral
     caster    the fork swivels on its bushing, the wheel rolls in the fork, trailing behind the swivel's axis
 
-Both against dry friction. Bushing and contact are those of the standing wheel.
+Both against dry friction, which takes the place of a standing caster's turning force. Bushing and contact are those
+of the standing wheel.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -41,7 +42,7 @@ class Rolling(Defect):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add hub, swivel and servo behind the wheel's bushing."""
-        self.wheel.apply(spec)
+        replace(self.wheel, turning_force=0.0).apply(spec)
         carrier, name = body(spec, self.wheel.body_name), self.wheel.name
         if name in DRIVES:
             carrier.add_joint(name=roll_joint(name), type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXIS, armature=_ROTOR)
