@@ -36,7 +36,6 @@ def build(
     links: Sequence[str] = (),
     timestep: float = 0.001,
     visual: bool = False,
-    wrist: bool = False,
 ) -> Twin:
     """Compile a twin; the specification given is left as it was.
 
@@ -46,7 +45,6 @@ def build(
         links: Links whose poses are to be sensed.
         timestep: [s].
         visual: Keep the shapes, for a picture.
-        wrist: Sense the wrench at the wrist, which costs a twentieth of the speed.
 
     Raises:
         UnknownElement: A defect or a link names what the robot does not have.
@@ -57,8 +55,10 @@ def build(
     for defect in defects:
         defect.apply(spec)
     _brake(spec)
-    _sense(spec, links, wrist)
+    _sense(spec, links)
     _push(spec)
+    if not visual:
+        _fuse(spec)
     model = spec.compile()
     for defect in defects:
         defect.tune(model)
@@ -95,16 +95,28 @@ def _push(spec: mujoco.MjSpec) -> None:
     """Three forces on the hand, where there is one, in its own axes [N], that a motion may use."""
     if spec.body(HAND) is None:
         return
-    site = body(spec, HAND).add_site(name="push")
+    site = body(spec, HAND).add_site(name=wrenches.PUSHED)
     for k, name in enumerate(PUSH):
         force = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=site.name)
         force.gear = np.eye(6)[k]
 
 
-def _sense(spec: mujoco.MjSpec, links: Sequence[str], wrist: bool) -> None:
+def _fuse(spec: mujoco.MjSpec) -> None:
+    """Let the compiler make one body of those welded together; it spares what is named elsewhere, so in an exclusion.
+
+    Wheels stay, since a contact goes by the inertia of its own body, and what hangs on the wrist's sensor.
+    """
+    spec.compiler.fusestatic = True
+    touching = [geom.parent for geom in spec.geoms if geom.contype or geom.conaffinity]
+    hung = [site.parent for site in spec.sites if site.name == wrenches.WRIST]
+    for kept in (*touching, *hung):
+        if kept.parent is not None and not kept.joints:
+            spec.add_exclude(bodyname1=kept.name, bodyname2=kept.parent.name)
+
+
+def _sense(spec: mujoco.MjSpec, links: Sequence[str]) -> None:
     for link in links:
         for kind in _POSES:
             spec.add_sensor(name=f"{link}.{kind.name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_XBODY, objname=link)
     wrenches.add_plates(spec)
-    if wrist:
-        wrenches.add_wrist(spec)
+    wrenches.add_wrist(spec)

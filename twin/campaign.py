@@ -150,7 +150,7 @@ def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
 
 
 def _built(config: TwinConfig, defects: Sequence[Defect], links: Sequence[str]) -> Twin:
-    return build(mjcf.spec(), defects, links, config.timestep, wrist=config.instruments.wrist is not None)
+    return build(mjcf.spec(), defects, links, config.timestep)
 
 
 def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:

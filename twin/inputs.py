@@ -25,6 +25,7 @@ class Inputs:
         first: State (ns,) before the first step, MuJoCo's full physics.
         control: (n, nu).
         command: Interpolated set-points (n, 8) [m, rad].
+        push: Force on the hand, its axes (n, 3) [N].
         settling: Steps before the first set-point.
     """
 
@@ -32,6 +33,7 @@ class Inputs:
     first: np.ndarray
     control: np.ndarray
     command: np.ndarray
+    push: np.ndarray
     settling: int
 
 
@@ -42,13 +44,15 @@ def prepare(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> Inputs:
     command = _interpolated(motion.command, step)
     control = np.zeros((len(command), model.nu))
     control[:, [model.actuator(driven(j)).id for j in JOINTS]] = command
+    push = np.zeros((len(command), len(PUSH)))
     if motion.push is not None:
-        control[:, [model.actuator(name).id for name in PUSH]] = _interpolated(motion.push, step)
+        push = _interpolated(motion.push, step)
+        control[:, [model.actuator(name).id for name in PUSH]] = push
     if motion.base is not None:
         angles = _interpolated(motion.base.wheel_angles(*differential_drive()), step)
         control[:, [model.actuator(roll_joint(name)).id for name in DRIVES]] = angles
     settling = len(command) - round(motion.duration / step) - 1
-    return Inputs(model, _first_state(model, data, motion.command[0]), control, command, settling)
+    return Inputs(model, _first_state(model, data, motion.command[0]), control, command, push, settling)
 
 
 def driven(joint: str) -> str:

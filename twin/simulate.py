@@ -10,7 +10,7 @@ from mujoco import rollout
 from twin import wrenches
 from twin.build import Twin
 from twin.conventions import states_with_their_sensors, transform
-from twin.inputs import driven, prepare
+from twin.inputs import Inputs, driven, prepare
 from twin.instruments.tiles import PLATE, felt
 from twin.motions import JOINTS, Motion
 from twin.root import anchored, floor_wrench
@@ -67,12 +67,11 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
     states = states_with_their_sensors(first, after[0])
     check(inputs, motion, states)
     skip = inputs.settling
-    return _unpack(model, twin.links, states[skip:], sensors[0][skip:], inputs.command[skip:])
+    return _unpack(inputs, twin.links, states[skip:], sensors[0][skip:])
 
 
-def _unpack(
-    model: mujoco.MjModel, links: tuple[str, ...], states: np.ndarray, sensors: np.ndarray, command: np.ndarray
-) -> States:
+def _unpack(inputs: Inputs, links: tuple[str, ...], states: np.ndarray, sensors: np.ndarray) -> States:
+    model, command, push = inputs.model, inputs.command[inputs.settling :], inputs.push[inputs.settling :]
     qpos, qvel = states[:, 1 : 1 + model.nq], states[:, 1 + model.nq : 1 + model.nq + model.nv]
     link = np.stack([qpos[:, model.joint(j).qposadr[0]] for j in JOINTS], axis=1)
     motor = np.stack([qpos[:, model.joint(driven(j)).qposadr[0]] for j in JOINTS], axis=1)
@@ -91,7 +90,7 @@ def _unpack(
         poses={name: _pose(model, sensors, name) for name in links},
         wrench=wrench,
         plates=np.stack(each, axis=1),
-        wrist=wrenches.on_wrist(model, sensors),
+        wrist=wrenches.on_wrist(model, sensors, push),
     )
 
 

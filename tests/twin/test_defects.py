@@ -1,6 +1,7 @@
 import json
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -61,13 +62,26 @@ def test_every_defect_can_be_read_back_from_the_compiled_model(lab):
 
 
 def test_masses_and_payload_are_as_declared(lab, nominal):
-    model = lab.twin.model
+    model = build(mjcf.spec(), lab.robot.defects, visual=True).model
     for d in lab.robot.defects:
         if isinstance(d, LinkMass):
             assert model.body(d.link).mass[0] == pytest.approx(nominal.body(d.link).mass[0] * d.scale, rel=1e-12)
             assert d.scale != 1.0
     payload = next(d for d in lab.robot.defects if isinstance(d, Payload))
     assert model.body("payload").mass[0] == payload.mass == 0.437
+
+
+def test_bodies_made_one_weigh_and_move_like_those_they_are_made_of(lab):
+    fused, apart = lab.twin.model, build(mjcf.spec(), lab.robot.defects, lab.twin.links, visual=True).model
+    assert fused.nbody < 0.7 * apart.nbody
+    ends = []
+    for model in (fused, apart):
+        data = mujoco.MjData(model)
+        data.joint("arm_2_joint").qvel = 1.0
+        mujoco.mj_step(model, data, 300)
+        ends.append(data.qpos.copy())
+    np.testing.assert_allclose(*ends, atol=1e-9)
+    assert fused.body_subtreemass[0] == pytest.approx(apart.body_subtreemass[0], rel=1e-12)
 
 
 def test_a_robot_has_one_make_of_arm_and_the_same_scatter(nominal):

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -10,7 +9,6 @@ from scipy.stats import chi2
 from twin import motions
 from twin.campaign import laboratory
 from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, WristSensor
-from twin.draw import TOOL
 from twin.instruments import optics, plate
 from twin.measure import EPOCH, instrument_errors, measure
 from twin.simulate import simulate
@@ -193,20 +191,6 @@ def test_the_filter_s_delay_is_in_the_plate_s_clock(lab):
     found = truth_of(lab, plate=errors)
     assert found["latency.plate"] == pytest.approx(2.25e-3, rel=0.01)
     assert found["clock.plate.offset"] == pytest.approx(truth_of(lab)["clock.plate.offset"] - found["latency.plate"])
-
-
-def test_the_wrist_bears_the_weight_of_the_hand_in_its_own_axes(lab, states):
-    model, data = lab.twin.model, mujoco.MjData(lab.twin.model)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    sensor, held, grasp = data.body("wrist_ft_link"), model.body("wrist_ft_tool_link").id, data.body(TOOL)
-    R_sensor_grasp = sensor.xmat.reshape(3, 3).T @ grasp.xmat.reshape(3, 3)
-    lever = sensor.xmat.reshape(3, 3).T @ (data.subtree_com[held] - sensor.xpos)
-    down = R_sensor_grasp @ states.poses[TOOL][0, :3, :3].T @ [0.0, 0.0, -1.0]
-    weight = 9.81 * model.body_subtreemass[held] * down
-    expected = np.concatenate([weight, np.cross(lever, weight)])
-    np.testing.assert_allclose(states.wrist[0], expected, atol=1e-2)
-    assert np.abs(expected[:3]).min() > 1.0 and np.abs(expected[3:]).max() > 0.5
 
 
 def test_the_wrist_s_readings_have_its_noise_zero_and_steps(lab, recorded, states):
