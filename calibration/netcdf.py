@@ -63,7 +63,7 @@ def write_variable(
     group: Group, name: str, data: np.ndarray, dims: tuple[str, ...], kind: str, attributes: Mapping[str, str]
 ) -> None:
     """Write an array, packed, with its attributes; one that is empty says `none`."""
-    packing: dict[str, Any] = {"compression": "zlib", "complevel": 4, "shuffle": True} if data.size else {}
+    packing: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True} if data.size else {}
     variable = group.createVariable(name, kind, dims, fill_value=False, **packing)
     variable.setncatts({key: value or "none" for key, value in attributes.items()})
     variable[...] = data.astype(kind)
