@@ -31,7 +31,11 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
         *(_confirmation(campaign, nominal, seed) if campaign.confirmation else ()),
     )
-    return tuple(m for m in trials if not campaign.only or _group(m) in campaign.only)
+    return tuple(m for m in trials if _asked(campaign, _group(m)))
+
+
+def _asked(campaign: Campaign, name: str) -> bool:
+    return not campaign.only or name in campaign.only
 
 
 def _group(motion: Motion) -> str:
@@ -61,7 +65,7 @@ def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign
 
 def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
     """The first posture is where the trial starts, the n that follow are dwelt in; not drawn unless asked for."""
-    if campaign.only and id not in campaign.only:
+    if not _asked(campaign, id):
         return ()
     q = postures.draw(nominal, n + 1, generator(seed, "postures", role))
     return (motions.postures(id, role, q, campaign),)
@@ -93,4 +97,5 @@ def _loaded(campaign: Campaign) -> tuple[Motion, ...]:
 def _swings(role: Role, duration: float, paths: dict[str, motions.Swing], campaign: Campaign) -> tuple[Motion, ...]:
     if duration == 0.0:
         return ()
-    return tuple(motions.swing(name, role, "swing", path, duration, campaign) for name, path in paths.items())
+    asked = {name: path for name, path in paths.items() if _asked(campaign, name)}
+    return tuple(motions.swing(name, role, "swing", path, duration, campaign) for name, path in asked.items())
