@@ -13,7 +13,7 @@ import mjcf
 from calibration import load as load_dataset
 from calibration.errors import NotEnoughData
 from calibration.play import play
-from calibration.signals import even, low_passed
+from calibration.signals import Signal, even, low_passed
 from scenarios import cli, exchange, load
 from scenarios.realism.arms import AS_LOGGED
 from scenarios.realism.compare import compare_replay, compare_swings
@@ -152,6 +152,17 @@ def test_the_swings_turn_the_hand_as_the_log_did():
     for path in AS_LOGGED:
         R = [_hand(model, q) for q in path.at(np.array([0.0, *(t[sample] - START)]))]
         np.testing.assert_allclose([(R[0].inv() * r).magnitude() for r in R[1:]], turned, atol=0.03)
+
+
+def test_the_log_rolls_about_a_line_above_its_wheels(log):
+    """y = a roll + Fy / k between the jerks: k is a floor's, a is 0.2 m; a base on upright springs has 0."""
+    _, cycles = recorded(load_dataset(log))
+    steady = cycles.t > 4.0
+    x, w = (low_passed(Signal(cycles.t, v, np.ones(len(cycles.t), dtype=bool)), 1.5).x for v in (cycles.x, cycles.w))
+    A = np.column_stack([np.ones(steady.sum()), x[steady, 3], w[steady, 1]])
+    theta = np.linalg.lstsq(A, x[steady, 1])[0]
+    assert theta[1] == pytest.approx(0.21, abs=0.02) and 1.0 / theta[2] == pytest.approx(84e3, rel=0.1)
+    assert (x[steady, 1] - A @ theta).var() < 0.02 * x[steady, 1].var()
 
 
 def _seconds(stamps):

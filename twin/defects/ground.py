@@ -24,7 +24,7 @@ _ROOT = "base_footprint"
 # Solver tolerance, iterations against slip and their tolerance. One rigid body's wheels share its load and friction in
 # more than one way; iterated to the end, friction drifts. Where each has a spring, those iterations set the accuracy.
 _OWN = 1e-4, 20, 1e-9
-_TURNING = 1e-6, 20, 1e-9  # where wheels turn in their bushings, their contacts hold a moment too
+_TWISTING = 1e-6, 20, 1e-9  # where wheels twist in their bushings, their contacts hold a moment too
 _SHARED = 1e-10, 3, 1e-6
 _SERIES = 1e-14  # tolerance against slip where a caster's friction in turning is in series with the floor's
 _LATE = 0.1  # torsional damping times step over inertia of the wheel [-]
@@ -79,8 +79,8 @@ class Wheel(Defect):
             self.footing.tune(model, self.name, self.contact_geom, torsion)
             self._check_torsion(model)
             option = model.opt
-            turning = torsion is not None and torsion.any()
-            solver = _SHARED if torsion is None else _TURNING if turning else _OWN
+            twists = torsion is not None and torsion.any()
+            solver = _SHARED if torsion is None else _TWISTING if twists else _OWN
             option.tolerance, option.noslip_iterations, noslip = solver
             if self.bushing is None:
                 option.noslip_tolerance = noslip
