@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import mjcf
+from calibration.errors import NotCalibrated
 from calibration.geometry_arrays import Widths, fit_chain
 from calibration.robot import chain_of_frames
 from scenarios.held_out import held_out
@@ -51,21 +52,25 @@ def real_draw(folder, table, mapping, kind, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("seen", "kind"),
-    [*(("four markers", kind) for kind in KINDS), *(("one marker", kind) for kind in KINDS if kind != 0.02)],
-)
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seen", ["four markers", "one marker"])
 def test_four_wrong_rows_of_a_real_file_are_named_and_change_nothing(tmp_path, seen, kind):
     table, mapping = real_rows(), TWO_DAYS if seen == "four markers" else one_marker(tmp_path)
     change, missed, more = [], [], []
     for seed in range(DRAWS):
-        by, wrong, told = real_draw(tmp_path, table, mapping, kind, seed)
+        try:
+            by, wrong, told = real_draw(tmp_path, table, mapping, kind, seed)
+        except NotCalibrated as refused:
+            print(f"draw {seed}: {refused}")
+            by, wrong, told = [np.inf, np.inf], set(), []
         change.append(by)
         missed.append(not told or any(not wrong <= one for one in told))
         more.append(any(one - wrong for one in told))
     report(np.array(change), missed, more)
     assert (np.median(change, axis=0) <= CHANGE).all()
-    assert not any(missed)
+    # 20 mm of one marker is five times this robot's own errors, and 31 points are three equations a parameter: a size
+    # of the random errors takes a wrong row for its own in some draws.
+    assert not any(missed) or (seen, kind) == ("one marker", 0.02)
 
 
 @pytest.mark.slow
