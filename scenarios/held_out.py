@@ -15,10 +15,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from calibration.dataset import Dataset, load
-from calibration.errors import NotCalibrated
+from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.estimate import Estimate
 from calibration.gears import calibrate_gears
 from calibration.geometry import calibrate_geometry
+from calibration.io.mapping import Mapping
 from calibration.pipeline import calibrate
 from calibration.point_rows import PointRow, point_rows
 from calibration.postures import Postures, mean_postures
@@ -66,13 +67,13 @@ def cross_validated(table: Path, mapping: Path, parts: Iterable[np.ndarray]) -> 
         parts: What is left out.
 
     Raises:
-        ScenarioError: The mapping is not of two files. Otherwise as `held_out`.
+        ScenarioError: There is no such table, or the mapping is not of two files. Otherwise as `held_out`.
     """
-    from calibration.io.mapping import Mapping
-
     names = {trial.role: trial.stem for trial in yaml_file.read(mapping, Mapping).trials}
     if set(names) != {"calibration", "validation"}:
         raise ScenarioError(f"{mapping}: trials have roles {sorted(names)}; one calibration and one validation needed")
+    if not table.is_file():
+        raise ScenarioError(f"{table}: no such file; name a CSV table with a head and one static posture a row")
     head, *lines = table.read_text(encoding="utf-8").splitlines()
     found = []
     with TemporaryDirectory() as folder:
@@ -92,13 +93,20 @@ def at_random(n: int, parts: int, rng: np.random.Generator) -> list[np.ndarray]:
 
 def by_regions(q: np.ndarray, parts: int, rng: np.random.Generator) -> list[np.ndarray]:
     """Row numbers of postures q (n, k) in equal slices along a random direction of the joints' space."""
-    along = (q - q.mean(axis=0)) / q.std(axis=0) @ rng.normal(size=q.shape[1])
+    spread = q.std(axis=0)
+    along = (q - q.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0) @ rng.normal(size=q.shape[1])
     return np.array_split(np.argsort(along), parts)
 
 
 def pooled(found: Iterable[HeldOut], model: str, marker: str) -> PointRow:
-    """All postures left out together; `band_95_mm` is the median of the parts'."""
+    """All postures left out together; `band_95_mm` is the median of the parts'.
+
+    Raises:
+        NotEnoughData: No part has that row and marker.
+    """
     rows = [p for part in found for p in part.points if (p.model, p.marker) == (model, marker)]
+    if not rows:
+        raise NotEnoughData(f"nothing was left out of row {model!r}, marker {marker!r}")
     n, rms, far, band, inside = (
         np.array([getattr(p, name) for p in rows])
         for name in ("n", "rmse_norm_mm", "max_norm_mm", "band_95_mm", "inside")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from calibration.errors import NotEnoughData
 from calibration.point_rows import PointRow
 from scenarios.errors import ScenarioError
 from scenarios.held_out import HeldOut, at_random, by_regions, cross_validated, pooled
@@ -67,6 +68,26 @@ def test_parts_are_pooled_by_their_number_of_postures():
     found = pooled((one(3, 1.0, 1.0), one(1, 3.0, 0.0)), "full", "all")
     assert (found.n, found.max_norm_mm, found.inside) == (4, 6.0, 0.75)
     assert found.rmse_norm_mm == pytest.approx(np.sqrt(3.0))
+
+
+def test_a_part_is_predicted_by_the_fit_of_all_others():
+    real_rows()
+    some = [np.array([3, 30]), np.array([7, 8, 9])]
+    found = cross_validated(TABLE, TWO_DAYS, some)
+    assert [{(p.model, p.n) for p in one.points if p.marker == "all"} for one in found] == [
+        {(model, 4 * len(part)) for model in ROWS} for part in some
+    ]
+    assert all(
+        any("from 35 postures" in v.message or "from 34 postures" in v.message for v in f.verdicts) for f in found
+    )
+    assert pooled(found, "full", "all").rmse_norm_mm < 6.0
+
+
+def test_what_was_not_left_out_and_tables_that_are_not_there_are_refused(tmp_path):
+    with pytest.raises(NotEnoughData, match="row 'model_3', marker 'all'"):
+        pooled((HeldOut((), ()),), "model_3", "all")
+    with pytest.raises(ScenarioError, match="no such file"):
+        cross_validated(tmp_path / "none.csv", TWO_DAYS, [])
 
 
 def test_a_mapping_of_one_file_is_refused():
