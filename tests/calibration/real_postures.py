@@ -19,6 +19,7 @@ def real_rows() -> tuple[str, np.ndarray]:
 
 
 def written(path: Path, head: str, rows: np.ndarray) -> Path:
+    path.parent.mkdir(exist_ok=True)
     np.savetxt(path, rows, delimiter=",", header=head, comments="", fmt="%.6f")
     return path
 

@@ -89,6 +89,18 @@ def test_wrong_rows_are_imported_and_named(tmp_path, kind):
     ]
 
 
+def test_exchanged_labels_do_not_move_where_undrawn_markers_are_placed(tmp_path):
+    head, rows = real_rows()
+    rng = np.random.default_rng(14)
+    wrong = np.sort(rng.choice(len(rows), 4, replace=False))
+    placed = []
+    for name, some in (("with", spoilt_rows(rows, wrong, "labels", rng)), ("without", np.delete(rows, wrong, axis=0))):
+        file = written(tmp_path / name / "qualisys_2021-11-30_postures.csv", head, some)
+        exchange.import_files("csv", [file], ROOT / "docs/mappings/qualisys_postures.yaml", tmp_path / name / "dataset")
+        placed.append([body.placement for body in load(tmp_path / name / "dataset").description.bodies])
+    np.testing.assert_allclose(*placed, atol=1e-3)
+
+
 def test_base_and_plate_give_a_suspension_and_say_what_is_missing(tmp_path):
     folder, notes = imported(tmp_path, "vicon_forceplate_2023-09-20.csv", "vicon_forceplate.yaml")
     assert "action, lab axes, about the surface centre, moments in N.m, confirmed by its CoP" in notes[0]
