@@ -68,7 +68,7 @@ def test_four_wrong_rows_of_a_real_file_are_named_and_change_nothing(tmp_path, s
         more.append(any(one - wrong for one in told))
     report(np.array(change), missed, more)
     assert (np.median(change, axis=0) <= CHANGE).all()
-    # 20 mm of one marker is five times this robot's own errors, and 31 points are three equations a parameter: a size
+    # 20 mm of one marker is nine times what `full` leaves, but 31 points are three equations a parameter: a size
     # of the random errors takes a wrong row for its own in some draws.
     assert not any(missed) or (seen, kind) == ("one marker", 0.02)
 
