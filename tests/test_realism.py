@@ -188,24 +188,13 @@ def test_the_swings_start_at_full_speed_under_the_joints_limits():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 40])
-def test_the_log_moves_among_the_draws_where_the_floor_holds_what_the_plate_read(log, seed):
-    """y, z and pitch as drawn; roll and yaw with twice the friction: the drawn is less than the jerk needs."""
+@pytest.mark.parametrize("seed", [0, 20, 40])
+def test_the_log_moves_among_the_draws(log, seed):
+    """y, roll, pitch and yaw as drawn, x where casters turn; z in neither, as the page says."""
     trials, scenario = recorded(load_dataset(log)), load("reality", [f"seed={seed}"])
-    drawn, held = (compare_replay(scenario, trials, 20, Condition(grip)) for grip in (1.0, 2.0))
-    assert min(drawn.share[k] for k in (1, 2, 4)) >= 0.8
-    assert min(held.share[k] for k in (3, 4, 5)) >= 0.8
-    assert drawn.share[5] < held.share[5]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 40])
-def test_the_log_turns_among_bases_whose_casters_turn(log, seed):
-    """Roll, pitch and yaw. x is inside with seeds 0 to 19 alone, by two robots: no cause of it is known."""
-    trials = recorded(load_dataset(log))
-    turned = compare_replay(load("reality", [f"seed={seed}"]), trials, 20, Condition(turning=True))
-    assert min(turned.share[k] for k in (3, 4, 5)) >= 0.8
-    assert (turned.share[0] >= 0.8) == (seed == 0)
+    drawn, turned = (compare_replay(scenario, trials, 20, Condition(turning=turns)) for turns in (False, True))
+    assert min(drawn.share[k] for k in (1, 3, 4, 5)) >= 0.8
+    assert min(turned.share[k] for k in (0, 3, 4, 5)) >= 0.8
 
 
 @pytest.mark.slow

@@ -52,6 +52,13 @@ def test_nothing_moves_before_the_wrench_changes(config):
     assert np.abs(x[T < 0.95]).max() < 1e-5
 
 
+def test_the_weight_stays_under_a_base_that_slides_round(config):
+    """By 20 mrad or more: at 1 m from the origin it would go 2 cm with that, and tilt the base by a milliradian."""
+    x = replay(carriage(config.base), pull(np.array([0, 0, 0, 0, 0, 32.0]), hump()))
+    assert np.abs(x[:, 5]).max() > 0.02
+    assert np.abs(x[:, 3:5]).max() < 1e-4
+
+
 def test_a_replay_repeats_bit_for_bit(config):
     twin, load = carriage(config.base), pull(np.array([0, 9.0, 0, 8.0, 0, 9.0]), hump())
     np.testing.assert_array_equal(replay(twin, load), replay(twin, load))
