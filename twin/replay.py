@@ -45,9 +45,7 @@ def carriage_on(floor: Sequence[Defect], timestep: float = 0.001) -> Twin:
     spec.delete(spec.body("torso_fixed_link"))
     chassis = spec.body("base_link")
     chassis.mass, chassis.fullinertia = _MASS, np.full(6, np.nan)
-    chassis.ipos = -np.asarray(
-        chassis.pos
-    )  # to the base frame's origin: MuJoCo pulls at the centre of mass as it moves
+    chassis.ipos = -np.asarray(chassis.pos)  # the base frame's origin: MuJoCo pulls at the centre of mass
     chassis.iquat, chassis.inertia = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, _INERTIA)
     spec.option.gravity = np.zeros(3)
     return build(spec, floor, timestep=timestep)
