@@ -20,12 +20,11 @@ def reality(  # noqa: PLR0913  an option each
     log: Annotated[
         Path | None, typer.Option(metavar="DATASET", help="A recording whose plate wrench is replayed on their bases.")
     ] = None,
-    grip: Annotated[
-        list[float] | None, typer.Option(metavar="F", help="Replay with F times the drawn friction; repeatable.")
-    ] = None,
-    turning: Annotated[
+    causes: Annotated[
         bool,
-        typer.Option("--turning", help="Replay, too, with casters that turn, wheels that differ and drives that hold."),
+        typer.Option(
+            "--causes", help="Replay, too, with markers that shift as the recording's, then with casters that turn."
+        ),
     ] = False,
     swings: Annotated[bool, typer.Option(help="Swing their arms.")] = True,
     seed: Seed = None,
@@ -34,12 +33,12 @@ def reality(  # noqa: PLR0913  an option each
     """Compare drawn robots with a real one: swings by the figures of its log, and its wrench replayed."""
     from scenarios import folder, steps
     from scenarios.realism.compare import as_json, compare_replay, compare_swings
-    from scenarios.realism.replayed import Condition
+    from scenarios.realism.replayed import AS_DRAWN, CAUSES
 
     loaded = steps.load(scenario, overriding(overrides, seed))
     recordings = () if log is None else _recordings(log)
     swung = [compare_swings(loaded, n)] if swings else []
-    conditions = [Condition(f) for f in grip or [1.0]] + [Condition(turning=True)] * turning
+    conditions = (AS_DRAWN, *CAUSES) if causes else (AS_DRAWN,)
     replays = [compare_replay(loaded, recordings, n, condition) for condition in conditions if recordings]
     for one in swung:
         _show_swings(one)

@@ -1,15 +1,17 @@
 """What one trial holds, in a few lines of figures: rates, holes, hidden markers, the plates' load, missing readings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calibration.dataset import Dataset
+from calibration.errors import NotEnoughData
 from calibration.means import PostureMeans
 from calibration.pressure import centre_of_pressure
 from calibration.recording import Trial
-from calibration.schema import TrialEntry
+from calibration.schema import Body, TrialEntry
+from calibration.shape_change import per_coordinate, shape_change
 from scenarios.plots.recording import holes
 
 _REST = 1.0  # [s] at both ends of a trial
@@ -43,7 +45,15 @@ def looked_at(dataset: Dataset, entry: TrialEntry) -> Looked:
     return Looked(
         entry,
         trial,
-        (*_clocks(trial), *_markers(trial), *_plates(trial), *_at_rest(trial), *_encoders(trial), *_felt(trial)),
+        (
+            *_clocks(trial),
+            *_markers(trial),
+            *_shapes(trial, dataset.description.bodies),
+            *_plates(trial),
+            *_at_rest(trial),
+            *_encoders(trial),
+            *_felt(trial),
+        ),
     )
 
 
@@ -88,6 +98,17 @@ def _markers(trial: Trial | PostureMeans) -> Iterator[str]:
         yield f"markers: {100.0 * hidden.mean():.2g} % hidden, {trial.marker[worst]} the most, {of_it:.2g} %"
     else:
         yield f"markers: all {len(trial.marker)} seen throughout"
+
+
+def _shapes(trial: Trial, bodies: Sequence[Body]) -> Iterator[str]:
+    """How well the markers of each body keep their places on it."""
+    for body in bodies:
+        try:
+            d = shape_change(body, trial).x
+        except NotEnoughData:
+            continue
+        if d.size:
+            yield f"{body.name}: markers move against each other by {1e3 * per_coordinate(d):.2g} mm a coordinate"
 
 
 def _plates(trial: Trial) -> Iterator[str]:

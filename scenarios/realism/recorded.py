@@ -3,11 +3,17 @@
 Both in frame 0 (`calibration.suspension_rest`), about its origin. The wrench is low-passed at 20 Hz, since what slips
 slips in peaks, the displacement at 10 Hz. At rest a robot pulls the floor neither sideways nor about the vertical: what
 a plate reads there of these is its offset.
+
+Markers do not keep their shape (`calibration.shape_change`). What of it is a motion of the body cannot be seen; it is
+drawn as large as what can, d(t), at the same times, in directions of its own (`Recorded.shifting`):
+
+    e(t) = G d(t) / sqrt(3 m - 6)      G (3 m, 3 m) ~ N(0, 1):  each coordinate's variance is |d|^2 / (3 m - 6)
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from calibration.bodies import body_poses
 from calibration.clock import Clock
@@ -16,6 +22,7 @@ from calibration.errors import NotEnoughData
 from calibration.markers import base_body
 from calibration.recording import Trial
 from calibration.schema import Description
+from calibration.shape_change import free, shape_change
 from calibration.signals import Signal, low_passed
 from calibration.suspension_rest import Rest, rest_of
 from calibration.suspension_sway import sway_of
@@ -41,6 +48,7 @@ class Recorded:
         x: (n, 6) displacement since rest [m, rad, frame 0].
         markers: (m, 3) of the base [m].
         frame: Frame 0.
+        change: (n, 3 m) of the markers' shape since rest [m, body].
     """
 
     trial_id: str
@@ -50,11 +58,27 @@ class Recorded:
     x: np.ndarray
     markers: np.ndarray
     frame: Rest
+    change: np.ndarray
 
-    def seen(self, x: np.ndarray, noise: float, rng: np.random.Generator) -> np.ndarray:
-        """What motion capture would make (n, 6) of a displacement (n, 6), white noise [m] on each marker."""
+    def shifting(self, rng: np.random.Generator) -> np.ndarray:
+        """Errors of markers (n, m, 3) [m, body] as large as their shape changes, when it does, in other directions."""
+        G = rng.normal(size=2 * (self.markers.size,)) / np.sqrt(free(len(self.markers)))
+        return (self.change @ G.T).reshape(-1, *self.markers.shape)
+
+    def seen(
+        self, x: np.ndarray, noise: float, rng: np.random.Generator, shift: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """What motion capture would make (n, 6) of a displacement (n, 6).
+
+        Args:
+            x: (n, 6) displacement [m, rad, frame 0].
+            noise: White, on each marker [m].
+            rng: Of the noise.
+            shift: (n, m, 3) of the markers [m, body].
+        """
         T = self.frame.poses(x)
-        positions = np.einsum("nij,mj->nmi", T[:, :3, :3], self.markers) + T[:, None, :3, 3]
+        places = np.broadcast_to(self.markers + shift, (len(x), *self.markers.shape))
+        positions = np.einsum("nij,nmj->nmi", T[:, :3, :3], places) + T[:, None, :3, 3]
         positions += noise * rng.normal(size=positions.shape)
         return referred(smooth(self.t, self.frame.displacement(body_poses(self.markers, positions).T)))
 
@@ -86,7 +110,8 @@ def _trial(description: Description, trial: Trial) -> Recorded:
     same = Clock("plate", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
     rest = rest_of(description, trial, np.eye(4))
     sway = sway_of(description, trial, rest, plate_load(trial, same, rest.T_lab_0, _WRENCH))
-    markers = np.array([m.xyz for m in base_body(description).markers])
-    forcing = sway.forcing
-    t = forcing.t - forcing.t[0]
-    return Recorded(trial.id, t, _LEVEL * forcing.rest, forcing.w, referred(sway.x), markers, rest)
+    body, forcing = base_body(description), sway.forcing
+    shape = shape_change(body, trial)
+    change = referred(CubicSpline(shape.t, shape.x)(forcing.t))
+    markers, t = np.array([m.xyz for m in body.markers]), forcing.t - forcing.t[0]
+    return Recorded(trial.id, t, _LEVEL * forcing.rest, forcing.w, referred(sway.x), markers, rest, change)

@@ -25,23 +25,26 @@ BAND = (0.05, 0.95)
 
 @dataclass(frozen=True)
 class Condition:
-    """What of the base is not as drawn.
+    """What is not as drawn.
 
     Attributes:
-        grip: Factor on the friction of the floor.
+        shifting: Markers shift by as much as the recording's are seen to (`Recorded.shifting`).
         turning: Casters turn (`turning`), each wheel is drawn on its own, the floor holds.
     """
 
-    grip: float = 1.0
+    shifting: bool = False
     turning: bool = False
 
     @property
     def name(self) -> str:
         """In words."""
-        return "casters turn" if self.turning else f"friction x {self.grip:g}"
+        said = ["markers shift"] * self.shifting + ["casters turn"] * self.turning
+        return ", ".join(said) or "as drawn"
 
 
 AS_DRAWN = Condition()
+CAUSES = (Condition(shifting=True), Condition(shifting=True, turning=True))
+"""What differences from the one public log are put down to, one after the other."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ def turning(base: Base, weight: float) -> Base:
 def floor_of(config: TwinConfig, seed: int, condition: Condition, weight: float) -> tuple[Defect, ...]:
     """The wheels of one drawn robot under a condition, each drawn on its own where they turn."""
     if not condition.turning:
-        base = gripping(drawn(config, seed).base, condition.grip)
+        base = drawn(config, seed).base
         return ground(base, wheels_of(base))
     apart = (turning(drawn(config.base, seed, "wheel", str(k)), weight) for k in range(6))
     return tuple(wheels_of(base)[k] for k, base in enumerate(apart))
@@ -111,4 +114,5 @@ def replayed(config: TwinConfig, seed: int, trial: Recorded, condition: Conditio
     felt = (trial.w - plate.drift * trial.t[:, None]) @ np.linalg.inv(plate.gain).T
     floor = floor_of(config, seed, condition, -float(trial.rest[2]))
     x = replay(carriage_on(floor, robot.timestep), Pull(trial.t, trial.rest + felt))
-    return trial.seen(x, robot.instruments.marker_noise, generator(seed, "seen", trial.trial_id))
+    shift = trial.shifting(generator(seed, "shift", trial.trial_id)) if condition.shifting else 0.0
+    return trial.seen(x, robot.instruments.marker_noise, generator(seed, "seen", trial.trial_id), shift)

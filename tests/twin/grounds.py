@@ -12,4 +12,4 @@ GROUNDS = {
         "twin.base.caster_back.turning_force=7.3",
     ],
 }
-"""`turning`: the default's friction times a sixth of 730 N, on a floor that holds, as `reality --turning` makes it."""
+"""`turning`: the default's friction times a sixth of 730 N, on a floor that holds, as `reality --causes` makes it."""
