@@ -23,6 +23,7 @@ from scenarios.plots.style import drawing, figure
 from scenarios.recorded import Looked, difference, looked_at, pressure_of
 
 _WIDTH, _HEIGHT, _DPI = 11.0, 10.5, 110  # [inch], [1/inch]
+_BELOW_TITLE, _LINE = 0.942, 0.013  # where lines begin, height of one, of the page's height
 _JOINTS = 4  # panels of encoders in a row
 _LINEAR = 10.0  # [mm] below which distances are drawn to a linear scale: a base moves by millimetres, a hand by metres
 _AXES = ("x", "y", "z")
@@ -57,12 +58,13 @@ def look(dataset: Path, out: Path, trials: Sequence[str] = ()) -> tuple[Looked, 
 
 def page(dataset: Dataset, one: Looked) -> Figure:
     """The picture of one trial."""
-    drawn, trial = figure(_WIDTH, _HEIGHT), one.trial
-    parts = drawn.add_gridspec(2, 1, height_ratios=(1.85, 1.0), left=0.06, right=0.955, top=0.89, bottom=0.05)
+    drawn, trial, said = figure(_WIDTH, _HEIGHT), one.trial, _in_columns(one.said)
+    top = _BELOW_TITLE - _LINE * len(said)
+    parts = drawn.add_gridspec(2, 1, height_ratios=(1.85, 1.0), left=0.06, right=0.955, top=top, bottom=0.05)
     grid = parts[0].subgridspec(3, 2, width_ratios=(1.0, 1.35), hspace=0.5, wspace=0.2)
     title = f"{one.entry.id}: {one.entry.role}, {one.entry.kind}"
     drawn.text(0.06, 0.985, title, fontsize=11.0, fontweight="bold", va="top")
-    drawn.text(0.06, 0.963, "\n".join(_in_columns(one.said)), fontsize=7.0, va="top", linespacing=1.35)
+    drawn.text(0.06, 0.963, "\n".join(said), fontsize=7.0, va="top", linespacing=1.35)
     _from_above(dataset.description.plates, trial, drawn.add_subplot(grid[0, 0]))
     _motion(trial, drawn.add_subplot(grid[0, 1]))
     _sight(trial, drawn.add_subplot(grid[1, 1]))

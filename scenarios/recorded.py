@@ -102,13 +102,16 @@ def _markers(trial: Trial | PostureMeans) -> Iterator[str]:
 
 def _shapes(trial: Trial, bodies: Sequence[Body]) -> Iterator[str]:
     """How well the markers of each body keep their places on it."""
+    found = []
     for body in bodies:
         try:
             d = shape_change(body, trial).x
         except NotEnoughData:
             continue
         if d.size:
-            yield f"{body.name}: markers move against each other by {1e3 * per_coordinate(d):.2g} mm a coordinate"
+            found.append(f"{body.name} {1e3 * per_coordinate(d):.2g}")
+    if found:
+        yield f"markers move against each other, mm a coordinate: {', '.join(found)}"
 
 
 def _plates(trial: Trial) -> Iterator[str]:

@@ -63,6 +63,17 @@ def test_a_picture_a_trial_and_what_it_holds_in_words(folder, tmp_path, capsys):
         assert words in said
 
 
+def test_a_marker_that_moves_on_its_body_is_told(tmp_path):
+    trial = matched.record(matched.defects(2), matched.sweep(3, seconds=3.0), 12.0, np.random.default_rng(2))
+    position = trial.marker_position.copy()
+    position[200:, trial.marker_body.index("base")] += [2e-3, 0.0, 0.0]
+    trial = replace(trial, marker_position=position)
+    dataset = load(matched.write(tmp_path / "dataset", [("sweep", "calibration", "sweep", trial)]))
+    (said,) = (line for line in looked_at(dataset, dataset.description.trials[0]).said if "each other" in line)
+    moved = dict(part.split() for part in said.split(": ")[1].split(", "))
+    assert float(moved["base"]) > 0.3 and float(moved["gripper"]) < 0.1
+
+
 def test_gaps_are_drawn_where_the_marker_was_hidden(panels, one):
     ax, t = panels["markers and gaps"], one.trial.t_mocap - one.trial.t_mocap[0]
     lost = [line for line in ax.lines if to_hex(line.get_color()) == MISSED]

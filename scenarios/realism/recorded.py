@@ -113,5 +113,6 @@ def _trial(description: Description, trial: Trial) -> Recorded:
     body, forcing = base_body(description), sway.forcing
     shape = shape_change(body, trial)
     change = referred(CubicSpline(shape.t, shape.x)(forcing.t))
-    markers, t = np.array([m.xyz for m in body.markers]), forcing.t - forcing.t[0]
+    markers = np.array([m.xyz for m in body.markers if m.name in trial.marker])
+    t = forcing.t - forcing.t[0]
     return Recorded(trial.id, t, _LEVEL * forcing.rest, forcing.w, referred(sway.x), markers, rest, change)
