@@ -29,6 +29,7 @@ from twin.defects.ground import Wheel
 from twin.defects.loads import Payload
 from twin.defects.rolling import Rolling
 from twin.draw import draw
+from twin.gravity import gravity_stiffness
 from twin.kinematic import arm_frame, carried
 from twin.laboratory import EPOCH, Laboratory
 from twin.measure import instrument_errors, is_carried, links_seen, measure, plate_centre
@@ -36,6 +37,7 @@ from twin.motions import Motion
 from twin.schedule import schedule
 from twin.session import CONFIRMATION, moved, remounted
 from twin.simulate import States, simulate
+from twin.slip import slip_loads
 from twin.stiffness import spatial_stiffness
 from twin.uncertain import drawn
 
@@ -161,7 +163,9 @@ def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> Non
         parameters += source.parameters()
     if lab.config.campaign.driving.forms:
         parameters += arm_frame(lab.twin, next(iter(lab.config.arm)))
-    derived = {"K": K, "C": C, "T_lab_base": lab.T_lab_base, "plate_centre": plate_centre(lab.twin.model)}
+    derived = {"K": K, "C": C, "K_gravity": gravity_stiffness(lab.twin, robot.wheels)}
+    derived |= {"slip_load": slip_loads(lab.twin, robot.wheels)}
+    derived |= {"T_lab_base": lab.T_lab_base, "plate_centre": plate_centre(lab.twin.model)}
     derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}
     if later is not None:
         parameters += session.parameters(later.robot)

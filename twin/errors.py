@@ -20,7 +20,7 @@ class Diverged(TwinError):
 
     Attributes:
         trial: The trial concerned.
-        time: When it happened [s from the start of the simulation].
+        time: When it happened [s from the first set-point; negative while the robot settles].
         joint: The first joint whose state is not finite.
     """
 

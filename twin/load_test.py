@@ -33,12 +33,13 @@ _HEAVIER = 1.5  # share of gravity at which the load test is repeated; less migh
 _INERTIA, _DAMPING = 1e5, 1e7  # of joints that are held [kg.m2, N.m.s/rad]
 _RIGID = np.array([2e-8] * 3 + [1e-6] * 3)  # compliance that counts as none [m/N, rad/(N.m)]
 _RELEASES, _LATE = 4, 200  # releases until rest, at most; samples that tell rest
-_UNEVEN = 0.01  # share by which a deflection may differ from its opposite
+_UNEVEN = 0.01  # share by which a deflection may differ from its opposite, or from what it was a little earlier
+_LATER = 0.1  # [s]
 _AT_REST = 1e-3  # share of a deflection that may be left after a release
 
 
 class Restless(TwinError):
-    """A base that does not come to rest, or slips, under a test load."""
+    """A base that does not come to rest, slips, or does not move, under a test load."""
 
 
 class Stiffness(NamedTuple):
@@ -70,10 +71,11 @@ class Bench:
     rest: np.ndarray
 
     def run(self, model: mujoco.MjModel, state: np.ndarray, wrench: np.ndarray, duration: float) -> np.ndarray:
-        """States (n, ns) after each step under a constant wrench (6,) on the base, lab axes, about its origin."""
+        """States (n, ns) after each step under a constant wrench (6,) on the base, its axes at rest, at its origin."""
         force, base = np.zeros((model.nbody, 6)), model.body(ROOT)
-        force[base.id] = wrench
-        force[base.id, 3:] -= np.cross(base.ipos, wrench[:3])  # MuJoCo pulls at the centre of mass
+        pull, turn = wrench.reshape(2, 3) - [np.zeros(3), np.cross(base.ipos, wrench[:3])]  # at the centre of mass
+        (T_lab_rest,) = base_poses(model, self.rest[None, 1 : 1 + model.nq])
+        force[base.id] = np.concatenate([T_lab_rest[:3, :3] @ pull, T_lab_rest[:3, :3] @ turn])
         control = np.concatenate([np.zeros(model.nu), self.hold, force.ravel()])
         kinds = (
             mujoco.mjtState.mjSTATE_CTRL,
@@ -150,14 +152,16 @@ def compliance(b: Bench) -> np.ndarray:
     Raises:
         Restless: A wheel slips under a load.
     """
-    loaded = [[b.run(b.model, b.rest, s * w, _LOAD)[-1] for w in _WRENCHES] for s in (1.0, -1.0)]
-    up, down = (b.displacement(np.array(states)) for states in loaded)
+    late = round(_LATER / b.model.opt.timestep)
+    loaded = [[b.run(b.model, b.rest, s * w, _LOAD)[[-1 - late, -1]] for w in _WRENCHES] for s in (1.0, -1.0)]
+    before, (up, down) = ([b.displacement(np.array(states)[:, k]) for states in loaded] for k in (0, 1))
     S = np.linalg.solve(_WRENCHES, (up - down) / 2.0).T
     for j in HELD:
-        uneven = abs((up + down)[j, j] / (up - down)[j, j])
-        if S[j, j] > _RIGID[j] and uneven > _UNEVEN:
-            w = _WRENCHES[j]
-            raise Restless(f"a wheel slips under {w[:3]} N, {w[3:]} N.m: opposite loads differ by {uneven:.1%}")
+        w, whole = _WRENCHES[j], (up - down)[j, j]
+        uneven, moves = abs((up + down)[j, j] / whole), abs(1.0 - (before[0] - before[1])[j, j] / whole)
+        if S[j, j] > _RIGID[j] and max(uneven, moves) > _UNEVEN:
+            how = f"opposite loads differ by {uneven:.1%}, {moves:.1%} are of the last {_LATER:g} s"
+            raise Restless(f"a wheel slips or lifts under {w[:3]} N, {w[3:]} N.m: {how}")
     return np.asarray(S)
 
 
@@ -182,8 +186,21 @@ def bench(twin: Twin, gravity: float = 1.0) -> Bench:
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     start = np.empty(mujoco.mj_stateSize(model, kind))
     mujoco.mj_getState(model, data, start, kind)
+    _check_guides(model)
     states = Bench(model, bare, hold, start).run(model, start, np.zeros(6), _SETTLE)
+    if not np.isfinite(states[-1]).all():
+        raise Restless("the base does not come to rest on the bench: its state is not a number any more")
     return Bench(model, bare, hold, states[-1])
+
+
+def _check_guides(model: mujoco.MjModel) -> None:
+    """A spring beside Coulomb's friction does not move under a small load: what is felt then is not the spring."""
+    sprung = model.jnt_stiffness[model.dof_jntid] > 0.0
+    for d in np.flatnonzero(sprung & (model.dof_frictionloss > 0.0)):
+        name, rubs = model.joint(model.dof_jntid[d]).name, model.dof_frictionloss[d]
+        raise Restless(
+            f"the guide {name!r} rubs with {rubs:.3g} N, a test load does not move it: test with guide_friction 0"
+        )
 
 
 def _upper_joints(model: mujoco.MjModel) -> np.ndarray:

@@ -32,11 +32,15 @@ def spatial_stiffness(wheels: Sequence[Wheel]) -> tuple[np.ndarray, np.ndarray]:
 
 def lever(wheel: Wheel) -> np.ndarray:
     """A (6, 6): displacement and rotation of the base at the wheel's point."""
-    tilts = wheel.bushing is None or not np.any(wheel.bushing.torsion[:2])
-    x, y, z = wheel.contact if tilts else wheel.centre
+    x, y, z = wheel.contact if tilts(wheel) else wheel.centre
     A = np.eye(6)
     A[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return A
+
+
+def tilts(wheel: Wheel) -> bool:
+    """Whether the wheel tilts with the base; one whose bushing twists stands."""
+    return wheel.bushing is None or not np.any(wheel.bushing.torsion[:2])
 
 
 def springs(wheel: Wheel) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ from twin import build, load_test, release_test
 from twin.defects.bushing import RunsAhead
 from twin.defects.contact import TurnsLate
 from twin.draw import draw
+from twin.gravity import gravity_stiffness
 from twin.load_test import Restless
 from twin.stiffness import spatial_stiffness
 
@@ -58,11 +59,10 @@ def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
     found = load_test(twin)
     assert error(found.K, K) < 1e-3
     assert error(release_test(twin), C) < 0.05
-    data = mujoco.MjData(twin.model)
-    mujoco.mj_forward(twin.model, data)
-    base = twin.model.body("base_footprint").id
-    weight, centre = 9.81 * twin.model.body_subtreemass[base], data.subtree_com[base] - data.xpos[base]
-    np.testing.assert_allclose(np.diag(found.K_gravity)[3:5], -weight * centre[2], rtol=0.2)  # loads turn with the base
+    gravity = gravity_stiffness(twin, wheels)
+    q = np.sqrt(np.diag(K))
+    assert np.abs((found.K_gravity - gravity) / np.outer(q, q)).max() < 1e-3
+    np.testing.assert_allclose(np.diag(found.K_gravity)[3:5], np.diag(gravity)[3:5], rtol=0.01)
 
 
 def random_base(seed):
@@ -101,7 +101,7 @@ def test_the_springs_and_dampers_of_random_bases_whose_casters_turn_are_found(no
 
 def test_a_wheel_that_slips_under_the_test_is_told(nominal):
     twin, _ = standing(nominal, "twin.base.caster_back.friction=0.005")
-    with pytest.raises(Restless, match="a wheel slips under"):
+    with pytest.raises(Restless, match="a wheel slips or lifts under"):
         load_test(twin)
 
 
@@ -148,6 +148,35 @@ def test_soft_contacts_alone_carry_heave_and_tilt(nominal, stiffness):
     assert error(load_test(twin).K, K) < 0.01
     if stiffness == 8e5:
         np.testing.assert_allclose(np.diag(release_test(twin))[2:5], np.diag(C)[2:5], rtol=0.05)
+
+
+def test_weight_takes_its_height_off_the_tilt_stiffness_of_an_anchored_base(nominal):
+    """m g h, as any inverted pendulum."""
+    twin, wheels = standing(nominal, *GROUNDS["anchored"])
+    data = mujoco.MjData(twin.model)
+    mujoco.mj_forward(twin.model, data)
+    base = twin.model.body("base_footprint").id
+    h = data.subtree_com[base, 2] - data.xpos[base, 2]
+    expected = -9.81 * twin.model.body_subtreemass[base] * h
+    np.testing.assert_allclose(np.diag(gravity_stiffness(twin, wheels))[3:5], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("setting, words", [
+    ("twin.base.caster_front.guide_friction=3.3", "the guide 'caster_front_right.z' rubs with 3.3 N"),
+    ("twin.base.drive.friction=0.0", r"a wheel slips or lifts under .* 11.5% are of the last 0.1 s"),
+])  # fmt: skip
+def test_a_base_that_a_small_load_does_not_tell_is_refused(nominal, setting, words):
+    others = [f"twin.base.{w}.friction=0.0" for w in ("caster_front", "caster_back")] * setting.endswith("=0.0")
+    twin, _ = standing(nominal, setting, *others)
+    with pytest.raises(Restless, match=words):
+        load_test(twin)
+
+
+def test_numbers_that_run_away_on_the_bench_are_told(nominal):
+    twin, _ = standing(nominal)
+    twin.model.body_mass[twin.model.body("torso_lift_link").id] = np.nan
+    with pytest.raises(Restless, match="not a number"):
+        load_test(twin)
 
 
 def test_the_bare_nominal_robot_can_be_tested():

@@ -71,4 +71,6 @@ def test_a_campaign_with_two_sessions_tells_their_truths_apart(config, tmp_path,
     for name in ("encoder.arm_1_joint.motor.offset", "frame.tool.hand.x", "marker.base1.z"):
         assert truth[name] != truth[f"confirmation.{name}"]
     assert not any(name.startswith("confirmation.geometry") for name in truth)
-    assert "confirmation.T_lab_base" in content["derived"]
+    derived = content["derived"]
+    assert "confirmation.T_lab_base" in derived and np.shape(derived["K_gravity"]) == (6, 6)
+    assert derived["K_gravity"][3][3] < 0.0 < min(derived["slip_load"])
