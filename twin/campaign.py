@@ -130,9 +130,8 @@ def _one(lab: Laboratory, motion: Motion, start: float, out: Path, watch: Watch)
 
 def _states(lab: Laboratory, motion: Motion, time: float) -> States:
     """What the motion does at `time` [s] of the campaign."""
-    if is_carried(lab, motion):
-        return carried(lab.twin, motion, lab.T_lab_base)
-    return simulate(_in_trial(lab, motion, time), motion, lab.T_lab_base)
+    move = carried if is_carried(lab, motion) else simulate
+    return move(_in_trial(lab, motion, time), motion, lab.T_lab_base)
 
 
 def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
@@ -141,7 +140,7 @@ def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
     def now(defect: Defect) -> Defect:
         if isinstance(defect, Payload) and motion.payload is not None:
             return replace(defect, mass=motion.payload)
-        if isinstance(defect, Wheel) and motion.base is not None:
+        if isinstance(defect, Wheel) and motion.base is not None and not is_carried(lab, motion):
             return Rolling(defect)
         return replace(defect, time=time) if isinstance(defect, Warming) else defect
 

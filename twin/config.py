@@ -6,12 +6,12 @@ any value that is given as a distribution (`twin.uncertain`).
 """
 
 from dataclasses import field
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from twin.config_arm import FRICTION_HELD, ArmJoint, FrictionHeld, LinkEncoders, MotorEncoders, Torso
+from twin.config_arm import FRICTION_HELD, Arm, LinkEncoders, MotorEncoders, SomeHeld, Torso
 from twin.config_base import Base
 from twin.config_datasheet import Datasheet
 from twin.config_departures import Departures
@@ -19,6 +19,7 @@ from twin.config_driving import Driving
 from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, PlatePlace, WristSensor
 from twin.config_session import Session
 from twin.config_values import (
+    BY_NAME,
     STRICT,
     Count,
     FixedNonNegative,
@@ -29,12 +30,14 @@ from twin.config_values import (
     Positive,
     Value,
     Vector3,
+    in_order,
 )
 from twin.uncertain import DRAWN
 
 ArmLink = Literal[
     "arm_1_link", "arm_2_link", "arm_3_link", "arm_4_link", "arm_5_link", "arm_6_link", "arm_7_link"
 ]  # fmt: skip
+BodyName = Literal["base", "shoulder", "gripper"]
 TrialName = Literal[
     "postures", "sweeps", "around_x", "around_y", "around_z", "x_fold", "y_fold",
     "xyz", "xyz_mirror", "push", "postures_validation",
@@ -97,7 +100,7 @@ class MarkerBody:
     """
 
     link: str
-    markers: dict[str, Vector3]
+    markers: Annotated[dict[str, Vector3], BY_NAME]
     translation: NonNegative
     rotation: NonNegative
     marker: NonNegative
@@ -136,7 +139,7 @@ class Instruments:
         wrist: The force-torque sensor of the wrist; null: none.
     """
 
-    bodies: dict[Literal["base", "shoulder", "gripper"], MarkerBody]
+    bodies: Annotated[dict[BodyName, MarkerBody], in_order(get_args(BodyName))]
     mocap_rate: FixedPositive
     marker_noise: Positive
     plate_rate: FixedPositive
@@ -224,7 +227,7 @@ class TwinConfig:
         session: What changes until the confirmation.
     """
 
-    arm: dict[str, ArmJoint]
+    arm: Arm
     torso: Torso
     base: Base
     payload: Load
@@ -234,7 +237,7 @@ class TwinConfig:
     datasheet: Datasheet
     timestep: Annotated[float, Field(gt=0.0, le=0.002)] = field(default=0.001)
     gear_form: Literal["dead_zone", "friction_held"] = "dead_zone"
-    friction_held: dict[str, FrictionHeld] = field(default_factory=lambda: dict(FRICTION_HELD))
+    friction_held: SomeHeld = field(default_factory=lambda: dict(FRICTION_HELD))
     coupled_wrist: bool = False
     departures: Departures = field(default_factory=Departures)
     session: Session = field(default_factory=Session)

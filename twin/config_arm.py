@@ -2,11 +2,14 @@
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 from pydantic.dataclasses import dataclass
 
-from twin.config_values import STRICT, Angle, NonNegative, Positive
+from twin.config_values import STRICT, Angle, NonNegative, Positive, in_order
 from twin.uncertain import DRAWN
+
+ARM = tuple(f"arm_{i}_joint" for i in range(1, 8))
+ArmName = Annotated[str, Field(pattern=r"^arm_[1-7]_joint$")]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -38,6 +41,16 @@ class ArmJoint:
     torque_per_ampere: Positive
 
 
+def _whole(arm: dict[ArmName, ArmJoint]) -> dict[ArmName, ArmJoint]:
+    if missing := [name for name in ARM if name not in arm]:
+        raise ValueError(f"an arm has seven joints, arm_1_joint to arm_7_joint; there is no {', '.join(missing)}")
+    return arm
+
+
+Arm = Annotated[dict[ArmName, ArmJoint], AfterValidator(_whole), in_order(ARM)]
+"""Every joint of the arm, base to tip."""
+
+
 @dataclass(frozen=True, config=STRICT)
 class FrictionHeld:
     """What the form `friction_held` adds to a joint's gear; see `twin.defects.hysteresis`.
@@ -53,7 +66,10 @@ class FrictionHeld:
     stiffness: Positive
 
 
-FRICTION_HELD = {
+SomeHeld = Annotated[dict[ArmName, FrictionHeld], in_order(ARM)]
+"""Some joints of the arm, base to tip."""
+
+FRICTION_HELD: dict[ArmName, FrictionHeld] = {
     **{f"arm_{i}_joint": FrictionHeld(holding=0.4, slip=3.0, stiffness=9000.0) for i in (1, 2)},
     **{f"arm_{i}_joint": FrictionHeld(holding=0.5, slip=2.0, stiffness=6000.0) for i in (3, 4)},
     **{f"arm_{i}_joint": FrictionHeld(holding=3.0, slip=0.4, stiffness=1000.0) for i in (5, 6)},

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from twin.config_values import STRICT, FixedNonNegative, NonNegative, Positive, Twist, Value
+from twin.config_values import BY_NAME, STRICT, FixedNonNegative, NonNegative, Positive, Twist, Value
 from twin.uncertain import DRAWN
 
 Tilt = Annotated[float, Field(ge=-0.05, le=0.05), DRAWN]
@@ -56,8 +56,8 @@ class Departures:
         loosened: By marker.
     """
 
-    bending: dict[str, Bending] = field(default_factory=dict)
-    warming: dict[str, Warming] = field(default_factory=dict)
+    bending: Annotated[dict[str, Bending], BY_NAME] = field(default_factory=dict)
+    warming: Annotated[dict[str, Warming], BY_NAME] = field(default_factory=dict)
     floor_tilt: tuple[Tilt, Tilt] = (0.0, 0.0)
-    cables: dict[str, Cable] = field(default_factory=dict)
-    loosened: dict[str, Loosened] = field(default_factory=dict)
+    cables: Annotated[dict[str, Cable], BY_NAME] = field(default_factory=dict)
+    loosened: Annotated[dict[str, Loosened], BY_NAME] = field(default_factory=dict)

@@ -4,7 +4,8 @@ What describes the robot or its instruments may be uncertain (`twin.uncertain`);
 campaign and the datasheet, is `Fixed`.
 """
 
-from typing import Annotated, Literal
+from collections.abc import Iterable
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo
 
@@ -24,6 +25,22 @@ Twist = tuple[Value, Value, Value, Value, Value, Value]
 GivenPosture = tuple[float, float, float, float, float, float, float, float]
 Side = Literal[-1, 0, 1]
 GivenApproach = tuple[Side, Side, Side, Side, Side, Side, Side, Side]
+
+T = TypeVar("T")
+
+
+def in_order(names: Iterable[str]) -> AfterValidator:
+    """Put a mapping's entries into this order of their names, so that no order of a file matters."""
+    order = {name: k for k, name in enumerate(names)}
+    return AfterValidator(lambda values: dict(sorted(values.items(), key=lambda entry: order[entry[0]])))
+
+
+def _by_name(values: dict[str, T]) -> dict[str, T]:
+    return dict(sorted(values.items()))
+
+
+BY_NAME = AfterValidator(_by_name)
+"""As `in_order`, of names that are not known beforehand."""
 
 
 def _one_each(approaches: tuple[GivenApproach, ...], given: ValidationInfo) -> tuple[GivenApproach, ...]:

@@ -10,8 +10,9 @@ from scenarios.errors import ScenarioError
 from twin import driving, schedule
 from twin.base_path import BasePath
 from twin.campaign import _in_trial, _states, laboratory, measure  # noqa: PLC2701
+from twin.config_departures import Departures, Warming
 from twin.conventions import rotation_vector
-from twin.kinematic import carried
+from twin.kinematic import carried, in_base
 from twin.motions import RATE
 
 TRACK, RADIUS = 0.4044, 0.0985
@@ -81,6 +82,21 @@ def test_no_plate_feels_a_carried_robot(robot, moves):
     assert trial.plate == () and len(trial.t_plate) == 0
     assert len(trial.dwell_start) == 9
     np.testing.assert_allclose(np.ptp(true.base_pose[:, 1, 3]), 0.8 * abs(np.sin(robot.config.base.pose[2])), atol=1e-9)
+
+
+def test_a_carried_robot_warms_too(heins, moves):
+    xi = (5e-3, 0.0, 0.0, 10e-3, 0.0, 0.0)
+    lab = laboratory(replace(heins, departures=Departures(warming={"arm_1_joint": Warming(xi, 100.0)})), 0)
+    motion = moves["spin_kinematic"]
+    cold, warm = (_states(lab, motion, time).poses for time in (0.0, 1e5))
+    moved = [p["gripper_grasping_frame"][0, :3, 3] - p["base_footprint"][0, :3, 3] for p in (cold, warm)]
+    hand = np.linalg.solve(lab.T_lab_base, cold["gripper_grasping_frame"][0])
+    physical = [_in_trial(lab, moves["spin_wheels"], time) for time in (0.0, 1e5)]
+    expected = [in_base(twin, motion.command[:1], ("gripper_grasping_frame",))[0, 0] for twin in physical]
+    np.testing.assert_allclose(hand, expected[0], atol=1e-12)
+    shift = lab.T_lab_base[:3, :3] @ (expected[1] - expected[0])[:3, 3]
+    np.testing.assert_allclose(moved[1] - moved[0], shift, atol=1e-12)
+    assert np.linalg.norm(shift) > 4e-3
 
 
 @pytest.fixture(scope="module")

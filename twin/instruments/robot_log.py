@@ -39,7 +39,7 @@ def measured(
     def sampled(values: np.ndarray) -> np.ndarray:
         return interpolate(t, states.t, values)
 
-    per_ampere = np.array([config.torso.force_per_ampere, *(j.torque_per_ampere for j in config.arm.values())])
+    per_ampere = np.array([config.torso.force_per_ampere, *(config.arm[j].torque_per_ampere for j in JOINTS[1:])])
     quantum = config.instruments.current_quantum
     return RobotLog(
         q_motor=_read(sampled(states.motor), encoders, "motor"),
