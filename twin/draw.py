@@ -107,12 +107,12 @@ def _gears(config: TwinConfig, seed: int) -> tuple[Defect, ...]:
     """Drive trains base to tip, then what friction adds to them."""
     alone = [_gear(config, seed, name) for name in config.arm]
     trains: list[Defect] = [g for g in alone if not (config.coupled_wrist and g.joint_name in WRIST)]
+    held = config.friction_held.items() if config.gear_form == "friction_held" else ()
+    frictions = [Hysteresis(name, h.stiffness, h.slip, h.holding) for name, h in held]
     if config.coupled_wrist:
         first, second = (g for g in alone if g.joint_name in WRIST)
-        trains.append(Differential((first, second)))
-    if config.gear_form == "friction_held":
-        trains += [_hysteresis(config, name) for name in config.friction_held]
-    return tuple(trains)
+        trains.append(Differential((first, second), tuple(f for f in frictions if f.joint_name in WRIST)))
+    return (*trains, *(f for f in frictions if not (config.coupled_wrist and f.joint_name in WRIST)))
 
 
 def _gear(config: TwinConfig, seed: int, name: str) -> Gear:
@@ -129,12 +129,6 @@ def _gear(config: TwinConfig, seed: int, name: str) -> Gear:
         servo_stiffness=j.servo_stiffness,
         servo_damping=_DAMPING_RATIO * float(np.sqrt(j.servo_stiffness * j.rotor_inertia)),
     )
-
-
-def _hysteresis(config: TwinConfig, name: str) -> Hysteresis:
-    """A mesh of a differential carries half of its joint's torque."""
-    h, share = config.friction_held[name], 0.5 if config.coupled_wrist and name in WRIST else 1.0
-    return Hysteresis(name, share * h.stiffness, share * h.slip, h.holding)
 
 
 def _torso_drive(config: TwinConfig) -> DirectDrive:

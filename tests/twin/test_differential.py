@@ -9,6 +9,7 @@ from tests.twin.drive_bench import bench, gear
 from twin.campaign import laboratory
 from twin.defects.differential import Differential, UnlikeMotors
 from twin.defects.gear import mesh_tendon
+from twin.defects.hysteresis import Hysteresis
 from twin.motions import JOINTS
 
 NAMES = ("pitch", "roll")
@@ -61,6 +62,32 @@ def test_play_and_compliance_of_a_joint_are_the_truths():
         assert ends[0] - ends[1] == pytest.approx(truth[f"backlash.{name}.gap"], rel=0.01)
 
 
+@pytest.mark.parametrize(
+    "frictions",
+    [
+        (Hysteresis("pitch", 500.0, 1.2, 0.0), Hysteresis("roll", 800.0, 0.4, 0.0)),
+        (Hysteresis("roll", 500.0, 0.8, 0.0),),
+    ],
+)
+def test_friction_of_a_joint_is_the_truths(frictions):
+    """A flank's lines to and fro are twice the slip apart, and begin to part with the slope of mesh and slider."""
+    pair = Differential(tuple(replace(g, damping=0.5) for g in PAIR.gears), frictions)
+    truth = {p.name: p.value for p in pair.parameters()}
+    for column, name in enumerate(NAMES):
+        torque = np.zeros((20000, 2))
+        torque[:, column] = 16.0 * np.interp(np.arange(20000), [0, 8000, 16000, 20000], [0.0, 1.0, 0.0, 0.0])
+        log = bench([pair], NAMES).run(torque=torque)
+        load, twist, t = torque[:, column], log.twist[:, column], np.arange(20000)
+        up, down = (t < 8000) & (load > 10.0), (t > 8000) & (t < 16000) & (load > 3.0) & (load < 8.0)
+        (k_up, at_up), (k_down, at_down) = (np.polyfit(twist[w], load[w], 1) for w in (up, down))
+        middle = twist[down].mean()
+        slip = 0.5 * (k_up * middle + at_up - k_down * middle - at_down)
+        assert slip == pytest.approx(truth[f"hysteresis.{name}.slip"], rel=0.02)
+        back = (t > 8020) & (load > 14.5)
+        stiffness = np.polyfit(twist[back], load[back], 1)[0] - 1.0 / truth[f"gear.{name}.compliance"]
+        assert stiffness == pytest.approx(truth[f"hysteresis.{name}.stiffness"], rel=0.02)
+
+
 def test_unlike_motors_are_refused():
     with pytest.raises(UnlikeMotors, match="pitch and roll .*rotor inertia are 50 and 40"):
         Differential((PAIR.gears[0], replace(PAIR.gears[1], rotor_inertia=40.0)))
@@ -86,4 +113,6 @@ def test_the_robots_wrist_can_be_a_differential(config):
     }
     truth = {p.name: p.value for p in lab.twin.truth}
     assert truth["backlash.arm_6_joint.gap"] == pytest.approx(0.022)
-    assert truth["hysteresis.arm_6_joint.slip"] == pytest.approx(0.2)
+    assert truth["hysteresis.arm_6_joint.slip"] == pytest.approx(0.4)
+    assert truth["hysteresis.arm_7_joint.holding"] == pytest.approx(1.0)
+    assert truth["differential.motor_1.slip"] == pytest.approx(0.2)

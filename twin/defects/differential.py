@@ -7,14 +7,21 @@ The motors are alike, so their inertia and servos are diagonal in joint coordina
 as two `Gear`s put them, and only the meshes are coupled. Torque follows from virtual work, t_a = t_1 + t_2,
 t_b = t_1 - t_2: with K_i half of what the joints' own gears have, each joint is as stiff as before. The free play of
 the pair is a diamond, |q_a + q_b| <= gap_1 / 2 and |q_a - q_b| <= gap_2 / 2, about the motors' positions.
+
+A mesh's friction (`hysteresis`) has half of its joint's spring k_i and slider s_i. While joint b bears no torque each
+mesh bears half of t_a, and joint a shows, of its own K_i, k_i, s_i,
+
+    1 / K = sum 1 / K_i / 2       s = sum (s_i / K_i) / sum 1 / K_i       K + k = 2 / sum 1 / (K_i + k_i)
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import mujoco
 
 from twin.defects.base import Defect, Parameter
 from twin.defects.gear import Gear, add_mesh, add_servo, mesh_tendon, rotor_joint, tune_mesh
+from twin.defects.hysteresis import Hysteresis
 from twin.errors import TwinError
 
 _SIGNS = (1.0, -1.0)
@@ -37,9 +44,11 @@ class Differential(Defect):
     Attributes:
         gears: What each joint's drive train would be alone. The mesh of motor i has the gap of gear i, and half of its
             stiffness and damping.
+        frictions: The same of the friction in their meshes, of the joints that have any.
     """
 
     gears: tuple[Gear, Gear]
+    frictions: tuple[Hysteresis, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that the motors are alike.
@@ -62,6 +71,8 @@ class Differential(Defect):
             wraps = {a: 1.0, b: sign, rotor_joint(a): -1.0, rotor_joint(b): -sign}
             add_mesh(spec, mesh_tendon(gear.joint_name), wraps, gear.gap)
             add_servo(spec, rotor_joint(gear.joint_name), gear.servo_stiffness, gear.servo_damping)
+        for whole in self.frictions:
+            replace(whole, stiffness=0.5 * whole.stiffness, slip=0.5 * whole.slip).apply(spec)
 
     def tune(self, model: mujoco.MjModel) -> None:
         """Give each mesh half of its gear's stiffness and damping."""
@@ -81,4 +92,21 @@ class Differential(Defect):
         for i, gear in enumerate(self.gears, 1):
             own.append(Parameter(f"differential.motor_{i}.gap", "rad", gear.gap))
             own.append(Parameter(f"differential.motor_{i}.stiffness", "N.m/rad", 0.5 * gear.stiffness))
-        return tuple(own)
+        return (*own, *self._friction_shown())
+
+    def _friction_shown(self) -> Iterator[Parameter]:
+        """Spring and slider of both joints, what holds each link, and each motor's mesh."""
+        if not self.frictions:
+            return
+        slips = {f.joint_name: f for f in self.frictions if f.slip > 0.0}
+        of = [slips.get(g.joint_name, Hysteresis(g.joint_name, 0.0, 0.0, 0.0)) for g in self.gears]
+        soft = sum(1.0 / g.stiffness for g in self.gears)
+        slip = sum(f.slip / g.stiffness for f, g in zip(of, self.gears, strict=True)) / soft
+        held = sum(1.0 / (g.stiffness + f.stiffness) for f, g in zip(of, self.gears, strict=True))
+        stiffness = 2.0 / held - 2.0 / soft
+        holding = {f.joint_name: f.holding for f in self.frictions}
+        for i, (gear, mesh) in enumerate(zip(self.gears, of, strict=True), 1):
+            joint = Hysteresis(gear.joint_name, stiffness, slip, holding.get(gear.joint_name, 0.0))
+            yield from joint.parameters()
+            yield Parameter(f"differential.motor_{i}.slip", "N.m", 0.5 * mesh.slip)
+            yield Parameter(f"differential.motor_{i}.slip_stiffness", "N.m/rad", 0.5 * mesh.stiffness)
