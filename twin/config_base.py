@@ -16,7 +16,7 @@ class WheelType:
         stiffness: Bushing kx, ky, kz [N/m].
         damping: Bushing cx, cy, cz [N.s/m].
         contact_stiffness: Normal, on the floor [N/m].
-        contact_damping: Normal, on the floor [N.s/m].
+        contact_damping: Normal, on the floor, and of slip: friction takes none away without [N.s/m].
         friction: Coefficient mu [-].
         torsion: Bushing krx, kry, krz [N.m/rad]: krz alone, or all three; 0: fixed to the base about that axis.
         torsion_damping: Bushing crx, cry, crz [N.m.s/rad].
@@ -29,7 +29,7 @@ class WheelType:
     stiffness: tuple[Positive, Positive, Positive]
     damping: tuple[NonNegative, NonNegative, NonNegative]
     contact_stiffness: Positive
-    contact_damping: NonNegative
+    contact_damping: Positive
     friction: NonNegative
     torsion: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     torsion_damping: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
@@ -45,6 +45,14 @@ class WheelType:
         if (torsion[0] > 0.0) != (torsion[1] > 0.0) or (torsion[0] > 0.0 and torsion[2] == 0.0):
             raise ValueError("torsional stiffness about z alone or about x, y and z; the others must be 0")
         return torsion
+
+    @field_validator("torsion_damping")
+    @classmethod
+    def _twisting(cls, damping: Vector3, info: ValidationInfo) -> Vector3:
+        """A wheel fixed to the base does not turn against it."""
+        if any(c > 0.0 and k == 0.0 for c, k in zip(damping, info.data.get("torsion", damping), strict=True)):
+            raise ValueError("torsional damping needs torsional stiffness about the same axis")
+        return damping
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -58,3 +58,15 @@ def test_guides_rub_along_the_vertical_and_are_in_the_truth():
 def test_wheels_without_guides_have_no_friction_in_them(ground):
     with pytest.raises(ScenarioError, match="guide_friction needs wheels: contact"):
         load("humanoids2024", [f"twin.base.wheels={ground}", "twin.base.caster_back.guide_friction=7.0"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("caster_back.contact_damping=0", "contact_damping: Input should be greater than 0"),
+        ("drive.torsion_damping=[0, 0, 1]", "needs torsional stiffness about the same axis"),
+    ],
+)
+def test_what_a_step_cannot_do_without_is_asked_for(setting, told):
+    with pytest.raises(ScenarioError, match=told):
+        load("humanoids2024", [f"twin.base.{setting}"])

@@ -8,8 +8,7 @@ import mjcf
 from scenarios import load
 from tests.twin.grounds import GROUNDS
 from twin import build, load_test, release_test
-from twin.defects.bushing import RunsAhead
-from twin.defects.contact import TurnsLate
+from twin.defects.bushing import RunsAhead, TurnsLate
 from twin.draw import draw
 from twin.gravity import gravity_stiffness
 from twin.load_test import Restless
@@ -52,7 +51,7 @@ def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
     np.testing.assert_allclose(C[2, 2], sum(series).imag / h, rtol=1e-9)
 
 
-@pytest.mark.parametrize("ground", ["contact", "anchored", "turning"])
+@pytest.mark.parametrize("ground", ["contact", "anchored", "turning", "twisting"])
 def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
     twin, wheels = standing(nominal, *GROUNDS[ground])
     K, C = spatial_stiffness(wheels)
@@ -112,7 +111,7 @@ def test_a_caster_too_light_for_its_springs_is_refused(nominal):
 
 TORSION = {
     "z": ["twin.base.drive.torsion=[0.0, 0.0, 400.0]"],
-    "xyz": [f"twin.base.{w}.torsion=[600.0, 500.0, 400.0]" for w in ("drive", "caster_front", "caster_back")],
+    "xyz": GROUNDS["twisting"],
 }
 
 
@@ -137,6 +136,13 @@ def test_a_point_contact_carries_no_torsion(nominal):
 def test_torsional_damping_that_a_light_wheel_cannot_follow_is_refused(nominal):
     with pytest.raises(TurnsLate, match="torsional damping 5 .*anchored"):
         standing(nominal, *TORSION["xyz"], "twin.base.caster_back.torsion_damping=[5.0, 5.0, 5.0]")
+
+
+def test_torsion_that_a_light_wheel_cannot_follow_is_refused(nominal):
+    with pytest.raises(
+        TurnsLate, match="torsional stiffness 1200 .*'caster_back.*at most 1.1e[+]03 N.m/rad, .*anchored"
+    ):
+        standing(nominal, "twin.base.caster_back.torsion=[0.0, 0.0, 1200.0]")
 
 
 @pytest.mark.parametrize("stiffness", [2e5, 8e5, 3e6])

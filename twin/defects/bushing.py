@@ -23,6 +23,8 @@ RUBS = (0.002, 1.0)
 """Reference of a friction that holds: MuJoCo's default, 0.02 s, lets a guide creep at half its friction."""
 
 _AHEAD = 0.5  # h k / (m b), at most
+_LATE = 0.1  # h c_r / I, at most
+_STIFF = 2.0  # h^2 k_r / I, at most; a lifted wheel runs away at 4
 _NONE = (0.0, 0.0, 0.0)
 
 
@@ -32,7 +34,17 @@ class RunsAhead(TwinError):
     def __init__(self, wheel: str, stiffness: float, limit: float) -> None:
         super().__init__(
             f"stiffness {stiffness:g} N/m in the floor's plane is more than the light wheel {wheel!r} bears at this "
-            f"time step; use at most {limit:.2g} N/m, a shorter step or anchored wheels"
+            f"time step; use at most {limit:.2g} N/m, more contact damping, a shorter step or anchored wheels"
+        )
+
+
+class TurnsLate(TwinError):
+    """A bushing's torsion that the inertia of its wheel cannot follow within a step."""
+
+    def __init__(self, wheel: str, what: str, limit: str) -> None:
+        super().__init__(
+            f"torsional {what} of {wheel!r} is more than its light wheel can turn against at this time step: "
+            f"the base would feel another; use at most {limit}, a shorter step or anchored wheels"
         )
 
 
@@ -64,8 +76,11 @@ class Bushing:
         """(6,) [N.s/m, N.m.s/rad]."""
         return np.array([*self.damping, *self.torsion_damping])
 
-    def hang(self, wheel: mujoco.MjsBody, name: str, R_wheel_base: np.ndarray, hub: np.ndarray) -> None:
-        """Add the joints to a wheel's body: its axes in base axes (3, 3), its hub (3,) in its own frame [m]."""
+    def hang(self, wheel: mujoco.MjsBody, name: str, R_wheel_base: np.ndarray, hub: np.ndarray, inertia: float) -> None:
+        """Add the joints to a wheel's body: its axes in base axes (3, 3), its hub (3,) in its own frame [m].
+
+        And what turns with the wheel where it twists, beyond its own inertia [kg.m2].
+        """
         slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
         for i, (k, c) in enumerate(zip(self.k, self.c, strict=True)):
             if i < 3 or k > 0.0:
@@ -76,9 +91,25 @@ class Bushing:
                     axis=R_wheel_base[:, i % 3],
                     stiffness=np.array([k, 0.0, 0.0]),
                     damping=np.array([c, 0.0, 0.0]),
+                    armature=inertia if i >= 3 else 0.0,
                     frictionloss=self.guide_friction if i == _Z else 0.0,
                     solref_friction=RUBS,
                 )
+
+    def check_torsion(self, model: mujoco.MjModel, name: str) -> None:
+        """The contact holds the wheel by its inertia I alone, spring and damper act on what it holds.
+
+        Raises:
+            TurnsLate: The wheel is too light for them.
+        """
+        step = model.opt.timestep
+        for i in np.flatnonzero(self.torsion):
+            inertia = float(model.dof_M0[model.joint(joint_name(name, 3 + int(i))).dofadr[0]])
+            k, c, most_k, most_c = self.torsion[i], self.torsion_damping[i], _STIFF / step**2, _LATE / step
+            if c > most_c * inertia:
+                raise TurnsLate(name, f"damping {c:g} N.m.s/rad", f"{most_c * inertia:.1g} N.m.s/rad")
+            if k > most_k * inertia:
+                raise TurnsLate(name, f"stiffness {k:g} N.m/rad", f"{most_k * inertia:.2g} N.m/rad")
 
     def tune_held(self, model: mujoco.MjModel, name: str, body_name: str, geom_name: str) -> None:
         """Give back the damping that a wheel loses in the floor's plane while friction holds it.

@@ -30,16 +30,6 @@ class Chatters(TwinError):
         )
 
 
-class TurnsLate(TwinError):
-    """A bushing's torsional damping that the inertia of its wheel cannot follow within a step."""
-
-    def __init__(self, wheel: str, damping: float, limit: float) -> None:
-        super().__init__(
-            f"torsional damping {damping:g} N.m.s/rad of {wheel!r} is more than its light wheel can turn against "
-            f"at this time step: the base would feel another; use at most {limit:.1g} or anchored wheels"
-        )
-
-
 @dataclass(frozen=True)
 class Contact:
     """A soft contact.

@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from twin.defects.base import Defect, Parameter, body
 from twin.defects.bushing import DIRECTIONS, Bushing
-from twin.defects.contact import Contact, TurnsLate
-from twin.defects.turning import let_turn
+from twin.defects.contact import Contact
+from twin.defects.turning import CASTER_INERTIA, let_turn
 
 Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
@@ -27,7 +27,6 @@ _OWN = 1e-4, 20, 1e-9
 _TWISTING = 1e-6, 20, 1e-9  # where wheels twist in their bushings, their contacts hold a moment too
 _SHARED = 1e-10, 3, 1e-6
 _SERIES = 1e-14  # tolerance against slip where a caster's friction in turning is in series with the floor's
-_LATE = 0.1  # torsional damping times step over inertia of the wheel [-]
 
 
 @dataclass(frozen=True)
@@ -59,8 +58,8 @@ class Wheel(Defect):
         wheel = self.fixed(spec)
         if self.bushing is not None:
             T_base_wheel = _pose_in_base(wheel)
-            R = T_base_wheel[:3, :3]
-            self.bushing.hang(wheel, self.name, R.T, R.T @ (np.array(self.centre) - T_base_wheel[:3, 3]))
+            R, inertia = T_base_wheel[:3, :3], CASTER_INERTIA if wheel.bodies else 0.0
+            self.bushing.hang(wheel, self.name, R.T, R.T @ (np.array(self.centre) - T_base_wheel[:3, 3]), inertia)
         if self.turning_force > 0.0:
             (hub,) = wheel.bodies
             let_turn(hub, self.name, _pose_in_base(hub)[:2, :3], self.turning_force)
@@ -77,7 +76,6 @@ class Wheel(Defect):
         if self.footing is not None:
             torsion = None if self.bushing is None else np.array(self.bushing.torsion)
             self.footing.tune(model, self.name, self.contact_geom, torsion)
-            self._check_torsion(model)
             option = model.opt
             twists = torsion is not None and torsion.any()
             solver = _SHARED if torsion is None else _TWISTING if twists else _OWN
@@ -87,15 +85,8 @@ class Wheel(Defect):
             else:
                 noslip = _SERIES if self.turning_force > 0.0 else noslip
                 option.noslip_tolerance = min(option.noslip_tolerance, noslip)  # wheels differ, the finest decides
+                self.bushing.check_torsion(model, self.name)
                 self.bushing.tune_held(model, self.name, self.body_name, self.contact_geom)
-
-    def _check_torsion(self, model: mujoco.MjModel) -> None:
-        """The contact holds the wheel by its bare inertia, the damper acts on what it holds."""
-        if self.bushing is None or not any(self.bushing.torsion_damping):
-            return
-        limit = _LATE * float(model.body(self.body_name).inertia.min()) / model.opt.timestep
-        if max(self.bushing.torsion_damping) > limit:
-            raise TurnsLate(self.name, max(self.bushing.torsion_damping), limit)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Bushing and contact, what there is of them."""
