@@ -51,7 +51,7 @@ def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
     np.testing.assert_allclose(C[2, 2], sum(series).imag / h, rtol=1e-9)
 
 
-@pytest.mark.parametrize("ground", ["contact", "anchored", "turning", "twisting"])
+@pytest.mark.parametrize("ground", ["contact", "anchored", "turning"])
 def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
     twin, wheels = standing(nominal, *GROUNDS[ground])
     K, C = spatial_stiffness(wheels)
@@ -118,9 +118,10 @@ TORSION = {
 @pytest.mark.parametrize(("axes", "ground"), [("z", "contact"), ("xyz", "contact"), ("xyz", "anchored")])
 def test_torsion_is_carried_to_the_floor(nominal, axes, ground):
     twin, wheels = standing(nominal, *TORSION[axes], f"twin.base.wheels={ground}")
-    K, _ = spatial_stiffness(wheels)
+    K, C = spatial_stiffness(wheels)
     found = load_test(twin).K
     assert error(found, K) < 1e-3
+    assert error(release_test(twin), C) < 0.05
     plain, _ = spatial_stiffness([replace(w, bushing=replace(w.bushing, torsion=(0.0, 0.0, 0.0))) for w in wheels])
     assert error(found, plain) > 0.2  # what a contact that cannot transmit it would leave
 
