@@ -8,13 +8,17 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic.errors import PydanticInvalidForJsonSchema
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.comments import CommentedMap
 
-from scenarios.override import Override
+from scenarios.override import Override, explaining
+from scenarios.place import place
 
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
 """What pydantic calls these two in models and in dataclasses."""
+
+OF_KEY = "[key]"
+"""What pydantic puts behind the key of a mapping when the key is wrong."""
 
 LONGEST_VALUE = 60
 """Characters of a found value that are shown."""
@@ -37,7 +41,7 @@ class Source:
     overrides: Sequence[Override] = ()
 
     def findings(self, error: ValidationError, adapter: TypeAdapter[Any], above: tuple[str, ...] = ()) -> list[str]:
-        """Return one line per finding, in the order of the file, those about overrides last.
+        """Return one line per finding, in the order of the file, then those about overrides in theirs.
 
         Args:
             error: What pydantic found.
@@ -49,14 +53,26 @@ class Source:
             path = _path(self.values, (*above, *detail["loc"]), detail["type"])
             known = _fields(adapter, self.values, above, path[:-1]) if detail["type"] in UNKNOWN else []
             text = ": ".join(part for part in (".".join(path), _message(detail, path, known)) if part)
-            line, column, _ = _place(self.tree, path, of_key=detail["type"] in UNKNOWN + MISSING)
-            holder = path[:-1] if detail["type"] in MISSING else path
-            *_, in_file = _place(self.tree, holder, of_key=False)
-            if any(override.explains(holder, in_file) for override in self.overrides):
-                placed.append((1, 0, 0, f"--set {text}"))
-            else:
-                placed.append((0, line, column, f"{self.file}:{line + 1}:{column + 1}: {text}"))
+            of_key = detail["type"] in UNKNOWN + MISSING or detail["loc"][-1:] == (OF_KEY,)
+            rank, line, column, where = self._where(path, path[:-1] if detail["type"] in MISSING else path, of_key)
+            placed.append((rank, line, column, f"{where}{text}"))
         return [text for *_, text in sorted(placed, key=lambda found: found[:3])]
+
+    def _where(self, path: tuple[str, ...], holder: tuple[str, ...], of_key: bool) -> tuple[int, int, int, str]:
+        """Where `path` stands: 0 for this file or the number of an override from 1, line, column, and all in words.
+
+        Args:
+            path: What is wrong.
+            holder: What had to be there for it: its mapping, when it is missing.
+            of_key: Its name is wrong, not its value.
+        """
+        *_, in_file = place(self.tree, holder, of_key=False)
+        number = explaining(self.overrides, holder, in_file)
+        if number is not None:
+            line, column, where = self.overrides[number].where(path, of_key)
+            return number + 1, line, column, where
+        line, column, _ = place(self.tree, path, of_key)
+        return 0, line, column, f"{self.file}:{line + 1}:{column + 1}: "
 
 
 def _path(values: Any, location: Sequence[str | int], kind: str) -> tuple[str, ...]:
@@ -65,29 +81,13 @@ def _path(values: Any, location: Sequence[str | int], kind: str) -> tuple[str, .
     node: Any = values
     for depth, step in enumerate(location):
         last = depth == len(location) - 1
-        if (isinstance(node, dict) and step in node) or (isinstance(node, list) and isinstance(step, int)):
+        held = range(len(node)) if isinstance(node, list) else node
+        if isinstance(node, (dict, list)) and step in held:
             path.append(str(step))
             node = node[step]  # type: ignore[index]
         elif last and kind in MISSING:
             path.append(str(step))
     return tuple(path)
-
-
-def _place(tree: CommentedMap, path: Sequence[str], of_key: bool) -> tuple[int, int, bool]:
-    """Return line and column, from 0, of the last part of `path` the file holds, and whether it holds all."""
-    node: Any = tree
-    line, column = 0, 0
-    for step in path:
-        if isinstance(node, CommentedSeq) and step.isdecimal() and int(step) < len(node):
-            line, column = node.lc.item(int(step))
-            node = node[int(step)]
-        elif isinstance(node, CommentedMap) and (key := next((k for k in node if str(k) == step), None)) is not None:
-            if key in (node.lc.data or {}):  # a merged key (`<<`) has no place of its own
-                line, column = node.lc.key(key) if of_key or node[key] is None else node.lc.value(key)
-            node = node[key]
-        else:
-            return line, column, False
-    return line, column, True
 
 
 def _message(detail: Mapping[str, Any], path: Sequence[str], known: Sequence[str]) -> str:

@@ -1,7 +1,12 @@
-"""A value given beside the file, `path.to.field=value`."""
+"""A value given beside a file, `path.to.field=value`: on the command line, or in a file that extends it."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
+
+from ruamel.yaml.comments import CommentedMap
+
+from scenarios.place import place
 
 
 @dataclass(frozen=True)
@@ -11,10 +16,14 @@ class Override:
     Attributes:
         path: Field names, and positions in lists, joined by dots.
         value: What to put there.
+        file: Name of the file it stands in; empty: it is from the command line.
+        tree: The mapping of that file it stands in, `path` its key there, with the line and column of every value.
     """
 
     path: str
     value: Any
+    file: str = ""
+    tree: CommentedMap = field(default_factory=CommentedMap, repr=False)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -43,7 +52,22 @@ class Override:
                 node = node[place]
         return None
 
-    def explains(self, path: tuple[str, ...], in_file: bool) -> bool:
-        """Whether a finding at `path` is about this override: at or under its value, or a name it brought in."""
-        above = path == self.keys[: len(path)] and not in_file
-        return above or path[: len(self.keys)] == self.keys
+    def holds(self, path: tuple[str, ...]) -> bool:
+        """Whether what stands at `path` is this value or a part of it."""
+        return path[: len(self.keys)] == self.keys
+
+    def where(self, path: Sequence[str], of_key: bool = True) -> tuple[int, int, str]:
+        """Line and column, from 0, of what is wrong at `path`, or of its name, and where that is in words."""
+        if not self.file:
+            return 0, 0, "--set "
+        line, column, _ = place(self.tree, (self.path, *path[len(self.keys) :]), of_key)
+        return line, column, f"{self.file}:{line + 1}:{column + 1}: "
+
+
+def explaining(overrides: Sequence[Override], path: tuple[str, ...], in_file: bool) -> int | None:
+    """Which override a finding at `path` is about: the last that holds it, or the first that brought its name in."""
+    holding = [k for k, override in enumerate(overrides) if override.holds(path)]
+    if holding:
+        return holding[-1]
+    under = (k for k, override in enumerate(overrides) if not in_file and path == override.keys[: len(path)])
+    return next(under, None)

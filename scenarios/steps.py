@@ -7,7 +7,6 @@ Only dataset/ crosses from the simulation to the calibration. What a step writes
 Importing this module is cheap: the engines are imported by the step that needs them.
 """
 
-import json
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -66,17 +65,11 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
 
     path = registry.find(name_or_path)  # an unknown name is told before the engines are imported
 
-    from scenarios import yaml_file
-    from scenarios.extension import Extension
+    from scenarios import extension, yaml_file
     from scenarios.schema import Scenario
 
-    beside = {"versions": dict[str, str]}
-    if not yaml_file.has_field(path, "extends"):
-        return yaml_file.read(path, Scenario, overrides, beside)
-    extension = yaml_file.read(path, Extension)
-    changed = [f"{name}={json.dumps(value)}" for name, value in extension.set.items()]
-    named = [f"{name}={json.dumps(getattr(extension, name))}" for name in ("name", "description")]
-    return yaml_file.read(registry.find(extension.extends), Scenario, [*named, *changed, *overrides], beside)
+    path, extending = extension.resolve(path)
+    return yaml_file.read(path, Scenario, [*extending, *overrides], {"versions": dict[str, str]})
 
 
 def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress: Progress = silent) -> RunResult:

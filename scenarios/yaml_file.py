@@ -24,31 +24,34 @@ from scenarios.override import Override
 T = TypeVar("T")
 
 
-def read(path: Path | str, model: type[T], overrides: Sequence[str] = (), beside: Mapping[str, Any] | None = None) -> T:
+def read(
+    path: Path | str,
+    model: type[T],
+    overrides: Sequence[str | Override] = (),
+    beside: Mapping[str, Any] | None = None,
+) -> T:
     """Read, override and validate one file.
 
     Args:
         path: A YAML file holding one mapping.
         model: A pydantic model or dataclass that forbids unknown fields.
-        overrides: `path.to.field=value`, applied before validation, in this order.
+        overrides: `path.to.field=value` from the command line, or values of another file; applied before validation,
+            in this order.
         beside: Types of further top-level keys, which are validated and then left out.
 
     Raises:
         ScenarioError: Something is wrong; every finding, one a line.
     """
     path = Path(path)
-    tree = _parse(_text(path), str(path))
-    if not isinstance(tree, CommentedMap):
-        kind = "the file is empty" if tree is None else f"the file holds {_kind(tree)}"
-        raise ScenarioError(f"{path}:1:1: {kind}; write `field: value` lines")
+    tree = mapping(path)
     values = _plain(tree, str(path))
     found, values = _split_beside(Source(str(path), tree, values), beside or {})
     adapter = TypeAdapter(model)
-    applied = [_override(text) for text in overrides]
+    applied = [given if isinstance(given, Override) else _override(given) for given in overrides]
     if applied:
         values = _complete(adapter, values)
         refused = [(override, override.apply(values)) for override in applied]
-        found += [f"--set {override.path}: {message}" for override, message in refused if message]
+        found += [f"{o.where(o.keys)[-1]}{o.path}: {message}" for o, message in refused if message]
     try:
         instance = adapter.validate_json(json.dumps(values), strict=True)
     except ValidationError as error:
@@ -58,14 +61,17 @@ def read(path: Path | str, model: type[T], overrides: Sequence[str] = (), beside
     return instance
 
 
-def has_field(path: Path | str, name: str) -> bool:
-    """Whether a file is a mapping with that field at its top.
+def mapping(path: Path) -> CommentedMap:
+    """The mapping a file holds, with the line and column of every value.
 
     Raises:
-        ScenarioError: The file cannot be read as YAML.
+        ScenarioError: The file cannot be read as YAML, or holds something else.
     """
-    tree = _parse(_text(Path(path)), str(path))
-    return isinstance(tree, CommentedMap) and name in tree
+    tree = _parse(_text(path), str(path))
+    if not isinstance(tree, CommentedMap):
+        kind = "the file is empty" if tree is None else f"the file holds {_kind(tree)}"
+        raise ScenarioError(f"{path}:1:1: {kind}; write `field: value` lines")
+    return tree
 
 
 def write(path: Path | str, instance: Any, beside: Mapping[str, Any] | None = None) -> None:

@@ -52,28 +52,6 @@ def test_an_unknown_field_is_refused_wherever_it_stands(name):
     assert {override.removesuffix("=1") for override in overrides} <= told
 
 
-@pytest.mark.parametrize(
-    "line, told",
-    [
-        ("extends: humanoids2023", "did you mean humanoids2024"),
-        ("extends: humanoids2024\nextend: 1", "extend"),
-        ("extends: humanoids2024\nset:\n  twin.campaign.pushes: 1.0", "pushes"),
-        ("extends: humanoids2024\nset:\n  twin.campaign.push: 1000.0", "less than or equal to 100"),
-    ],
-)
-def test_a_wrong_extension_is_told(tmp_path: Path, line, told):
-    text = f"name: mine\ndescription: Mine\n{line}\n" + ("" if "set:" in line else "set: {}\n")
-    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
-    with pytest.raises(ScenarioError, match=told):
-        steps.load(tmp_path / "mine.yaml")
-
-
-def test_an_extension_is_the_other_scenario_but_for_its_values():
-    other, mine = steps.load("humanoids2024"), steps.load("payload")
-    assert mine.name == "payload" and mine.twin.campaign.push == 20.0
-    assert mine.twin.arm == other.twin.arm and mine.seed == other.seed
-
-
 def test_the_script_and_its_scenario_have_one_name():
     for path in registry.HERE.glob("*.yaml"):
         assert f'load("{path.stem}")' in path.with_suffix(".py").read_text(encoding="utf-8")
