@@ -36,5 +36,22 @@ class NotStanding(TwinError):
     """A robot that tipped over or left its plate."""
 
 
+class Shaking(TwinError):
+    """A robot that does not come to rest before its trial: the solver overshoots, step for step.
+
+    Attributes:
+        trial: The trial concerned.
+        joint: What shakes most, by its kinetic energy; `root`: the base itself.
+    """
+
+    def __init__(self, trial: str, flips: tuple[float, float], joint: str) -> None:
+        self.trial, self.joint = trial, joint
+        super().__init__(
+            f"trial {trial!r}: the base shakes before the motion begins, from step to step by {flips[0]:.2g} m/s2 and "
+            f"{flips[1]:.2g} rad/s2, most of all joint {joint!r}; lower the stiffness or damping named by that "
+            "joint (root: of the wheels or their contacts) or the time step"
+        )
+
+
 class Unreachable(TwinError):
     """A motion that the robot cannot make."""

@@ -43,13 +43,21 @@ def base_poses(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     return np.asarray(transform(base.pos, base.quat) @ T_turned)
 
 
+def base_velocities(model: mujoco.MjModel, qvel: np.ndarray) -> np.ndarray:
+    """Speeds (n, 6) of the base's joints, linear then angular [m/s, rad/s], of states qvel (n, nv)."""
+    if anchored(model):
+        return np.asarray(qvel[:, [model.joint(f"root.{a}").dofadr[0] for a in AXES]])
+    start = model.joint("root").dofadr[0]
+    return np.asarray(qvel[:, start : start + 6])
+
+
 def floor_wrench(model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray, about: np.ndarray) -> np.ndarray:
     """Action of anchored wheels on the floor (n, 6), lab axes, about a point (3,) of the lab [N, N.m].
 
     The hinges' torques are the moment's components along their axes, which turn one with the other.
     """
     x = qpos[:, [model.joint(f"root.{a}").qposadr[0] for a in AXES]]
-    v = qvel[:, [model.joint(f"root.{a}").dofadr[0] for a in AXES]]
+    v = base_velocities(model, qvel)
     K, C = (_matrix(model, kind) for kind in ("spring", "damper"))
     f = x @ K.T + v @ C.T
     R_x, R_xy = Rotation.from_euler("X", x[:, 3:4]), Rotation.from_euler("XY", x[:, 3:5])

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from scenarios import load
+from tests.twin.grounds import GROUNDS
 from twin import motions, record
 from twin.campaign import laboratory
 from twin.conventions import exp6
 from twin.defects.gear import mesh_tendon
-from twin.errors import Diverged, NotStanding
+from twin.errors import Diverged, NotStanding, Shaking
 from twin.simulate import simulate
 
 
@@ -69,3 +70,30 @@ def test_a_wheel_off_the_plate_is_told(sweep, ground):
     beyond = exp6(np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])) @ lab.T_lab_base
     with pytest.raises(NotStanding, match=r"'s': (caster|wheel)_\w+ is off the plate at -2\.00 s"):
         simulate(lab.twin, sweep, beyond)
+
+
+def stands_and_sweeps(sweep, *settings):
+    lab = laboratory(load("humanoids2024", settings).quick().twin, 4)
+    simulate(lab.twin, sweep, lab.T_lab_base)
+
+
+DAMPED = [f"twin.base.{w}.damping=[150.0, 150.0, 9e4]" for w in ("drive", "caster_front", "caster_back")]
+
+
+@pytest.mark.parametrize(
+    ("settings", "joint"),
+    [
+        (DAMPED, "root"),
+        (["twin.torso.servo_stiffness=1e9"], "torso_lift_joint"),
+        (["twin.base.caster_front.damping=[0.0, 0.0, 0.0]"], r"caster_front_\w+\.z"),
+        (["twin.base.wheels=rigid", "twin.base.caster_front.friction=0.0"], "root"),
+    ],
+)
+def test_a_base_that_shakes_at_rest_is_told(sweep, settings, joint):
+    with pytest.raises(Shaking, match=rf"trial 's': the base shakes .* most of all joint '{joint}'"):
+        stands_and_sweeps(sweep, *settings)
+
+
+@pytest.mark.parametrize("ground", sorted(GROUNDS))
+def test_a_base_rests_before_its_trial(sweep, ground):
+    stands_and_sweeps(sweep, *GROUNDS[ground])
