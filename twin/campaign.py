@@ -33,6 +33,7 @@ from twin.gravity import gravity_stiffness
 from twin.kinematic import arm_frame, carried
 from twin.laboratory import EPOCH, Laboratory
 from twin.measure import instrument_errors, is_carried, links_seen, measure, plate_centre
+from twin.mesh_step import check_meshes
 from twin.motions import Motion
 from twin.schedule import schedule
 from twin.session import CONFIRMATION, moved, remounted
@@ -151,7 +152,9 @@ def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
 
 
 def _built(config: TwinConfig, defects: Sequence[Defect], links: Sequence[str]) -> Twin:
-    return build(mjcf.spec(), defects, links, config.timestep)
+    twin = build(mjcf.spec(), defects, links, config.timestep)
+    check_meshes(twin.model, config.arm)
+    return twin
 
 
 def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:
