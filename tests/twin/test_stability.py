@@ -49,7 +49,9 @@ def test_what_runs_away_is_named_with_trial_time_and_joint(lab, sweep, edit, joi
 
 
 def test_a_campaign_that_runs_away_records_nothing(tmp_path):
-    config = load("humanoids2024", ["twin.arm.arm_7_joint.stiffness=5e4", "twin.campaign.only=[xyz]"]).quick().twin
+    config = (
+        load("humanoids2024", ["twin.arm.arm_7_joint.servo_stiffness=1e9", "twin.campaign.only=[xyz]"]).quick().twin
+    )
     with pytest.raises(Diverged, match="'arm_7_joint"):
         record(config, 0, tmp_path)
     assert not [p for p in tmp_path.rglob("*") if p.is_file()]
