@@ -17,6 +17,9 @@ UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
 """What pydantic calls these two in models and in dataclasses."""
 
+UNKNOWN_NAME = "unknown_name"
+"""What `twin` calls a name that nothing of its kind has."""
+
 OF_KEY = "[key]"
 """What pydantic puts behind the key of a mapping when the key is wrong."""
 
@@ -94,12 +97,19 @@ def _message(detail: Mapping[str, Any], path: Sequence[str], known: Sequence[str
     """Say what is wrong and, for a wrong name, what is possible."""
     if detail["type"] in MISSING:
         return "missing"
+    if detail["type"] == UNKNOWN_NAME:
+        name, said = detail["input"], detail["ctx"]
+        return _unknown(f"no {said['kind']} named {name}", name, said["known"].split(", "))
     if detail["type"] in UNKNOWN:
-        close = difflib.get_close_matches(path[-1], known, n=1)
-        hint = f"; did you mean {close[0]}?" if close else ""
-        return f"unknown field{hint}" + (f" (known here: {', '.join(known)})" if known else "")
+        return _unknown("unknown field", path[-1], known)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
     return f"{message} (got {_shown(detail['input'])})"
+
+
+def _unknown(what: str, name: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    return f"{what}{hint}" + (f" (known here: {', '.join(known)})" if known else "")
 
 
 def _shown(value: Any) -> str:

@@ -1,31 +1,30 @@
-"""What a scenario says about a robot and its laboratory: magnitudes, widths, motions and instruments.
+"""What a scenario says about a robot and its laboratory: magnitudes, widths and instruments.
 
 SI units. Every field is validated here once; nothing downstream checks it again. Magnitudes of one robot are values,
 what differs between robots is drawn: placements from zero-mean normals, offsets and gaps within +-spread of theirs, and
 any value that is given as a distribution (`twin.uncertain`).
 """
 
+from collections.abc import Iterator
 from dataclasses import field
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from twin.config_arm import FRICTION_HELD, Arm, LinkEncoders, MotorEncoders, SomeHeld, Torso
 from twin.config_base import Base
+from twin.config_campaign import Campaign
 from twin.config_datasheet import Datasheet
 from twin.config_departures import Departures
-from twin.config_driving import Driving
 from twin.config_instruments import LogErrors, MocapErrors, PlateErrors, PlatePlace, WristSensor
+from twin.config_names import OF_KEY, ArmLinkName, LinkName, of_another_body, refuse, unknown
 from twin.config_session import Session
 from twin.config_values import (
     BY_NAME,
     STRICT,
-    Count,
-    FixedNonNegative,
     FixedPositive,
-    GivenApproaches,
-    GivenPosture,
     NonNegative,
     Positive,
     Value,
@@ -34,14 +33,7 @@ from twin.config_values import (
 )
 from twin.uncertain import DRAWN
 
-ArmLink = Literal[
-    "arm_1_link", "arm_2_link", "arm_3_link", "arm_4_link", "arm_5_link", "arm_6_link", "arm_7_link"
-]  # fmt: skip
 BodyName = Literal["base", "shoulder", "gripper"]
-TrialName = Literal[
-    "postures", "sweeps", "around_x", "around_y", "around_z", "x_fold", "y_fold",
-    "xyz", "xyz_mirror", "push", "postures_validation",
-]  # fmt: skip
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -84,7 +76,7 @@ class Widths:
     spread: Annotated[float, Field(ge=0.0, le=0.9), DRAWN] = 0.0
     mount_translation: NonNegative = 0.0
     mount_rotation: NonNegative = 0.0
-    makes: tuple[dict[ArmLink, Annotated[float, Field(ge=0.3, le=3.0), DRAWN]], ...] = ()
+    makes: tuple[dict[ArmLinkName, Annotated[float, Field(ge=0.3, le=3.0), DRAWN]], ...] = ()
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -99,8 +91,8 @@ class MarkerBody:
         marker: Standard deviation of each marker within its cluster, per axis [m].
     """
 
-    link: str
-    markers: Annotated[dict[str, Vector3], BY_NAME]
+    link: LinkName
+    markers: Annotated[dict[str, Vector3], Field(min_length=1), BY_NAME]
     translation: NonNegative
     rotation: NonNegative
     marker: NonNegative
@@ -158,52 +150,17 @@ class Instruments:
     plate_place: PlatePlace = field(default_factory=PlatePlace)
     wrist: WristSensor | None = field(default_factory=WristSensor)
 
-
-@dataclass(frozen=True, config=STRICT)
-class Campaign:
-    """How much is recorded.
-
-    Attributes:
-        ramp: Duration of the velocity ramp that starts and stops a motion [s].
-        rest: Rest at the start and end of each trial [s].
-        speed: Of moves between postures [rad/s].
-        dwell: Rest in each static posture [s].
-        calibration_postures: Number of.
-        validation_postures: Number of.
-        given_postures: Calibration postures [m, rad] as `tiago-twin design` chooses them, the lift first, instead of
-            `calibration_postures` drawn ones.
-        given_approaches: For each of them the sign of each joint's last motion before it rests, by way of a point
-            0.05 rad (the lift 5 mm) before it; 0: it does not matter. Empty: straight from the last.
-        sweep: Duration of each one-joint sweep [s]; 0: no sweeps.
-        calibration_swing: Duration of each calibration swing [s]; 0: none.
-        validation_swing: Duration of each validation swing [s]; 0: none.
-        pause: Between trials, on every clock [s].
-        payloads: Further masses [kg] with which the first validation swing is repeated.
-        push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
-        confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
-        driving: Trials in which the base moves.
-        carried: Whether every trial is without physics, joints and base where they are told to be.
-        only: Trials to record, `sweeps` for those of one joint; empty: all.
-    """
-
-    ramp: Annotated[float, Field(gt=0.0, le=3.0)]
-    rest: Annotated[float, Field(ge=1.0, le=10.0)]
-    speed: Annotated[float, Field(gt=0.0, le=1.76)]
-    dwell: Annotated[float, Field(ge=0.8, le=10.0)]
-    calibration_postures: Count
-    validation_postures: Count
-    sweep: FixedNonNegative
-    calibration_swing: FixedNonNegative
-    validation_swing: FixedNonNegative
-    pause: FixedNonNegative
-    payloads: tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...] = ()
-    push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    confirmation: bool = False
-    driving: Driving = field(default_factory=Driving)
-    carried: bool = False
-    only: tuple[TrialName, ...] = ()
-    given_postures: tuple[GivenPosture, ...] = ()
-    given_approaches: GivenApproaches = ()
+    def __post_init__(self) -> None:
+        """Each marker of the laboratory has a name of its own."""
+        owner: dict[str, str] = {}
+        again = [(b, m) for b, body in self.bodies.items() for m in body.markers if owner.setdefault(m, b) != b]
+        refuse(
+            "Instruments",
+            [
+                InitErrorDetails(type=of_another_body(owner[m]), loc=("bodies", b, "markers", m, OF_KEY), input=m)
+                for b, m in again
+            ],
+        )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -243,10 +200,34 @@ class TwinConfig:
     session: Session = field(default_factory=Session)
 
     def __post_init__(self) -> None:
-        """Only wheels on bushings and contacts can roll; only contacts press on one plate or another."""
-        if self.base.wheels == "anchored" and self.instruments.plate_grid != (1, 1):
-            raise ValueError(
-                "instruments.plate_grid: anchored wheels press on the floor as a whole; use contact or rigid"
+        """What one field says fits what the others say."""
+        refuse("TwinConfig", [*self._loose(), *self._unheld(), *self._ungrounded()])
+
+    def _loose(self) -> Iterator[InitErrorDetails]:
+        """Markers that hang but are not there."""
+        known = [m for body in self.instruments.bodies.values() for m in body.markers]
+        for name in self.departures.loosened:
+            if name not in known:
+                yield InitErrorDetails(
+                    type=unknown("marker", known), loc=("departures", "loosened", name, OF_KEY), input=name
+                )
+
+    def _unheld(self) -> Iterator[InitErrorDetails]:
+        """Friction that would hold nothing."""
+        if self.gear_form == "dead_zone" and self.friction_held != FRICTION_HELD:
+            error = PydanticCustomError(
+                "unused", "nothing is held where gear_form is dead_zone; set it to friction_held"
             )
-        if "wheels" in self.campaign.driving.forms and self.base.wheels != "contact":
-            raise ValueError(f"campaign.driving.forms: wheels cannot roll where base.wheels is {self.base.wheels!r}")
+            yield InitErrorDetails(type=error, loc=("friction_held",), input=self.friction_held)
+
+    def _ungrounded(self) -> Iterator[InitErrorDetails]:
+        """Only wheels on bushings and contacts can roll; only contacts press on one plate or another."""
+        grid, forms, wheels = self.instruments.plate_grid, self.campaign.driving.forms, self.base.wheels
+        if wheels == "anchored" and grid != (1, 1):
+            error = PydanticCustomError("wheels", "anchored wheels press on the floor as a whole; use contact or rigid")
+            yield InitErrorDetails(type=error, loc=("instruments", "plate_grid"), input=grid)
+        if "wheels" in forms and wheels != "contact":
+            error = PydanticCustomError(
+                "wheels", "wheels cannot roll where base.wheels is '{wheels}'", {"wheels": wheels}
+            )
+            yield InitErrorDetails(type=error, loc=("campaign", "driving", "forms"), input=forms)

@@ -5,11 +5,9 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 from pydantic.dataclasses import dataclass
 
+from twin.config_names import ARM, ArmName
 from twin.config_values import STRICT, Angle, NonNegative, Positive, in_order
 from twin.uncertain import DRAWN
-
-ARM = tuple(f"arm_{i}_joint" for i in range(1, 8))
-ArmName = Annotated[str, Field(pattern=r"^arm_[1-7]_joint$")]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from twin.config_names import ArmLinkName, ArmName, JointName
 from twin.config_values import BY_NAME, STRICT, FixedNonNegative, NonNegative, Positive, Twist, Value
 from twin.uncertain import DRAWN
 
@@ -49,15 +50,15 @@ class Departures:
     """Departures no model of the pipeline holds.
 
     Attributes:
-        bending: By link.
-        warming: By joint.
+        bending: By link of the arm; the column bends as `torso` says.
+        warming: By joint of the torso or the arm.
         floor_tilt: Rotation of the floor, and of the lab's axes with it, out of level about x and y [rad].
-        cables: By joint.
+        cables: By joint of the arm.
         loosened: By marker.
     """
 
-    bending: Annotated[dict[str, Bending], BY_NAME] = field(default_factory=dict)
-    warming: Annotated[dict[str, Warming], BY_NAME] = field(default_factory=dict)
+    bending: Annotated[dict[ArmLinkName, Bending], BY_NAME] = field(default_factory=dict)
+    warming: Annotated[dict[JointName, Warming], BY_NAME] = field(default_factory=dict)
     floor_tilt: tuple[Tilt, Tilt] = (0.0, 0.0)
-    cables: Annotated[dict[str, Cable], BY_NAME] = field(default_factory=dict)
+    cables: Annotated[dict[ArmName, Cable], BY_NAME] = field(default_factory=dict)
     loosened: Annotated[dict[str, Loosened], BY_NAME] = field(default_factory=dict)

@@ -192,6 +192,11 @@ def cluster(name: str, body: MarkerBody, seed: int, *session: str) -> Cluster:
 
 
 def _without_rigid_part(points: np.ndarray, nominal: np.ndarray) -> np.ndarray:
-    """Points (n, 3) moved onto `nominal` as one rigid body: a body's frame is where its nominal markers fit best."""
+    """Points (n, 3) moved onto `nominal` as one rigid body: a body's frame is where its nominal markers fit best.
+
+    Markers of one nominal place, or a single one, tell no rotation: these are only shifted.
+    """
     p, q = points.mean(axis=0), nominal.mean(axis=0)
+    if (nominal == nominal[0]).all():
+        return points - p + q
     return Rotation.align_vectors(nominal - q, points - p)[0].apply(points - p) + q

@@ -5,7 +5,7 @@ import numpy as np
 import mjcf
 from calibration.schema import Kind
 from twin.base_path import BasePath
-from twin.config import Campaign
+from twin.config_campaign import Campaign
 from twin.config_driving import Form
 from twin.defects.rolling import DRIVES
 from twin.motions import JOINTS, RATE, Motion, path_time

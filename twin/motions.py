@@ -13,7 +13,7 @@ import numpy as np
 
 from calibration.schema import Kind, Role
 from twin.base_path import BasePath
-from twin.config import Campaign
+from twin.config_campaign import Campaign
 
 JOINTS = ("torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8)))
 RATE = 100.0  # [Hz] of the set-points

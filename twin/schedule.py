@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.schema import Role
 from twin import driving, motions, postures
-from twin.config import Campaign
+from twin.config_campaign import Campaign
 from twin.motions import Motion
 from twin.randomness import generator
 
