@@ -30,6 +30,7 @@ from twin.defects.loads import Payload
 from twin.defects.rolling import Rolling
 from twin.draw import draw
 from twin.gravity import gravity_stiffness
+from twin.instruments.constants import constants
 from twin.kinematic import arm_frame, carried
 from twin.laboratory import EPOCH, Laboratory
 from twin.measure import instrument_errors, is_carried, links_seen, measure, plate_centre
@@ -163,6 +164,7 @@ def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> Non
     parameters: list[Parameter] = list(lab.twin.truth)
     for source in (*robot.encoders, *robot.clusters, *robot.loose, *instrument_errors(lab)):
         parameters += source.parameters()
+    parameters += constants(lab.config)
     if lab.config.campaign.driving.forms:
         parameters += arm_frame(lab.twin, next(iter(lab.config.arm)))
     derived = {"K": K, "C": C, "K_gravity": gravity_stiffness(lab.twin, robot.wheels)}

@@ -47,7 +47,9 @@ def truth_of(lab, **errors):
 
 
 def test_nothing_is_wrong_unless_it_is_named(lab):
-    assert set(truth_of(lab)) == {f"clock.{i}.{v}" for i in ("robot", "plate") for v in ("offset", "drift")}
+    clocks = {f"clock.{i}.{v}" for i in ("robot", "plate") for v in ("offset", "drift")}
+    wrist = {f"wrist.{of}_{what}" for of in ("force", "moment") for what in ("noise", "resolution")}
+    assert set(truth_of(lab)) == clocks | wrist
 
 
 def test_stamps_jitter_by_what_is_said_and_never_go_back(lab, plain, recorded):

@@ -69,13 +69,17 @@ class Contact:
         geom.friction[:] = self.friction, self.torsional_friction, self.rolling_friction
         geom.condim[0], geom.priority[0] = _condim(torsion), 1
 
-    def parameters(self, wheel: str) -> tuple[Parameter, ...]:
-        """Normal stiffness and damping, friction."""
-        return (
-            Parameter(f"contact.{wheel}.kn", "N/m", self.stiffness),
-            Parameter(f"contact.{wheel}.bn", "N.s/m", self.damping),
-            Parameter(f"contact.{wheel}.mu", "-", self.friction),
+    def parameters(self, wheel: str, torsion: np.ndarray | None) -> tuple[Parameter, ...]:
+        """Normal stiffness and damping, and the frictions that a bushing's `torsion` (3,) lets act."""
+        values = (
+            ("kn", "N/m", self.stiffness),
+            ("bn", "N.s/m", self.damping),
+            ("mu", "-", self.friction),
+            ("torsional_friction", "m", self.torsional_friction),
+            ("rolling_friction", "m", self.rolling_friction),
         )
+        acting = values[: {3: 3, 4: 4, 6: 5}[_condim(torsion)]]
+        return tuple(Parameter(f"contact.{wheel}.{name}", unit, value) for name, unit, value in acting)
 
 
 def _condim(torsion: np.ndarray | None) -> int:

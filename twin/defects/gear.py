@@ -103,13 +103,13 @@ class Gear(Defect):
 
 @dataclass(frozen=True)
 class DirectDrive(Defect):
-    """A joint whose motor is fixed to it without play: the torso's spindle.
+    """A sliding joint whose motor is fixed to it without play: the torso's spindle.
 
     Attributes:
         joint_name: The joint.
-        rotor_inertia: Reflected [kg or kg.m2].
-        servo_stiffness: Position gain [N/m or N.m/rad].
-        servo_damping: Velocity gain [N.s/m or N.m.s/rad].
+        rotor_inertia: Reflected [kg].
+        servo_stiffness: Position gain [N/m].
+        servo_damping: Velocity gain [N.s/m].
     """
 
     joint_name: str
@@ -121,6 +121,15 @@ class DirectDrive(Defect):
         """Add rotor inertia and servo."""
         joint(spec, self.joint_name).armature = self.rotor_inertia
         add_servo(spec, self.joint_name, self.servo_stiffness, self.servo_damping)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Rotor and servo."""
+        name = f"gear.{self.joint_name}"
+        return (
+            Parameter(f"{name}.rotor_inertia", "kg", self.rotor_inertia),
+            Parameter(f"{name}.servo_stiffness", "N/m", self.servo_stiffness),
+            Parameter(f"{name}.servo_damping", "N.s/m", self.servo_damping),
+        )
 
 
 def add_mesh(spec: mujoco.MjSpec, name: str, coefficients: dict[str, float], gap: float) -> None:

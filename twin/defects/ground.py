@@ -74,7 +74,7 @@ class Wheel(Defect):
     def tune(self, model: mujoco.MjModel) -> None:
         """Turn the contact's stiffness and damping into reference parameters."""
         if self.footing is not None:
-            torsion = None if self.bushing is None else np.array(self.bushing.torsion)
+            torsion = self._torsion
             self.footing.tune(model, self.name, self.contact_geom, torsion)
             option = model.opt
             twists = torsion is not None and torsion.any()
@@ -87,6 +87,10 @@ class Wheel(Defect):
                 option.noslip_tolerance = min(option.noslip_tolerance, noslip)  # wheels differ, the finest decides
                 self.bushing.check_torsion(model, self.name)
                 self.bushing.tune_held(model, self.name, self.body_name, self.contact_geom)
+
+    @property
+    def _torsion(self) -> np.ndarray | None:
+        return None if self.bushing is None else np.array(self.bushing.torsion)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Bushing and contact, what there is of them."""
@@ -105,7 +109,7 @@ class Wheel(Defect):
         if self.turning_force > 0.0:
             found.append(Parameter(f"suspension.{self.name}.turning_force", "N", self.turning_force))
         if self.footing is not None:
-            found += self.footing.parameters(self.name)
+            found += self.footing.parameters(self.name, self._torsion)
         return tuple(found)
 
 

@@ -67,11 +67,11 @@ class Payload(Defect):
         geom.contype, geom.conaffinity, geom.rgba = 0, 0, np.array([0.72, 0.53, 0.31, 1.0])
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Mass and centre of mass."""
-        centre = zip(("cx", "cy", "cz"), self.com, strict=True)
+        """Mass, centre of mass and edges."""
+        lengths = zip(("cx", "cy", "cz", "size_x", "size_y", "size_z"), (*self.com, *self.size), strict=True)
         return (
             Parameter("payload.mass", "kg", self.mass),
-            *(Parameter(f"payload.{n}", "m", float(v)) for n, v in centre),
+            *(Parameter(f"payload.{n}", "m", float(v)) for n, v in lengths),
         )
 
 

@@ -24,7 +24,7 @@ class Encoder(Defect):
         joint_name: The joint.
         side: `motor` or `link`.
         offset: Reading at true zero [rad, or m on a prismatic joint].
-        harmonics: cos1, sin1, cos2, sin2 [rad], once and twice per turn of the joint.
+        harmonics: cos1, sin1, cos2, sin2 [as the offset], once and twice per turn of the joint.
         quantum: Step of the reading [rad or m].
         prismatic: Whether the joint's position is a length.
     """
@@ -43,13 +43,11 @@ class Encoder(Defect):
         return np.round((q + self.offset + wave) / self.quantum) * self.quantum
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Offset and harmonics."""
-        prefix = f"encoder.{self.joint_name}.{self.side}"
-        waves = zip(("cos1", "sin1", "cos2", "sin2"), self.harmonics, strict=True)
-        return (
-            Parameter(f"{prefix}.offset", "rad", self.offset),
-            *(Parameter(f"{prefix}.{n}", "rad", v) for n, v in waves),
-        )
+        """Offset, harmonics and quantum."""
+        names = ("offset", "cos1", "sin1", "cos2", "sin2", "quantum")
+        values = (self.offset, *self.harmonics, self.quantum)
+        prefix, unit = f"encoder.{self.joint_name}.{self.side}", "m" if self.prismatic else "rad"
+        return tuple(Parameter(f"{prefix}.{n}", unit, v) for n, v in zip(names, values, strict=True))
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class PlateDefect(Defect):
         return float(np.sqrt(2.0) / (2.0 * np.pi * self.cutoff)) if self.cutoff else 0.0
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Gains, drift and filter, where they are not ideal."""
+        """Gains, drift, steps and filter, where they are not ideal."""
         found, name = [], f"plate.{self.name}"
         if (self.gain != np.eye(6)).any():
             units = [["-", "1/m"], ["m", "-"]]
@@ -54,6 +54,8 @@ class PlateDefect(Defect):
         if self.drift.any():
             units_of = ("N/s",) * 3 + ("N.m/s",) * 3
             found += [Parameter(f"{name}.drift_{i + 1}", units_of[i], float(r)) for i, r in enumerate(self.drift)]
+        steps = (("force", "N", self.resolution[0]), ("moment", "N.m", self.resolution[3]))
+        found += [Parameter(f"{name}.{of}_resolution", unit, float(step)) for of, unit, step in steps if step]
         if self.cutoff:
             found.append(Parameter(f"{name}.cutoff", "Hz", self.cutoff))
         return tuple(found)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from twin.config_instruments import PlatePlace
 from twin.conventions import placement, transform
-from twin.defects.base import Defect, body
+from twin.defects.base import Defect, Parameter, body
 from twin.instruments.tiles import PLATE
 
 _SLAB = "floor_"  # begins the name of a slab of floor
@@ -40,6 +40,16 @@ class Laid(Defect):
         for slab in (g for g in spec.geoms if g.name.startswith(_SLAB)):
             slab.pos, slab.quat = placement(moved @ transform(slab.pos, slab.quat))
         plate.pos, plate.quat = placement(T_new)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Where it lies, if elsewhere."""
+        if self.place == PlatePlace():
+            return ()
+        values = zip(("x", "y", "height"), (*self.place.shift, self.place.height), strict=True)
+        return (
+            *(Parameter(f"plate.place.{name}", "m", value) for name, value in values),
+            Parameter("plate.place.yaw", "rad", self.place.yaw),
+        )
 
 
 def T_lab_plate(nominal: mujoco.MjsBody, place: PlatePlace) -> np.ndarray:

@@ -30,11 +30,15 @@ class WristDefect(Defect):
     resolution: np.ndarray
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The zero, where there is one."""
-        if not self.zero.any():
-            return ()
+        """Noise, and zero and steps where there are any."""
         units = ("N",) * 3 + ("N.m",) * 3
-        return tuple(Parameter(f"wrist.zero_{k + 1}", units[k], float(z)) for k, z in enumerate(self.zero))
+        zero = [Parameter(f"wrist.zero_{k + 1}", units[k], float(z)) for k, z in enumerate(self.zero)]
+        found = zero if self.zero.any() else []
+        for of, k in (("force", 0), ("moment", 3)):
+            found.append(Parameter(f"wrist.{of}_noise", units[k], float(self.sigma[k])))
+            if self.resolution[k]:
+                found.append(Parameter(f"wrist.{of}_resolution", units[k], float(self.resolution[k])))
+        return tuple(found)
 
 
 def draw(sensor: WristSensor, rng: np.random.Generator) -> WristDefect:
