@@ -39,7 +39,10 @@ def normal_forces(twin: Twin, wheels: Sequence[Wheel]) -> np.ndarray:
 
 
 def slip_loads(twin: Twin, wheels: Sequence[Wheel]) -> np.ndarray:
-    """Loads (3,) along x, along y [N] and about z [N.m] at which the first wheel slips or turns."""
+    """Loads (3,) along x, along y [N] and about z [N.m] at which the first wheel slips or turns.
+
+    Infinite without bushings: a rigid body's wheels share a load in many ways, none slips before the others.
+    """
     K, _ = spatial_stiffness(wheels)
     N = normal_forces(twin, wheels)
     mu = np.array([w.footing.friction if w.footing else np.inf for w in wheels])

@@ -98,3 +98,18 @@ def test_half_the_slip_load_does_not_creep_in_a_minute(stood, axis):
     later = displaced(b, [(wrench, 61.5)])
     print("creep", 1e3 * np.abs(later - loaded), "mm, mrad")
     assert (1e3 * np.abs(later - loaded) < 0.05).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", range(3))
+def test_half_of_what_friction_holds_under_a_rigid_base_does_not_creep_in_a_minute(nominal, axis):
+    """Half of sum(mu N), and of sum(mu N r) about z: all wheels at once, which is more than the first holds."""
+    twin, wheels = standing(nominal, *GROUNDS["rigid"])
+    b, mu = bench(twin), np.array([w.footing.friction for w in wheels])
+    reach = np.linalg.norm([w.contact[:2] for w in wheels], axis=1)
+    wrench = 0.5 * mu * normal_forces(twin, wheels) @ (reach if axis == 2 else np.ones(len(wheels))) * UNIT[axis]
+    loaded = b.run(b.model, b.rest, wrench, 1.5)[-1]
+    later = b.run(b.model, loaded, wrench, 60.0)[-1]
+    creep = 1e3 * np.abs(np.diff(b.displacement(np.array([loaded, later])), axis=0))
+    print("load", wrench @ UNIT[axis], "creep", creep, "mm, mrad")
+    assert (creep < 0.05).all()

@@ -8,6 +8,7 @@ from tests.twin.grounds import GROUNDS
 from twin import motions, record
 from twin.campaign import laboratory
 from twin.conventions import exp6
+from twin.defects.contact import Chatters
 from twin.defects.gear import mesh_tendon
 from twin.errors import Diverged, NotStanding, Shaking
 from twin.simulate import simulate
@@ -88,7 +89,6 @@ DAMPED = [f"twin.base.{w}.damping=[150.0, 150.0, 9e4]" for w in ("drive", "caste
         (DAMPED, "root"),
         (["twin.torso.servo_stiffness=1e9"], "torso_lift_joint"),
         (["twin.base.caster_front.damping=[0.0, 0.0, 0.0]"], r"caster_front_\w+\.z"),
-        (["twin.base.wheels=rigid", "twin.base.caster_front.friction=0.0"], "root"),
     ],
 )
 def test_a_base_that_shakes_at_rest_is_told(sweep, settings, joint):
@@ -96,6 +96,27 @@ def test_a_base_that_shakes_at_rest_is_told(sweep, settings, joint):
         stands_and_sweeps(sweep, *settings)
 
 
-@pytest.mark.parametrize("ground", sorted(GROUNDS))
+RIGID = {
+    "damped alike": [f"twin.base.{w}.contact_damping=1000.0" for w in ("drive", "caster_front", "caster_back")],
+    "damped by drives": ["twin.base.drive.contact_damping=1500.0"],
+    "smooth": ["twin.base.caster_front.friction=0.0"],
+    "stiff": [f"twin.base.{w}.contact_stiffness=1.5e7" for w in ("drive", "caster_front", "caster_back")],
+}
+STOOD = GROUNDS | {name: ["twin.base.wheels=rigid", *settings] for name, settings in RIGID.items()}
+
+
+@pytest.mark.parametrize("ground", sorted(STOOD))
 def test_a_base_rests_before_its_trial(sweep, ground):
-    stands_and_sweeps(sweep, *GROUNDS[ground])
+    stands_and_sweeps(sweep, *STOOD[ground])
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("drive.contact_damping=3000", "damping 3000 .* makes the base heavier .* at most 1[67].. N.s/m"),
+        ("caster_back.contact_stiffness=2.5e7", r"stiffness 2\.5e\+07 .* makes the wheel hop"),
+    ],
+)
+def test_contacts_that_one_rigid_base_cannot_follow_are_refused(setting, told):
+    with pytest.raises(Chatters, match=told):
+        laboratory(load("humanoids2024", ["twin.base.wheels=rigid", f"twin.base.{setting}"]).twin, 0)

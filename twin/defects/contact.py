@@ -2,11 +2,15 @@
 
     N = Kc r + Bc dr/dt       normal, sphere on plane; friction cone of coefficient mu
 
-The law is MuJoCo's with constant impedance d: Kc = S / ((1 - d) iw), iw the inverse weight in the compiled
-model of the body that carries the geom. It adds a mass d / ((1 - d) iw) to the motion of the contact: of the light
-wheel's size at d = 0.5 where the wheel rides on a bushing, 1 % of the base's at d = 0.01 where it is fixed to it.
-The same Bc damps slip, so Bc (1 - d) iw dt <= 1 or friction flips its sign at every step: a 0.14 kg caster bears
-280 N.s/m at 1 ms. A stiff one makes the wheel hop where Kc (1 - d) iw dt^2 > 8: 2.2 MN/m.
+The law is MuJoCo's with constant impedance d: Kc = S / ((1 - d) iw), iw the inverse weight in the compiled model of
+the body that carries the geom. It adds a mass d / ((1 - d) iw) to the motion of the contact, and Bc damps slip, too, at
+the rate b = Bc (1 - d) iw / d.
+
+    wheel on a bushing    d = 0.5: the mass is of the light wheel's size; b h <= 2 or friction flips its sign at every
+                          step, 280 N.s/m for a 0.14 kg caster at 1 ms; it hops where Kc (1 - d) iw h^2 > 8, 2.2 MN/m
+    fixed to the base     d so that b h = 1 at every wheel: the mass is h Bc, an implicit damper's, and slip ends in a
+                          step. Wheels of one body that damp its slip at different rates work against each other up to
+                          their friction, which then flips. The base hops on six where 6 Kc iw h^2 > 4, 21 MN/m
 """
 
 from dataclasses import dataclass
@@ -17,12 +21,13 @@ import numpy as np
 from twin.defects.base import Parameter
 from twin.errors import TwinError
 
-_ON_BUSHING, _ON_BASE = 0.5, 0.01
-_HOPS = 8.0  # Kc (1 - d) iw dt^2, at most
+_ON_BUSHING = 0.5
+_LEAST, _HEAVY = 1e-4, 0.05  # impedance that MuJoCo knows; at which h Bc makes the base too heavy
+_HOPS, _BASE_HOPS = 8.0, 4.0 / 6.0  # Kc (1 - d) iw h^2, at most: of a wheel, of a base on six
 
 
 class Chatters(TwinError):
-    """A contact that overshoots rest within one step: its friction flips its sign at every step, or its wheel hops."""
+    """A contact that overshoots rest within one step: its friction flips its sign, its wheel hops, or mass grows."""
 
     def __init__(self, wheel: str, what: str, does: str, limit: str) -> None:
         super().__init__(
@@ -52,17 +57,21 @@ class Contact:
         """Set the geom's reference parameters; `torsion` (3,) of the bushing, None where there is no bushing.
 
         Raises:
-            Chatters: Friction would flip its sign at every step, or the wheel hop.
+            Chatters: Friction would flip its sign at every step, the wheel hop, or damping weigh as mass.
         """
-        d = _ON_BASE if torsion is None else _ON_BUSHING
-        geom = model.geom(geom_name)
-        scale = (1.0 - d) * model.body_invweight0[geom.bodyid[0], 0]
-        step = model.opt.timestep
-        if self.damping * scale * step > 1.0:
-            limit = f"{1.0 / (scale * step):.0f} N.s/m"
-            raise Chatters(wheel, f"damping {self.damping:g} N.s/m", "its friction chatter", limit)
-        if self.stiffness * scale * step**2 > _HOPS:
-            limit = f"{_HOPS / (scale * step**2):.2g} N/m"
+        geom, step, shared = model.geom(geom_name), model.opt.timestep, torsion is None
+        iw = float(model.body_invweight0[geom.bodyid[0], 0])
+        held = self.damping * iw * step
+        d = max(held / (1.0 + held), _LEAST) if shared else _ON_BUSHING
+        scale, hops = (1.0 - d) * iw, _BASE_HOPS if shared else _HOPS
+        if shared:
+            does, most = "the base heavier", _HEAVY / (1.0 - _HEAVY) / iw
+        else:
+            does, most = "its friction chatter", 1.0 / scale
+        if self.damping * step > most:
+            raise Chatters(wheel, f"damping {self.damping:g} N.s/m", does, f"{most / step:.0f} N.s/m")
+        if self.stiffness * scale * step**2 > hops:
+            limit = f"{hops / (scale * step**2):.2g} N/m"
             raise Chatters(wheel, f"stiffness {self.stiffness:g} N/m", "the wheel hop", limit)
         geom.solref[:] = -self.stiffness * scale, -self.damping * scale
         geom.solimp[:] = d, d, 0.001, 0.5, 2.0

@@ -21,11 +21,11 @@ from twin.defects.turning import CASTER_INERTIA, let_turn
 
 Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
-# Solver tolerance, iterations against slip and their tolerance. One rigid body's wheels share its load and friction in
-# more than one way; iterated to the end, friction drifts. Where each has a spring, those iterations set the accuracy.
+# Solver tolerance, iterations against slip and their tolerance. One rigid body's wheels share its load in more than one
+# way: without the fine tolerance of both it creeps. Where each has a spring, those iterations set the accuracy.
 _OWN = 1e-4, 20, 1e-9
 _TWISTING = 1e-6, 20, 1e-9  # where wheels twist in their bushings, their contacts hold a moment too
-_SHARED = 1e-10, 3, 1e-6
+_SHARED = 1e-10, 20, 1e-12
 _SERIES = 1e-14  # tolerance against slip where a caster's friction in turning is in series with the floor's
 
 
