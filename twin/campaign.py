@@ -86,10 +86,10 @@ def record(
         TwinError: The simulation failed; said where.
     """
     lab = laboratory(config, seed)
-    later = second_session(lab) if config.campaign.confirmation else lab
     for folder in ("dataset/trials", "truth/trials"):
         (out / folder).mkdir(parents=True, exist_ok=True)
     motions = schedule(config.campaign, mjcf.model(), seed)
+    later = second_session(lab) if any(m.role == CONFIRMATION for m in motions) else lab
     starts = EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
     entries, done, total = [], 0.0, sum(m.duration for m in motions)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:

@@ -26,6 +26,7 @@ from twin.config_values import (
     STRICT,
     FixedPositive,
     NonNegative,
+    Point,
     Positive,
     Value,
     Vector3,
@@ -48,7 +49,7 @@ class Load:
     """
 
     mass: Annotated[float, Field(ge=0.0, le=3.0), DRAWN]
-    com: Vector3
+    com: Point
     size: tuple[Positive, Positive, Positive]
     com_error: NonNegative
 

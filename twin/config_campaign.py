@@ -39,7 +39,7 @@ class Campaign:
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
         driving: Trials in which the base moves.
         carried: Whether every trial is without physics, joints and base where they are told to be.
-        only: Trials to record, `sweeps` for those of one joint; empty: all.
+        only: Trials to record, `sweeps` for those of one joint; empty: all. A confirmation repeats those of validation.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]

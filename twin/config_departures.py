@@ -7,7 +7,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from twin.config_names import ArmLinkName, ArmName, JointName
-from twin.config_values import BY_NAME, STRICT, FixedNonNegative, NonNegative, Positive, Twist, Value
+from twin.config_values import BY_NAME, STRICT, NonNegative, Positive, Twist, Value
 from twin.uncertain import DRAWN
 
 Tilt = Annotated[float, Field(ge=-0.05, le=0.05), DRAWN]
@@ -39,10 +39,10 @@ class Cable:
 
 @dataclass(frozen=True, config=STRICT)
 class Loosened:
-    """A marker that hangs down by `sag` [m] from `since` [s] after the campaign's start."""
+    """A marker that hangs down by `sag` [m] from `since` [s] after the campaign's start, until it is mounted anew."""
 
     sag: NonNegative
-    since: FixedNonNegative = 0.0
+    since: NonNegative = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)

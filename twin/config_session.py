@@ -2,7 +2,7 @@
 
 from pydantic.dataclasses import dataclass
 
-from twin.config_values import STRICT, FixedNonNegative
+from twin.config_values import STRICT, NonNegative
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -16,6 +16,6 @@ class Session:
             encoder it is homed by.
     """
 
-    base_translation: FixedNonNegative = 0.08
-    base_rotation: FixedNonNegative = 0.5
-    encoder_zero: FixedNonNegative = 3e-4
+    base_translation: NonNegative = 0.08
+    base_rotation: NonNegative = 0.5
+    encoder_zero: NonNegative = 3e-4

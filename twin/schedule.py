@@ -29,9 +29,9 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *_loaded(campaign),
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
-        *(_confirmation(campaign, nominal, seed) if campaign.confirmation else ()),
     )
-    return tuple(m for m in trials if _asked(campaign, _group(m)))
+    second = _confirmation(campaign, nominal, seed) if campaign.confirmation else ()
+    return (*(m for m in trials if _asked(campaign, _group(m))), *second)
 
 
 def _asked(campaign: Campaign, name: str) -> bool:
@@ -43,15 +43,15 @@ def _group(motion: Motion) -> str:
 
 
 def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
-    """The second session: a few postures to register the markers anew, then what validation is made of."""
+    """The second session: a few postures to register the markers anew, then what is asked for of validation."""
     q = postures.draw(nominal, _REGISTRATION_POSTURES + 1, generator(seed, "postures", REGISTRATION))
     register = motions.postures(f"{REGISTRATION}_confirmation", "confirmation", q, campaign)
     swings = _swings("confirmation", campaign.validation_swing, motions.VALIDATION_SWINGS, campaign)
-    return (
-        replace(register, name=REGISTRATION),
+    confirming = (
         *(replace(m, id=f"{m.id}_confirmation") for m in swings),
         *_statics("postures_confirmation", "confirmation", campaign.validation_postures, nominal, seed, campaign),
     )
+    return (replace(register, name=REGISTRATION), *confirming) if confirming else ()
 
 
 def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
@@ -65,7 +65,7 @@ def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign
 
 def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
     """The first posture is where the trial starts, the n that follow are dwelt in; not drawn unless asked for."""
-    if not _asked(campaign, id):
+    if not _asked(campaign, id.replace("_confirmation", "_validation")):
         return ()
     q = postures.draw(nominal, n + 1, generator(seed, "postures", role))
     return (motions.postures(id, role, q, campaign),)

@@ -18,7 +18,7 @@ CONFIRMATION = "confirmation"
 
 
 def remounted(config: TwinConfig, robot: Robot, seed: int, session: str = CONFIRMATION) -> Robot:
-    """The robot with its markers remounted and its motor encoders homed anew; link encoders are absolute."""
+    """The robot with its markers remounted, none loose, and its motors homed anew; link encoders are absolute."""
 
     def homed(encoder: Encoder) -> Encoder:
         if encoder.side != "motor" or encoder.prismatic:
@@ -28,7 +28,7 @@ def remounted(config: TwinConfig, robot: Robot, seed: int, session: str = CONFIR
 
     bodies = config.instruments.bodies.items()
     clusters = tuple(cluster(name, body, seed, session) for name, body in bodies)
-    return replace(robot, encoders=tuple(homed(e) for e in robot.encoders), clusters=clusters)
+    return replace(robot, encoders=tuple(homed(e) for e in robot.encoders), clusters=clusters, loose=())
 
 
 def moved(config: TwinConfig, T_lab_base: np.ndarray, seed: int, session: str = CONFIRMATION) -> np.ndarray:

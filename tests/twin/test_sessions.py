@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from twin.campaign import record, second_session
+from twin.campaign import laboratory, record, second_session
+from twin.config_departures import Departures, Loosened
 from twin.schedule import schedule
 from twin.truth import read_trial
 
@@ -28,6 +29,32 @@ def test_there_is_no_second_session_unless_it_is_asked_for(config, nominal):
     before = schedule(config.campaign, nominal, 0)
     for a, b in zip(before, with_it, strict=False):
         np.testing.assert_array_equal(a.command, b.command)
+
+
+@pytest.mark.parametrize(
+    ("only", "confirmed"),
+    [
+        (("postures",), []),
+        (("xyz",), ["registration_confirmation", "xyz_confirmation"]),
+        (("postures", "postures_validation"), ["registration_confirmation", "postures_confirmation"]),
+    ],
+)
+def test_a_second_session_repeats_the_validation_that_is_asked_for(config, nominal, only, confirmed):
+    asked = replace(config.campaign, confirmation=True, only=only)
+    assert [m.id for m in schedule(asked, nominal, 0) if m.role == "confirmation"] == confirmed
+
+
+def test_the_truth_tells_of_no_session_that_is_not_recorded(config, tmp_path):
+    asked = replace(config.campaign, confirmation=True, only=("postures",), carried=True)
+    record(replace(config, campaign=asked), 0, tmp_path)
+    content = json.loads((tmp_path / "truth/truth.json").read_text())
+    names = [*content["derived"], *(p["name"] for p in content["parameters"])]
+    assert not [n for n in names if n.startswith("confirmation")]
+
+
+def test_a_loose_marker_is_tight_once_it_is_remounted(config):
+    lab = laboratory(replace(config, departures=Departures(loosened={"gripper2": Loosened(1e-3)})), 0)
+    assert lab.robot.loose and not second_session(lab).robot.loose
 
 
 def test_the_robots_body_stays_and_what_is_mounted_on_it_changes(lab, later):

@@ -86,6 +86,25 @@ def test_a_wrong_distribution_is_told_with_its_place(value, message):
         scenario(f"{GAP}={value}")
 
 
+LOOSE = "twin.departures.loosened={gripper2: {sag: 1.0e-3, since: DRAWN}}"
+
+
+@pytest.mark.parametrize(
+    ("path", "found"),
+    [
+        (LOOSE, lambda c: c.departures.loosened["gripper2"].since),
+        ("twin.payload.com=[DRAWN, 0.0, 0.0]", lambda c: c.payload.com[0]),
+        ("twin.session.base_translation=DRAWN", lambda c: c.session.base_translation),
+        ("twin.session.encoder_zero=DRAWN", lambda c: c.session.encoder_zero),
+    ],
+)
+def test_what_happens_to_a_robot_can_be_drawn(path, found):
+    config = scenario(path.replace("DRAWN", "{uniform: [0.01, 0.02]}")).twin
+    values = {found(laboratory(config, seed).config) for seed in (1, 2)}
+    assert len(values) == 2 and all(0.01 < v < 0.02 and not isinstance(v, Uncertain) for v in values)
+    declaration(config, ()).model_dump_json()
+
+
 def test_what_a_person_decides_is_never_drawn():
     for path in ("twin.campaign.sweep", "twin.datasheet.joint_play", "twin.instruments.mocap_rate"):
         with pytest.raises(ScenarioError, match="valid number"):
