@@ -4,8 +4,10 @@ Exit code 0: done. 1: the simulation or the fit failed, or its result must not b
 """
 
 import logging
+import os
 import signal
 import sys
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
@@ -178,23 +180,30 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _fail(error, WRONG_INPUT)
     except OSError as error:
         _fail(error, FAILED)
-    except _domain_errors() as error:
-        from calibration.errors import InputError
-
-        _fail(error, WRONG_INPUT if isinstance(error, InputError) else FAILED)
+    except _raised("CalibrationError", "TwinError") as error:
+        _fail(error, WRONG_INPUT if isinstance(error, _raised("InputError")) else FAILED)
+    except (AttributeError, ImportError, RuntimeError) as error:
+        if not _of_importing_mujoco(error):
+            raise
+        setting = os.environ.get("MUJOCO_GL", "")
+        _fail(f"MuJoCo cannot be imported ({error}) with MUJOCO_GL={setting!r}; unset it, or set it to off", FAILED)
     finally:
         signal.signal(signal.SIGTERM, before)
 
 
-def _domain_errors() -> tuple[type[Exception], ...]:
-    """Return the roots of the engines' errors; asked only when there is one, since the engines import slowly."""
-    from calibration.errors import CalibrationError
-    from twin.errors import TwinError
-
-    return CalibrationError, TwinError
+def _raised(*names: str) -> tuple[type[Exception], ...]:
+    """Errors of the engines by their names, of those that are imported: the others raised nothing and import slowly."""
+    modules = [sys.modules[name] for name in ("calibration.errors", "twin.errors") if name in sys.modules]
+    return tuple(getattr(module, name) for module in modules for name in names if hasattr(module, name))
 
 
-def _fail(error: Exception, code: int) -> None:
+def _of_importing_mujoco(error: Exception) -> bool:
+    """Whether MuJoCo was being imported: it looks for a graphics driver then, and lets pass what that raises."""
+    names = (str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__))
+    return "mujoco" not in sys.modules and any(name.partition(".")[0] == "mujoco" for name in names)
+
+
+def _fail(error: Exception | str, code: int) -> None:
     typer.echo(str(error), err=True)
     sys.exit(code)
 

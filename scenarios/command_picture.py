@@ -31,6 +31,14 @@ def picture(  # noqa: PLR0913  an option each
     if clip is None and still is None:
         raise ScenarioError("nothing to write; name a file: --clip FILE.gif, --still FILE.png, or both")
 
+    wrong = [
+        f"--{name} {path}: it is written as {ending[1:].upper()}; name a file that ends in {ending}"
+        for name, path, ending in (("clip", clip, ".gif"), ("still", still, ".png"))
+        if path is not None and path.suffix.lower() != ending
+    ]
+    if wrong:
+        raise ScenarioError("\n".join(wrong))
+
     from scenarios.footage import film
     from twin.clip import ClipOptions
 

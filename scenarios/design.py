@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from scenarios import folder
 from scenarios.errors import ScenarioError
@@ -94,7 +95,11 @@ def recording_too(scenario: "Scenario", file: Path) -> "Scenario":
     own = schedule(replace(campaign, only=("postures",)), mjcf.model(), scenario.seed)[0]
     rests = [tuple(map(float, own.command[round(stop * RATE)])) for _, stop in own.dwells]
     sides = campaign.given_approaches or ((0,) * len(JOINTS),) * len(rests)
-    return _with_postures(scenario, (*rests, *(p.q for p in asked)), (*sides, *(p.approach for p in asked)))
+    try:
+        return _with_postures(scenario, (*rests, *(p.q for p in asked)), (*sides, *(p.approach for p in asked)))
+    except ValidationError as error:
+        beyond = [f"{file}: {found['msg']} (got {found['input']})" for found in error.errors()]
+        raise ScenarioError("\n".join(beyond)) from error
 
 
 def recording(scenario: "Scenario", plan: "Plan") -> "Scenario":

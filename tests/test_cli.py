@@ -385,3 +385,20 @@ def test_broken_data_end_with_2_and_leave_nothing(tmp_path, monkeypatch, tiago_t
         assert (code, out) == (2, "") and here() == files
     code, _, err = tiago_twin("calibrate", "data", "--out", "x")
     assert words in err
+
+
+@pytest.mark.parametrize(
+    "command", [["list"], ["simulate", "short", "--out", "x"], ["calibrate", "nowhere", "--out", "x"]]
+)
+def test_an_engine_that_cannot_be_imported_is_told_in_a_line(tmp_path, command):
+    code = f"from scenarios.cli import main; main({command})"
+    surroundings = {**os.environ, "MUJOCO_GL": "bogus", "PYTHONPATH": str(Path(__file__).parent.parent)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=surroundings, capture_output=True, text=True, check=False
+    )
+    told = [line for line in done.stderr.splitlines() if line != "calibrate"]
+    assert len(told) == 1 and not list(tmp_path.iterdir())
+    if command[0] == "calibrate":  # needs no engine, and tells what is wrong
+        assert done.returncode == 2 and told[0].startswith("nowhere: no such folder")
+    else:
+        assert done.returncode == 1 and "MUJOCO_GL='bogus'; unset it" in told[0]

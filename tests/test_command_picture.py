@@ -31,6 +31,14 @@ def test_it_must_be_told_what_to_write(run_folder, capsys):
     assert "name a file: --clip FILE.gif, --still FILE.png" in capsys.readouterr().err
 
 
+def test_what_is_written_has_the_ending_of_its_format(run_folder, tmp_path, capsys):
+    assert exit_code(run_folder, "--clip", tmp_path / "x.png", "--still", tmp_path / "x") == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == f"--clip {tmp_path / 'x.png'}: it is written as GIF; name a file that ends in .gif"
+    assert second == f"--still {tmp_path / 'x'}: it is written as PNG; name a file that ends in .png"
+    assert not list(tmp_path.glob("x*"))
+
+
 def test_a_folder_that_is_no_simulated_run_is_told(tmp_path, capsys):
     assert exit_code(tmp_path, "--still", tmp_path / "a.png") == 2
     assert "holds no scenario.yaml; a picture is made of a run that was simulated here" in capsys.readouterr().err

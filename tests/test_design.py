@@ -235,6 +235,10 @@ def test_what_an_estimate_asks_for_is_recorded_after_the_scenario_s_own_postures
     rests = [alone.command[round(stop * RATE)] for _, stop in alone.dwells]
     np.testing.assert_allclose(both.given_postures, [*rests, *(p.q for p in remedy.postures)], atol=1e-12)
     assert both.given_approaches == ((0,) * 8,) * 5 + tuple(p.approach for p in remedy.postures)
+    beyond = replace(remedy.postures[0], q=np.r_[0.1, 9.0, np.zeros(6)])
+    (tmp_path / "beyond.yaml").write_text(to_text(DESCRIBED.joint_names, [replace(remedy, postures=(beyond,))]))
+    with pytest.raises(ScenarioError, match=r"beyond.yaml: arm_1_joint goes from 0.0 to 2.7\d* \(got 9.0\)"):
+        recording_too(plain, tmp_path / "beyond.yaml")
     (tmp_path / "other.yaml").write_text(to_text(("a",), []))
     with pytest.raises(ScenarioError, match="joints are"):
         recording_too(plain, tmp_path / "other.yaml")

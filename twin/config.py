@@ -24,10 +24,10 @@ from twin.config_session import Session
 from twin.config_values import (
     BY_NAME,
     STRICT,
-    FixedPositive,
     NonNegative,
     Point,
     Positive,
+    Rate,
     Value,
     Vector3,
     in_order,
@@ -133,12 +133,12 @@ class Instruments:
     """
 
     bodies: Annotated[dict[BodyName, MarkerBody], in_order(get_args(BodyName))]
-    mocap_rate: FixedPositive
+    mocap_rate: Rate
     marker_noise: Positive
-    plate_rate: FixedPositive
+    plate_rate: Annotated[float, Field(ge=10.0, le=10e3)]
     plate_force_noise: Positive
     plate_moment_noise: Positive
-    robot_rate: FixedPositive
+    robot_rate: Rate
     current_quantum: Positive
     link_encoders: LinkEncoders
     robot_clock: ClockSetting
@@ -193,7 +193,7 @@ class TwinConfig:
     instruments: Instruments
     campaign: Campaign
     datasheet: Datasheet
-    timestep: Annotated[float, Field(gt=0.0, le=0.002)] = field(default=0.001)
+    timestep: Annotated[float, Field(ge=1e-5, le=0.002)] = field(default=0.001)
     gear_form: Literal["dead_zone", "friction_held"] = "dead_zone"
     friction_held: SomeHeld = field(default_factory=lambda: dict(FRICTION_HELD))
     coupled_wrist: bool = False

@@ -8,7 +8,10 @@ from collections.abc import Iterable
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
+import mjcf
+from twin.config_names import ARM, TORSO, refuse
 from twin.uncertain import DRAWN
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -22,11 +25,30 @@ Count = Annotated[int, Field(ge=1)]
 Vector3 = tuple[float, float, float]
 Point = tuple[Value, Value, Value]
 Twist = tuple[Value, Value, Value, Value, Value, Value]
-GivenPosture = tuple[float, float, float, float, float, float, float, float]
 Side = Literal[-1, 0, 1]
 GivenApproach = tuple[Side, Side, Side, Side, Side, Side, Side, Side]
 
 T = TypeVar("T")
+Rate = Annotated[float, Field(ge=10.0, le=1000.0)]
+"""Of a robot's log or a motion capture [Hz]: from a throttled topic to the steps of the simulation."""
+
+_Posture = tuple[float, float, float, float, float, float, float, float]
+
+
+def _within_limits(posture: _Posture) -> _Posture:
+    """Each joint [m, rad], the lift first, between the limits of the nominal robot."""
+    beyond = []
+    for k, (name, value) in enumerate(zip((TORSO, *ARM), posture, strict=True)):
+        low, high = mjcf.model().joint(name).range.tolist()
+        if not low <= value <= high:
+            said = {"joint": name, "low": low, "high": high}
+            error = PydanticCustomError("joint_limit", "{joint} goes from {low} to {high}", said)
+            beyond.append(InitErrorDetails(type=error, loc=(k,), input=value))
+    refuse("GivenPosture", beyond)
+    return posture
+
+
+GivenPosture = Annotated[_Posture, AfterValidator(_within_limits)]
 
 
 def in_order(names: Iterable[str]) -> AfterValidator:
