@@ -165,6 +165,8 @@ def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> Non
     for source in (*robot.encoders, *robot.clusters, *robot.loose, *instrument_errors(lab)):
         parameters += source.parameters()
     parameters += constants(lab.config)
+    if "wheels" in lab.config.campaign.driving.forms:
+        parameters += (p for wheel in robot.wheels for p in Rolling(wheel).parameters())
     if lab.config.campaign.driving.forms:
         parameters += arm_frame(lab.twin, next(iter(lab.config.arm)))
     derived = {"K": K, "C": C, "K_gravity": gravity_stiffness(lab.twin, robot.wheels)}

@@ -90,6 +90,15 @@ def test_every_number_of_the_scenario_shows_in_the_truth(full, told, part):
     assert silent == []
 
 
+def test_a_robot_that_drives_tells_how_its_wheels_roll(full, told):
+    campaign = replace(full.config.campaign, driving=replace(full.config.campaign.driving, forms=("wheels",)))
+    true = {p.name: p for p in told(replace(full.config, campaign=campaign))}
+    assert true["rolling.wheel_left.servo_stiffness"].value == 2000.0
+    assert true["rolling.caster_front_left.swivel_friction"].unit == "N.m"
+    assert sum(name.startswith("rolling.") for name in true) == 2 * 3 + 4 * 6
+    assert not any(p.name.startswith("rolling.") for p in told(full.config))
+
+
 def test_names_are_there_once_and_lengths_are_lengths(full, told):
     true = told(full.config)
     assert len({p.name for p in true}) == len(true)

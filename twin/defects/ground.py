@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from twin.defects.base import Defect, Parameter, body
 from twin.defects.bushing import DIRECTIONS, Bushing
 from twin.defects.contact import Contact
-from twin.defects.turning import CASTER_INERTIA, let_turn
+from twin.defects.turning import CASTER_INERTIA, INERTIA, let_turn
 
 Vector = tuple[float, float, float]
 _ROOT = "base_footprint"
@@ -108,6 +108,7 @@ class Wheel(Defect):
                 found.append(Parameter(f"suspension.{self.name}.guide_friction", "N", self.bushing.guide_friction))
         if self.turning_force > 0.0:
             found.append(Parameter(f"suspension.{self.name}.turning_force", "N", self.turning_force))
+            found.append(Parameter(f"suspension.{self.name}.turning_inertia", "kg", INERTIA))
         if self.footing is not None:
             found += self.footing.parameters(self.name, self._torsion)
         return tuple(found)

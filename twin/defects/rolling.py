@@ -57,8 +57,20 @@ class Rolling(Defect):
         self.wheel.tune(model)
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """As the standing wheel."""
-        return self.wheel.parameters()
+        """Of what lets it roll; those of the standing wheel are its own."""
+        name = f"rolling.{self.wheel.name}"
+        if self.wheel.name in DRIVES:
+            values = (("servo_stiffness", "N.m/rad", _SERVO[0]), ("servo_damping", "N.m.s/rad", _SERVO[1]))
+            return (
+                *(Parameter(f"{name}.{n}", unit, value) for n, unit, value in values),
+                Parameter(f"{name}.rotor_inertia", "kg.m2", _ROTOR),
+            )
+        units = (("friction", "N.m"), ("damping", "N.m.s/rad"), ("inertia", "kg.m2"))
+        return tuple(
+            Parameter(f"{name}.{of}_{what}", unit, value)
+            for of, values in (("swivel", _SWIVEL), ("roll", _ROLL))
+            for (what, unit), value in zip(units, (*values, CASTER_INERTIA), strict=True)
+        )
 
 
 def _free(carrier: mujoco.MjsBody, name: str, friction: float, damping: float) -> None:
