@@ -12,9 +12,8 @@ from calibration.bodies import poses_of
 from calibration.recording import Trial
 from calibration.schema import Body
 from calibration.signals import Signal, even, low_passed
-
-_CUTOFF = 10.0  # [Hz]
-_REST = 1.0  # [s] at the start of a trial
+from calibration.suspension_rest import REST
+from calibration.suspension_wrench import CUTOFF
 
 
 def shape_change(body: Body, trial: Trial) -> Signal:
@@ -25,8 +24,8 @@ def shape_change(body: Body, trial: Trial) -> Signal:
     """
     found = poses_of(body, trial)
     local = np.einsum("nji,nmj->nmi", found.T[:, :3, :3], found.residual)
-    d = low_passed(even(trial.t_mocap, local.reshape(len(local), -1)), _CUTOFF)
-    return Signal(d.t, d.x - d.x[d.t <= d.t[0] + _REST].mean(axis=0), d.valid)
+    d = low_passed(even(trial.t_mocap, local.reshape(len(local), -1)), CUTOFF)
+    return Signal(d.t, d.x - d.x[d.t <= d.t[0] + REST].mean(axis=0), d.valid)
 
 
 def per_coordinate(d: np.ndarray) -> float:
