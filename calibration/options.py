@@ -5,9 +5,8 @@ from typing import Literal
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from calibration.joint_model import Terms
-
 Elements = Literal["diagonal", "full"]
+Terms = Literal["printed", "tensor", "total"]
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))

@@ -9,33 +9,31 @@ purpose, are for `base_frame` alone; all other stages see the trials in which it
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from calibration.arm_tool_stage import locate_arm
-from calibration.base_frame_stage import locate_base
-from calibration.base_motion import MOVES, read_stations
-from calibration.clocks import synchronise
-from calibration.dataset import Dataset
+from calibration.checks.recordings import implausible_inputs
+from calibration.context import Work, postures_of, with_postures
+from calibration.design.next_motions import drive_next, sweeps_next, swings_next
+from calibration.design.next_postures import record_next
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
-from calibration.estimate import Estimate, Model, RobotNames
-from calibration.estimate_parts import joints_model, suspension_model
-from calibration.gears import calibrate_gears
-from calibration.geometry import calibrate_geometry
-from calibration.hand_payload_stage import weighed
-from calibration.joint_fit import fit_joint_models
+from calibration.estimate.estimate import Estimate, RobotNames
+from calibration.inference.parameters import Model
 from calibration.options import Options
-from calibration.parameters import nominal_frames
-from calibration.plausibility import implausible_inputs
-from calibration.record_next import record_next
-from calibration.record_next_base import drive_next
-from calibration.record_next_joints import sweeps_next
-from calibration.record_next_suspension import swings_next
-from calibration.registration import register
-from calibration.robot import chain_of
-from calibration.suspension_fit import Form, fit_suspension
+from calibration.recording.dataset import Dataset
+from calibration.robot.chain import chain_of
+from calibration.robot.nominal_frames import nominal_frames
+from calibration.stages.clocks.stage import synchronise
+from calibration.stages.frames.arm_tool_stage import locate_arm
+from calibration.stages.frames.base_rests import MOVES, read_stations
+from calibration.stages.frames.base_stage import locate_base
+from calibration.stages.geometry.gear_deflection import calibrate_gears
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.geometry.registration import register
+from calibration.stages.geometry.stage import calibrate_geometry
+from calibration.stages.joints.stage import fit_joint_models, joints_model
+from calibration.stages.suspension.stage import Form, fit_suspension, suspension_model
+from calibration.stages.wrist_load import weighed
 from calibration.verdict import Verdict
-from calibration.work import Work, lacking, postures_of, with_postures
 
 Progress = Callable[[str, float], None]
-
 STAGES = ("clocks", "registration", "base_frame", "arm_tool", "suspension", "geometry", "joints")
 _FRAMES = ("base_frame", "arm_tool")  # run where there is a spin; alone where the arm only ever posed
 MAIN = ("full", "model_2", "arm_tool", "registration")  # rows an estimate can stand for, the best first
@@ -166,7 +164,7 @@ def _weighed(work: Work, model: Model) -> tuple[Verdict, ...]:
     """What hangs on the wrist's sensor in the trials with the declared payload."""
     declared = {entry.id for entry in work.dataset.entries("calibration") if entry.payload is None}
     trials = [trial for trial in work.trials if trial.id in declared]
-    hand = model.hand(work.chain, nominal_frames(work.chain, work.description))
+    hand = hand_of(model, work.chain, nominal_frames(work.chain, work.description))
     return weighed(work.dataset.urdf, work.description, trials, work.clock("robot"), hand, postures_of(work))
 
 
@@ -174,7 +172,7 @@ def _calibrate_joints(work: Work) -> Work:
     if any(v.verdict == "refused" for v in work.estimate.verdicts):
         return work
     geometry = work.estimate.model("model_2")
-    hand = geometry.hand(work.chain, nominal_frames(work.chain, work.description))
+    hand = hand_of(geometry, work.chain, nominal_frames(work.chain, work.description))
     robot = work.clock("robot")
     if robot is None:
         raise NotEnoughData("no robot clock")
@@ -219,3 +217,16 @@ def _empty(dataset: Dataset, options: Options) -> Estimate:
     d = dataset.description
     names = RobotNames(d.joint_names, d.base_frame, d.tool_frame)
     return Estimate("not_calibrated", (), (), (), "", dataset.urdf, names, options=options, laboratory=d.alone)
+
+
+def lacking(work: Work, stage: str) -> str:
+    """What a stage would need that the dataset does not have; empty where it has it."""
+    if stage == "base_frame":
+        return ""
+    if stage == "suspension":
+        return "" if work.trials else "no suspension: posture means show no motion; record base and plate continuously"
+    if work.postures is None:
+        return f"no {stage}: it takes joint readings with base and hand markers in static postures"
+    if stage == "joints" and work.clock("robot") is None:
+        return "no joint models: posture means have no link encoders; record motor and link readings continuously"
+    return ""

@@ -4,10 +4,10 @@ The XML files beside this one are the only place where a number of the nominal r
 where each comes from. Everything else here is read from the model they compile to.
 """
 
-from .export import NotAUrdfTree, urdf
-from .nominal import ROOT, model, scene_path, spec
-from .rotations import matrix_from_rpy, rpy_from_matrix
-from .wheels import Wheel, wheels
+from mjcf.nominal import ROOT, model, scene_path, spec
+from mjcf.rpy import matrix_from_rpy, rpy_from_matrix
+from mjcf.urdf_export import NotAUrdfTree, urdf
+from mjcf.wheels import Wheel, wheels
 
 __all__ = [
     "ROOT",

@@ -11,8 +11,8 @@ from typing import Literal
 import mujoco
 import numpy as np
 
-from .nominal import ROOT
-from .nominal import model as nominal
+from mjcf.nominal import ROOT
+from mjcf.nominal import model as nominal
 
 _SUFFIX = "_contact"
 

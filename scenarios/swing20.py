@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
-from scenarios import console, load
-from scenarios.collection.collect import Plan, collect
-from scenarios.collection.engine import Workers
-from scenarios.collection.produce import recordings_and_truth
+from scenarios import load
+from scenarios.commands import console
+from scenarios.datasets.collection import Plan, collect
+from scenarios.datasets.run_content import recordings_and_truth
+from scenarios.datasets.workers import Workers
 
 if __name__ == "__main__":
     plan = Plan(load("swing20"), 10, Path("runs/swing20"), recordings_and_truth)

@@ -17,8 +17,8 @@ def base_r2():
         from scipy.spatial.transform import Rotation
 
         import calibration
-        from calibration.suspension_predict import base_poses
-        from calibration.suspension_read import laboratory
+        from calibration.prediction.base_pose import base_poses
+        from calibration.stages.suspension.base_response import laboratory
         from twin.truth import read_trial
 
         dataset = calibration.load(folder / "dataset")

@@ -4,11 +4,11 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from calibration import netcdf
-from twin.defects.base import Parameter
+from calibration.recording import netcdf
 
 _UNITS = {
     "t_mocap": "s",
@@ -29,6 +29,7 @@ _DIMS = {
     "marker_position": ("t_mocap", "marker", "axis"),
     "plate_wrench": ("t_mocap", "wrench"),
 }
+AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)
@@ -80,13 +81,6 @@ def read_trial(path: Path) -> TruthTrial:
         return TruthTrial(joint, marker, **{name: netcdf.array(file, name) for name in _DIMS})
 
 
-def write_parameters(path: Path, parameters: Iterable[Parameter], derived: dict[str, np.ndarray]) -> None:
-    """Write truth.json: every parameter, and what follows from them."""
-    rows = ",\n  ".join(json.dumps(p._asdict(), allow_nan=False) for p in parameters)
-    values = json.dumps({name: _numbers(value) for name, value in derived.items()}, allow_nan=False)
-    path.write_text(f'{{"schema": 1,\n "parameters": [\n  {rows}],\n "derived": {values}}}\n', encoding="utf-8")
-
-
 def _numbers(value: np.ndarray) -> object:
     """Nested lists; null for what is infinite, a stiffness where nothing gives."""
     found = np.asarray(value, dtype=float).astype(object)
@@ -94,6 +88,33 @@ def _numbers(value: np.ndarray) -> object:
     return found.tolist()
 
 
+class Parameter(NamedTuple):
+    """One true number.
+
+    Attributes:
+        name: Name of the contract, `geometry.arm_1_joint.x` and the like.
+        unit: SI unit, `-` where there is none.
+        value: The value.
+    """
+
+    name: str
+    unit: str
+    value: float
+
+
+def write_parameters(path: Path, parameters: Iterable[Parameter], derived: dict[str, np.ndarray]) -> None:
+    """Write truth.json: every parameter, and what follows from them."""
+    rows = ",\n  ".join(json.dumps(p._asdict(), allow_nan=False) for p in parameters)
+    values = json.dumps({name: _numbers(value) for name, value in derived.items()}, allow_nan=False)
+    path.write_text(f'{{"schema": 1,\n "parameters": [\n  {rows}],\n "derived": {values}}}\n', encoding="utf-8")
+
+
 def read_parameters(path: Path) -> tuple[Parameter, ...]:
     """Parameters of truth.json."""
     return tuple(Parameter(**p) for p in json.loads(path.read_text(encoding="utf-8"))["parameters"])
+
+
+def twist_parameters(prefix: str, values: np.ndarray) -> tuple[Parameter, ...]:
+    """Six parameters `prefix.{x,y,z,rx,ry,rz}` [m, rad]."""
+    units = ("m",) * 3 + ("rad",) * 3
+    return tuple(Parameter(f"{prefix}.{a}", u, float(v)) for a, u, v in zip(AXES, units, values, strict=True))

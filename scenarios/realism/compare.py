@@ -9,10 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from scenarios.realism.recorded import Recorded
+from scenarios.files.scenario import Scenario
+from scenarios.realism.log import Recorded
 from scenarios.realism.replayed import AS_DRAWN, AXES, BAND, Condition, Inside, inside, replayed, together
 from scenarios.realism.swings import LOG, Figures, YawFromMoment, figures, matrix, swung, yaw_from_moment
-from scenarios.schema import Scenario
 from twin.errors import TwinError
 
 T = TypeVar("T")

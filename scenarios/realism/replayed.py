@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenarios.realism.recorded import Recorded
-from twin.config import TwinConfig
-from twin.config_base import Base
-from twin.defects.base import Defect
-from twin.draw_base import ground, wheels_of
-from twin.instruments.plate import draw
-from twin.randomness import generator
-from twin.replay import Pull, carriage_on, replay
-from twin.uncertain import drawn
+from scenarios.realism.log import Recorded
+from twin.base_tests.wrench_replay import Pull, carriage_on, replay
+from twin.config.base import Base
+from twin.config.distributions import drawn
+from twin.config.twin import TwinConfig
+from twin.defects.defect import Defect
+from twin.defects.wheels.from_config import ground, wheels_of
+from twin.instruments.force_plate import draw
+from twin.random_streams import generator
 
 _HOLDS = 10.0  # times the drawn friction: no wheel slides
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -21,8 +21,8 @@ from scenarios.plots import (
     z_histogram,
 )
 from scenarios.report.ladder import Step, floor, headline_model, oracle_base, predictive
-from scenarios.report.parameters import Known, groups
-from scenarios.report.results import Results
+from scenarios.report.run_results import Results
+from scenarios.report.sections.parameters import Known, groups
 from scenarios.report.traces import Trace
 
 WIDTH = 10.0  # [inch], as wide as the page

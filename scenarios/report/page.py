@@ -11,14 +11,15 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from scenarios.plots import svg
-from scenarios.report import figures, numbers, paper, verdict
+from scenarios.report import figures, formatting
 from scenarios.report.ladder import BASES, MEANINGS, headline_model, ladder, predictive
-from scenarios.report.models import section
-from scenarios.report.parameters import coverage, groups, known, left_out
-from scenarios.report.recordings import instruments
-from scenarios.report.results import Results, read
+from scenarios.report.run_results import Results, read
+from scenarios.report.sections import paper_models, verdict
+from scenarios.report.sections.models import section
+from scenarios.report.sections.parameters import coverage, groups, known, left_out
+from scenarios.report.sections.recordings import instruments
 
-_TEMPLATES = Path(__file__).parent.parent / "templates"
+_TEMPLATES = Path(__file__).with_name("templates")
 _NAMES = ("frames", "paper", "wheels", "sway", "joint", "loops", "errors", "traces", "parameters", "z_scores")
 
 
@@ -67,7 +68,7 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
     models = section(results, steps)
     made = {
         **models.figures,
-        "errors": figures.boxes(results, paper.readable(steps)),
+        "errors": figures.boxes(results, paper_models.readable(steps)),
         "traces": figures.traces(results, steps),
         "parameters": figures.forest(found, has_truth),
         "z_scores": figures.z_scores(found, has_truth),
@@ -131,11 +132,11 @@ def render(values: Mapping[str, Any], drawings: Mapping[str, Drawing]) -> str:
         keep_trailing_newline=True,
     )
     environment.filters |= {
-        "fixed": numbers.fixed,
-        "significant": numbers.significant,
-        "count": numbers.count,
-        "cell": numbers.cell,
-        "decimals": numbers.decimals,
+        "fixed": formatting.fixed,
+        "significant": formatting.significant,
+        "count": formatting.count,
+        "cell": formatting.cell,
+        "decimals": formatting.decimals,
     }
     style = (_TEMPLATES / "report.css").read_text(encoding="utf-8")
     return environment.get_template("report.html").render(**values, drawings=drawings, style=style)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration import netcdf
-from calibration.netcdf import Group
+from calibration.recording import netcdf
+from calibration.recording.netcdf import Group
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ import time
 import pytest
 
 from scenarios import load
-from scenarios.collection.produce import recordings_and_truth
-from scenarios.collection.task import size
+from scenarios.datasets.run_content import recordings_and_truth
+from scenarios.datasets.run_one import size
 
-SWING = "twin.campaign.calibration_swing"
+SWING = "twin.campaign.record.calibration_swing"
 VARIED = {
     "7 s": (f"{SWING}=7",),
     "17 s": (),

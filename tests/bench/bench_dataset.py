@@ -32,7 +32,7 @@ def memory_of(process: psutil.Process) -> int:
 
 def watched(out: Path, workers: int, n: int) -> tuple[float, np.ndarray, int]:
     """Time from the first run to the last [s], memory [bytes] along the way, and bytes told before the start."""
-    code = "from scenarios.cli import main; main()"
+    code = "from scenarios.commands.main import main; main()"
     arguments = ["dataset", "swing20", "-n", str(n), "--workers", str(workers), "--out", str(out)]
     process = subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE, text=True)
     samples: list[int] = []

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 import mjcf
-from calibration.geometry_arrays import Widths, fit_chain
-from calibration.robot import chain_of_frames
-from calibration.se3 import from_vector
+from calibration.numerics.lie import from_vector
+from calibration.robot.chain import chain_of_frames
+from calibration.stages.geometry.from_arrays import Widths, fit_chain
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT.parent / "shared/bench/figaroh_bench.py"

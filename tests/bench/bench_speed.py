@@ -11,11 +11,13 @@ import mjcf
 import twin
 from calibration import Compensator
 from scenarios import load, run
-from twin import motions
-from twin.build import build
-from twin.campaign import laboratory, measure
-from twin.inputs import prepare
-from twin.simulate import simulate
+from twin.campaign.laboratory import laboratory
+from twin.campaign.measure import measure
+from twin.motions import motion as motions
+from twin.motions.swings import VALIDATION_SWINGS
+from twin.simulation.build import build
+from twin.simulation.rollout import simulate
+from twin.simulation.setpoints import prepare
 
 
 def seconds(function, repeats: int = 3) -> float:
@@ -32,7 +34,7 @@ def seconds(function, repeats: int = 3) -> float:
 def test_speed_of_the_twin(name, keep):
     scenario = load(name)
     lab = laboratory(scenario.twin, 0)
-    path = motions.VALIDATION_SWINGS["xyz"]
+    path = VALIDATION_SWINGS["xyz"]
     motion = motions.swing("xyz", "validation", "swing", path, 20.0, scenario.twin.campaign)
     inputs = prepare(lab.twin, motion, lab.T_lab_base)
     model, first, control = inputs.model, inputs.first, inputs.control

@@ -4,7 +4,7 @@ import subprocess
 import sys
 import time
 
-LIGHT = "from scenarios.cli import main; main()"
+LIGHT = "from scenarios.commands.main import main; main()"
 SMALL = """
 import resource, subprocess, sys
 subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, check=True)

@@ -8,19 +8,19 @@ import pytest
 
 import mjcf
 from calibration import Dataset, Estimate, calibrate, load
-from calibration.robot import Chain, chain_of
-from tests.calibration import matched
+from calibration.robot.chain import Chain, chain_of
+from tests.doubles import rigid_robot
 
 
 @pytest.fixture(scope="session")
-def truth() -> matched.Truth:
-    return replace(matched.defects(1), half_gap=np.array([0.0, 1.0, 1.0, 1.5, 1.5, 3.0, 12.0, 10.0]) * 1e-3)
+def truth() -> rigid_robot.Truth:
+    return replace(rigid_robot.defects(1), half_gap=np.array([0.0, 1.0, 1.0, 1.5, 1.5, 3.0, 12.0, 10.0]) * 1e-3)
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory: pytest.TempPathFactory, truth: matched.Truth) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory, truth: rigid_robot.Truth) -> Path:
     """A dataset folder; copy it before changing anything."""
-    return matched.campaign(tmp_path_factory.mktemp("matched") / "dataset", truth)
+    return rigid_robot.campaign(tmp_path_factory.mktemp("matched") / "dataset", truth)
 
 
 @pytest.fixture(scope="session")
@@ -35,4 +35,4 @@ def estimate(dataset: Dataset) -> Estimate:
 
 @pytest.fixture(scope="session")
 def chain() -> Chain:
-    return chain_of(mjcf.urdf(), matched.described())
+    return chain_of(mjcf.urdf(), rigid_robot.described())

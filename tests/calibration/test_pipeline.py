@@ -8,9 +8,10 @@ import pytest
 
 from calibration import calibrate, load, save_estimate
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
-from calibration.recording import sha256
-from tests.calibration import matched
-from tests.calibration.changes import rewritten
+from calibration.recording.trial import sha256
+from calibration.stages.geometry.model_of_fit import hand_of
+from tests.doubles import rigid_robot
+from tests.doubles.edited_dataset import rewritten
 
 CALIBRATION = ("postures", "sweep1", "sweep2", "sweep4", "swing")
 
@@ -48,9 +49,9 @@ def test_the_estimate_says_what_it_is(estimate):
 
 
 def test_the_calibrated_robot_is_the_true_one_within_its_play(estimate, truth, chain):
-    hand = estimate.model("model_2").hand(chain, np.zeros(12))
-    q = matched.near_postures(np.random.default_rng(9), 100)
-    error = hand.poses(q + truth.offset)[:, :3, 3] - matched.hand_in_base(truth, q)[:, :3, 3]
+    hand = hand_of(estimate.model("model_2"), chain, np.zeros(12))
+    q = rigid_robot.near_postures(np.random.default_rng(9), 100)
+    error = hand.poses(q + truth.offset)[:, :3, 3] - rigid_robot.hand_in_base(truth, q)[:, :3, 3]
     assert np.sqrt((error**2).mean()) < 1.5e-3  # 20 postures, each with up to 12 mrad of play in the wrist
 
 
@@ -70,7 +71,7 @@ def test_an_unknown_stage_is_told_with_those_that_exist(dataset):
 
 
 def test_without_a_plate_everything_else_works_and_it_is_said(folder, tmp_path):
-    changes = dict.fromkeys(CALIBRATION, matched.without_plate)
+    changes = dict.fromkeys(CALIBRATION, rigid_robot.without_plate)
     estimate = calibrate(load(rewritten(folder, tmp_path / "copy", changes)), ["geometry"])
     assert estimate.calibrated and [c.instrument for c in estimate.clocks] == ["robot"]
     assert any(v.verdict == "missing" and "plate" in v.message for v in estimate.verdicts)

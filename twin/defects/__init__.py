@@ -1,1 +1,1 @@
-"""What a robot of the series has that the datasheet has not; one file a class of defect."""
+"""What makes a robot differ from nominal."""

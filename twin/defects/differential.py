@@ -19,10 +19,11 @@ from dataclasses import dataclass, replace
 
 import mujoco
 
-from twin.defects.base import Defect, Parameter
+from twin.defects.defect import Defect
 from twin.defects.gear import Gear, add_mesh, add_servo, mesh_tendon, rotor_joint, tune_mesh
-from twin.defects.hysteresis import Hysteresis
+from twin.defects.gear_friction import Hysteresis
 from twin.errors import TwinError
+from twin.truth import Parameter
 
 _SIGNS = (1.0, -1.0)
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from twin.defects.base import Defect, Parameter, joint
+from twin.defects.defect import Defect, joint
+from twin.truth import Parameter
 
 _IMPEDANCE = 0.02
 _ROTOR_MASS = 1e-4  # [kg] a moving body must have some

@@ -1,1 +1,1 @@
-"""What a laboratory and a robot measure; one file an instrument."""
+"""From states to what instruments record."""

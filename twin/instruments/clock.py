@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.defects.base import Parameter
+from twin.truth import Parameter
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from twin.config import TwinConfig
-from twin.config_instruments import LogErrors
-from twin.defects.sensing import Encoder
-from twin.instruments.events import windows, within
-from twin.instruments.sampling import interpolate
-from twin.motions import JOINTS
-from twin.simulate import States
+from twin.config.instruments import LogErrors
+from twin.config.twin import TwinConfig
+from twin.instruments.encoder import Encoder
+from twin.instruments.sampling import interpolate, windows, within
+from twin.motions.swings import JOINTS
+from twin.simulation.states import States
 
 _MOST = 0.45  # of the interval between ticks that a stamp may be off [-]
 

@@ -1,0 +1,1 @@
+"""What recordings cannot be: wrong units, joints, plates, currents."""

@@ -1,0 +1,197 @@
+"""Columns of joints that are swapped or reversed, told by the hand's markers before anything is written.
+
+    e_h = mean_i min(|d_i|, 0.5 m),   d_i = (p, L w) of (X A_i(h) Y)^-1 B_i        L = 0.2 m
+
+A_i(h) is the nominal robot's T_base_hand at the readings under hypothesis h (as declared; one joint reversed; two
+joints swapped), B_i the measured one; X and Y are two constant frames fitted to all of them (hand-eye), so that no
+drawing is needed. A robot is a centimetre or two off its nominal model, a column that is another's by the motion
+itself: where one hypothesis explains the hand better than the declaration by a factor, it is named.
+A joint that does not move, or two that turn about one line, cannot be told apart so; then nothing is said.
+A single wrong file among right ones is held against the frames that the others give.
+
+Clocks are not known yet: the robot's is brought to the markers' by the hand's speed of rotation, for each hypothesis.
+
+Link readings that cannot be those of their joint, told by name before a joint model is fitted to them.
+
+    y = q_motor - q_link - zero         rms y > 0.1 rad over calibration trials: ten times the play of a worn gear
+    q_link ~ a q_motor + b              a = -1 sign, a = 180 / pi degrees, a = 0 stands still; by least squares
+
+A polynomial of the angle explains such a discrepancy perfectly, so its R2 says nothing.
+"""
+
+import logging
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from calibration.checks.column_hypotheses import MOST, Frames, Pairs, Reading, Shown, as_declared, distance, readings
+from calibration.errors import InputError, NotEnoughData
+from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.cluster_shape import of_one_shape
+from calibration.mocap.labels import with_right_labels
+from calibration.mocap.postures import mean_postures
+from calibration.numerics.alignment import hand_eye, registration_start
+from calibration.numerics.lie import inverse
+from calibration.recording.posture_means import PostureMeans
+from calibration.recording.schema import Description, base_body, hand_body
+from calibration.recording.trial import Trial
+from calibration.robot.chain import Chain
+from calibration.verdict import Verdict
+
+_POSES, _FEWEST, _ENOUGH = 60, 6, 10  # compared, of all trials; of each at least; to judge by
+_OFF, _ANOTHER = 0.012, 0.06  # [m] no suspicion; another robot than the nominal one
+_CLEAR = 1.5  # so many times better is an explanation
+_ODD = 3.0  # times the other files' distance: a file unlike them
+_HALF = 0.5  # of that file's distance is left by an explanation, at most
+_STRANGE = 0.15  # [m] a file for which there is none; postures far from the others' are 60 mm off on a loose robot
+_log = logging.getLogger(__name__)
+_BEYOND = 0.1  # rms [rad, m]
+_NEAR = 0.1  # of the slope [-]
+_FOLLOWS = 0.99  # correlation with another joint's motor side [-]
+_SLOPES = ((-1.0, "its sign is turned"), (180.0 / np.pi, "it is in degrees"), (0.0, "it stands still"))
+
+
+def check_columns(description: Description, chain: Chain, trials: Sequence[tuple[str, Trial | PostureMeans]]) -> None:
+    """Refuse readings that explain the hand only with a joint reversed or two swapped, or not at all.
+
+    Args:
+        description: Of the dataset to be written.
+        chain: The nominal chain.
+        trials: Of one session, where markers stay as they are, each with the file it came from.
+
+    Raises:
+        InputError: It names the files, the joints and the remedy.
+    """
+    shown = []
+    for file, trial in trials:
+        try:
+            shown.append(_shown(description, file, trial))
+        except NotEnoughData as error:
+            _log.info("%s: joints not compared with the hand: %s", file, error)
+    try:
+        odd = _odd_one(chain, shown)
+    except NotEnoughData as error:
+        _log.info("files not compared with each other: %s", error)
+        odd = None
+    if odd is not None:
+        raise InputError(*odd)
+    said = _judge(chain, shown) if shown else None
+    if said is not None:
+        more = f" and {len(shown) - 1} more" if len(shown) > 1 else ""
+        raise InputError(shown[0].file + more, said)
+
+
+def _shown(description: Description, file: str, trial: Trial | PostureMeans) -> Shown:
+    none = np.zeros(0)
+    if isinstance(trial, PostureMeans):
+        postures = mean_postures(description, trial)
+        postures = postures.rows(of_one_shape(postures.misfit))
+        return Shown(file, postures.T_base_hand, none, postures.q, none, postures.components == 6)
+    if len(trial.t_robot) < 2 or not len(trial.marker):
+        raise NotEnoughData("readings or markers are missing")
+    bodies = base_body(description), hand_body(description)
+    mended = with_right_labels(bodies, trial)[0]
+    base, hand = (poses_of(body, mended) for body in bodies)
+    return Shown(file, inverse(base.T) @ hand.T, trial.t_mocap, trial.q_motor, trial.t_robot)
+
+
+def _odd_one(chain: Chain, shown: Sequence[Shown]) -> tuple[str, str] | None:
+    """The one file that the frames of all others do not fit, and what is to be said of it."""
+    if len(shown) < 2 or not all(x.oriented for x in shown):
+        return None
+    most = max(_FEWEST, _POSES // len(shown))
+    lags = [x.lag(chain, as_declared(chain)) for x in shown]
+    pairs = [x.pairs(chain, as_declared(chain), most, lag) for x, lag in zip(shown, lags, strict=True)]
+    rest, k, frames = min(_without_each(pairs), default=(np.inf, 0, None), key=lambda left: left[0])
+    if frames is None or rest > _ANOTHER or len(pairs[k][0]) < _FEWEST:
+        return None
+    of_others = [lag for j, lag in enumerate(lags) if j != k and np.isfinite(lag)]
+    clocks = (None, float(np.median(of_others)) if of_others else None)  # its own may be as wrong as its columns
+
+    def left_by(reading: Reading) -> float:
+        found = (shown[k].pairs(chain, reading, _POSES, lag) for lag in clocks)
+        return min((float(distance(frames, A, B).mean()) for A, B in found if len(A) >= _FEWEST), default=MOST)
+
+    off = left_by(as_declared(chain))
+    if off < max(_OFF, _ODD * rest):
+        return None
+    far = f"the hand's markers are {1e3 * off:.0f} mm (mean) from where its readings put them, {1e3 * rest:.0f} mm in"
+    far = f"{far} the other files, frames fitted to those"
+    left, said = min((left_by(r), r.said) for r in readings(chain))
+    if left < min(_HALF * off, _ANOTHER):
+        return shown[k].file, f"{said}: {far}, {1e3 * left:.0f} mm otherwise; correct this file's columns"
+    if off < _STRANGE:
+        return None
+    return shown[k].file, (
+        f"{far}; no joint reversed and no two swapped explain it: other columns are swapped, or it is another session's"
+    )
+
+
+def _without_each(pairs: Sequence[Pairs]) -> Iterator[tuple[float, int, Frames]]:
+    """For each file k the mean distance of the others, k, and the frames X, Y that they give, where they do."""
+    for k in range(len(pairs)):
+        others = [np.concatenate(x) for x in zip(*(p for j, p in enumerate(pairs) if j != k), strict=True)]
+        try:
+            frames = hand_eye(others[0], others[1])
+        except NotEnoughData:
+            continue
+        yield float(distance(frames, others[0], others[1]).mean()), k, frames
+
+
+def _judge(chain: Chain, shown: Sequence[Shown]) -> str | None:
+    """What is to be said of the readings, if anything."""
+    d = _distances(chain, shown, as_declared(chain))
+    if d is None or (off := float(d.mean())) < _OFF:
+        return None
+    found = [(float(d_h.mean()), r.said) for r in readings(chain) if (d_h := _distances(chain, shown, r)) is not None]
+    left, said = min(found, default=(off, ""))
+    far = f"the hand's markers are {1e3 * off:.0f} mm (mean) from where the readings put them, frames fitted"
+    if left < min(off / _CLEAR, _ANOTHER):
+        return f"{said}: {far}, {1e3 * left:.0f} mm otherwise; correct the mapping file"
+    if float(np.median(d)) > _ANOTHER:
+        return (
+            f"{far}; no joint reversed and no two swapped explain it: columns of several joints or of markers are "
+            "swapped, readings are another session's, or this is another robot's URDF"
+        )
+    return None
+
+
+def _distances(chain: Chain, shown: Sequence[Shown], reading: Reading) -> np.ndarray | None:
+    """min(|d_i|, 0.5 m) (n,) of all trials; None where they do not tell the constant frames."""
+    try:
+        pairs = [x.pairs(chain, reading, max(_FEWEST, _POSES // len(shown))) for x in shown]
+        A, B = (np.concatenate(x) for x in zip(*pairs, strict=True))
+        if len(A) < _ENOUGH:
+            raise NotEnoughData(f"{len(A)} samples show base and hand")
+        if not all(x.oriented for x in shown):
+            return np.minimum(registration_start(A, B, False).residual, MOST)
+        return distance(hand_eye(A, B), A, B)
+    except NotEnoughData as error:
+        _log.info("joints not compared with the hand: %s", error)
+        return None
+
+
+def wrong_links(measured: Sequence[str], trials: Sequence[Trial], zero: np.ndarray) -> Iterator[Verdict]:
+    """A refusal for each joint whose link readings, its zero (n_measured,) removed, are not those of its motor side."""
+    motor, link = (np.concatenate([getattr(t, side) for t in trials]) for side in ("q_motor", "q_link"))
+    for j, joint in enumerate(measured):
+        known = np.isfinite(link[:, j]) & np.isfinite(motor).all(axis=1)
+        if not known.any():
+            continue
+        rms = float(np.sqrt((((motor - link)[known, j] - zero[j]) ** 2).mean()))
+        if rms > _BEYOND:
+            why = _reason(measured, j, motor[known], link[known, j])
+            message = f"link encoder of {joint} is off its motor side by {rms:.2g} rad rms{why}; correct the recording"
+            yield Verdict("joints", "refused", message)
+
+
+def _reason(measured: Sequence[str], j: int, motor: np.ndarray, link: np.ndarray) -> str:
+    """What explains the readings `link` (n,), or nothing; motor (n, n_measured)."""
+    spread, across = motor.std(axis=0), link.std()
+    covariance = ((motor - motor.mean(axis=0)) * (link - link.mean())[:, None]).mean(axis=0)
+    follows = np.abs(covariance) > _FOLLOWS * np.maximum(spread * across, np.finfo(float).tiny)
+    if follows.any() and not follows[j]:
+        return f": it follows {measured[int(np.argmax(follows))]}"
+    slope = covariance[j] / max(float(spread[j]) ** 2, np.finfo(float).tiny)
+    said = [text for value, text in _SLOPES if abs(slope - value) < _NEAR * max(abs(value), 1.0)]
+    return f": {said[0]}" if said else " (sign, unit, whole turns, order of the joints?)"

@@ -1,0 +1,1 @@
+"""Which postures and motions to record."""

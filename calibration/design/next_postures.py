@@ -1,0 +1,175 @@
+"""The five postures (more, where more are lacking) that would tell most of what the recorded ones leave to tolerances.
+
+    C before = T^-1 Sigma T^-1,     Sigma the covariance of the fit, T = diag(tolerance)        (see `information`)
+    C after  = (C^-1 + sum_5 B' B)^-1
+
+A direction is untold where the data shrink its prior variance by less than a tenth, while postures elsewhere inside the
+limits would shrink it. Directions no posture tells, the gauge, do not move the hand and are not counted. They are
+chosen by D, which looks for untold directions first. After a refused fit the robot is taken as drawn, and its random
+errors as the recorded postures let believe (`believed_play`).
+
+How large the readings' random errors are believed to be where a fit must not be relied on.
+
+    s = lambda s_datasheet of all joints,        ln lambda uniform between ln _LEAST and 0
+    believed s^2 = s_datasheet^2 sum_l lambda_l^2 p(data | lambda_l) / sum_l p(data | lambda_l)
+
+A datasheet says what play is tolerated, not what there is. p(data | lambda) is the evidence, parameters integrated out
+at their tolerances (`evidence`): few postures tell little and leave a third of the datasheet's play (the root mean
+square of a log-uniform factor), more of them tell, and data that fit no robot ask for all of it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.design.candidates import room_of
+from calibration.design.collisions import shapes_of
+from calibration.design.information import dwell_noise, prospect, told_directions
+from calibration.design.plan import Plan, Task, plan
+from calibration.errors import NotEnoughData
+from calibration.inference.marginal_likelihood import Widths, evidence
+from calibration.inference.parameters import Model, ParameterSet
+from calibration.mocap.postures import Postures
+from calibration.recording.experiment import Remedy, Sigma
+from calibration.recording.schema import Description
+from calibration.robot.chain import Chain
+from calibration.robot.hand import HandModel, nominal_hand
+from calibration.stages.geometry.guards import APART, distinct, fewest, joint_lengths
+from calibration.stages.geometry.hand_residual import Errors, hand_problem
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.geometry.parameters import geometry_parameters, play_floor, play_start
+from calibration.verdict import Verdict
+
+STAGE, FILE = "geometry", "record_next.yaml"
+N = 5
+_UNTOLD = 0.9  # of a direction's prior variance, left of it [-]
+_FALLS = 0.7  # sigma after over before, of parameters worth naming [-]
+_NEVER = 0.99  # sigma after over before, of parameters that no posture tells [-]
+_NAMED = 12
+_PROBES = 120  # postures anywhere inside the limits, for what could be told at all
+_SEED = 0  # the same data get the same suggestion
+_LEAST = 1e-2
+_POINTS = 21
+
+
+@dataclass(frozen=True)
+class Known:
+    """What recorded postures tell of a geometry.
+
+    Attributes:
+        hand: The robot as far as it is known.
+        parameters: To be found, with tolerances.
+        play: (k,) random error of each joint's reading [rad, m].
+        description: With the marker noise the recorded postures had.
+        C: (p, p) covariance of the scaled parameters.
+        untold: Number of directions that postures could tell and these did not.
+    """
+
+    hand: HandModel
+    parameters: ParameterSet
+    play: np.ndarray
+    description: Description
+    C: np.ndarray
+    untold: int
+
+
+def record_next(
+    urdf: str, chain: Chain, description: Description, postures: Postures, model: Model, refused: bool
+) -> tuple[Remedy | None, tuple[Verdict, ...]]:
+    """Postures to record after the geometry `model` from `postures`; None where they would tell nothing new."""
+    rng = np.random.default_rng(_SEED)
+    known = _known(chain, description, postures, model, refused, rng)
+    lost = tuple(
+        p.name for p in model.parameters if p.status == "not_identifiable" and p.name in known.parameters.names
+    )
+    short = _short(chain, postures)
+    if not known.untold and not lost and short <= 0:
+        return None, ()
+    try:
+        room = room_of(shapes_of(urdf, chain, description), known.description, rng)
+        task = Task(room, known.hand, known.parameters, known.play, known.C)
+        found = plan(task, max(N, short), "D", rng)
+    except NotEnoughData as error:
+        return None, (Verdict(STAGE, "warning", f"no postures to suggest: {error}"),)
+    remedy = _remedy(found, known, lost, short)
+    sigma = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in remedy.sigma[:3])
+    return remedy, (
+        Verdict(STAGE, "warning", f"{remedy.why}; {len(remedy.postures)} postures that would tell, in {FILE}: {sigma}"),
+    )
+
+
+def _known(
+    chain: Chain, description: Description, postures: Postures, model: Model, refused: bool, rng: np.random.Generator
+) -> Known:
+    """From a fit, or from the datasheet where it must not be relied on."""
+    parameters = geometry_parameters(chain, description)
+    hand, p = nominal_hand(chain, parameters.nominal[:12]), len(parameters)
+    names = [x.name for x in model.parameters]
+    rows = [names.index(name) for name in parameters.names]
+    play = np.maximum(play_start(chain, description), play_floor(chain, description))
+    if refused:
+        theta = np.array([model.parameters[row].value for row in rows])
+        play = believed_play(hand, parameters, postures, theta, play)
+    else:
+        hand = hand_of(model, chain, parameters.nominal[:12])
+        play = model.play if len(model.play) else play
+    description = _as_measured(description, postures)
+    low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits())
+    anywhere = rng.uniform(low, high, size=(_PROBES, len(low)))
+    V = told_directions(prospect(hand, parameters, description, play, anywhere, anywhere[:1], np.eye(p)).B)
+    told = prospect(hand, parameters, description, play, postures.q, anywhere[:1], np.eye(p))
+    C = by_tolerance = told.after(np.arange(len(postures)))
+    if not refused:
+        C = model.covariance[np.ix_(rows, rows)] / np.outer(parameters.scale, parameters.scale)
+    untold = int((np.linalg.eigvalsh(V.T @ by_tolerance @ V) > _UNTOLD).sum())
+    return Known(hand, parameters, play, description, C, untold)
+
+
+def _short(chain: Chain, postures: Postures) -> int:
+    """How many distinct postures a geometry still lacks."""
+    enough = fewest(chain, postures.covariance.shape[1])
+    return enough - distinct(postures.q[:, chain.columns], APART * joint_lengths(chain), enough)
+
+
+def _as_measured(description: Description, postures: Postures) -> Description:
+    """With the marker noise that makes dwells as uncertain as the recorded ones are."""
+    expected = dwell_noise(postures.T_base_hand, description)
+    if expected.shape != postures.covariance.shape:
+        return description
+    ratio = np.trace(np.linalg.solve(expected, postures.covariance), axis1=1, axis2=2) / expected.shape[1]
+    sigma = description.sigmas.marker * float(np.sqrt(np.median(ratio)))
+    return description.model_copy(update={"sigmas": description.sigmas.model_copy(update={"marker": sigma})})
+
+
+def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> Remedy:
+    """The postures with what they do to the hand, to what was lost, and to what they tell most."""
+    hand = [float(found.design.prospect.hand(C).max()) for C in (found.design.prospect.C, found.design.C)]
+    whole = found.remedy(STAGE, "").sigma
+    most = sorted((s for s in whole if s.after < _FALLS * s.before), key=lambda s: s.after / s.before)[:_NAMED]
+    named = {s.name for s in most} | set(lost)
+    why = f"{known.untold} of {_directions(found)} combinations are told by the datasheet's tolerances alone"
+    if short > 0:
+        why = f"{short} distinct postures are lacking; {why}"
+    never = [s.name for s in whole if s.name in lost and s.after > _NEVER * s.before]
+    if set(lost) - set(never):
+        why += f"; not identifiable: {', '.join(name for name in lost if name not in never)}"
+    if never:
+        why += f"; no posture tells {', '.join(never)}"
+    told = (Sigma("hand.position", "m", *hand), *(s for s in whole if s.name in named and s.name not in never))
+    return replace(found.remedy(STAGE, why), sigma=told)
+
+
+def _directions(found: Plan) -> int:
+    return int(told_directions(found.design.prospect.B).shape[1])
+
+
+def believed_play(
+    hand: HandModel, parameters: ParameterSet, postures: Postures, theta: np.ndarray, play: np.ndarray
+) -> np.ndarray:
+    """(k,) [rad, m] from postures, a robot near theta (p,) and the datasheet's `play` (k,)."""
+    problem = hand_problem(hand, parameters, postures, Errors(play, _LEAST * play, np.zeros(0)))
+    at, f = problem.linearise(theta), problem.widths.prior
+    noise, factors = problem.sources(at), np.geomspace(_LEAST, 1.0, _POINTS)
+    values = [evidence(at, noise, problem.prior, Widths(np.append(x * play, 1.0), f)).value for x in factors]
+    likely = np.exp(np.min(values) - np.array(values))
+    return np.asarray(play * np.sqrt(likely @ factors**2 / likely.sum()))

@@ -1,0 +1,1 @@
+"""An estimate and its files."""

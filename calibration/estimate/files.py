@@ -1,0 +1,163 @@
+"""An estimate as files.
+
+    estimate.json            parameters, combinations, verdicts, clocks
+    estimate.nc              covariances, one group a model
+    record_next.yaml         postures and motions for what the data do not tell, see `remedy`; if there is such
+    nominal.urdf             what the placement twists are relative to
+    calibrated.urdf          joint placements of the main model        } only if the result
+    master_calibration.yaml  zeros of the readings of the main model   } may be used: see `estimate_tables`
+    parameters.csv           every parameter of every model            }
+
+The same estimate gives the same bytes. `load_estimate` also reads somebody else's estimate.json, or a bare URDF.
+
+A calibrated URDF: the nominal text with the joint origins moved.
+
+    origin <- origin exp6(xi)           xyz [m], rpy [rad]: R = Rz(yaw) Ry(pitch) Rx(roll)
+
+Near pitch = +-pi/2 yaw and roll turn about one axis and only their sum is defined: yaw is taken first, whatever it is,
+and pitch and roll from Rz(yaw)' R, so that the three together give R to rounding. Zeros of readings do not fit in a
+URDF: they go to master_calibration.yaml, and this file's joint positions are readings minus those.
+"""
+
+import json
+import os
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from pydantic import ValidationError
+
+from calibration.errors import InputError
+from calibration.estimate.estimate import Estimate
+from calibration.estimate.json_schema import EstimateFile, to_estimate, to_file
+from calibration.estimate.tables import parameters_text, zeros_text
+from calibration.inference.parameters import Model
+from calibration.recording import netcdf
+from calibration.recording.experiment import read_remedies, to_text
+from calibration.robot.chain import Chain, chain_of_frames
+from calibration.stages.geometry.model_of_fit import hand_of
+
+JSON, COVARIANCES, NOMINAL = "estimate.json", "estimate.nc", "nominal.urdf"
+CALIBRATED, ZEROS, TABLE = "calibrated.urdf", "master_calibration.yaml", "parameters.csv"
+NEXT = "record_next.yaml"
+
+
+def save_estimate(estimate: Estimate, folder: Path | str) -> None:
+    """Write the files of an estimate into a folder, made where it is missing."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    _replace_text(folder / JSON, json.dumps(to_file(estimate).model_dump(by_alias=True, exclude_none=True), indent=1))
+    _write_covariances(folder / COVARIANCES, estimate)
+    if estimate.urdf is not None:
+        _replace_text(folder / NOMINAL, estimate.urdf)
+    for name in (CALIBRATED, ZEROS, TABLE, NEXT):
+        (folder / name).unlink(missing_ok=True)
+    if estimate.remedies and estimate.robot is not None:
+        _replace_text(folder / NEXT, to_text(estimate.robot.joints, estimate.remedies))
+    if estimate.calibrated and estimate.urdf is not None and estimate.robot is not None:
+        chain = chain_of_frames(
+            estimate.urdf, estimate.robot.joints, estimate.robot.base_frame, estimate.robot.tool_frame
+        )
+        hand = hand_of(estimate.model(estimate.main), chain, np.zeros(12))
+        _replace_text(folder / CALIBRATED, calibrated_urdf(estimate.urdf, hand.chain))
+        _replace_text(folder / ZEROS, zeros_text(hand))
+        _replace_text(folder / TABLE, parameters_text(estimate.models))
+
+
+def load_estimate(path: Path | str) -> Estimate:
+    """Read an estimate: a folder written by `save_estimate`, an estimate.json, or a calibrated URDF.
+
+    Of a URDF the geometry is taken, zeros of readings are 0 and the marker bodies are where the datasheet has them.
+
+    Raises:
+        InputError: There is nothing there that can be read.
+    """
+    path = Path(path)
+    file = path / JSON if path.is_dir() else path
+    text = _text(file)
+    if file.suffix.lower() in (".urdf", ".xml"):
+        return Estimate("calibrated", (), (), (Model("model_2", ()),), "model_2", text)
+    try:
+        found = EstimateFile.model_validate(json.loads(text))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{file}:{error.lineno}:{error.colno}", f"broken JSON: {error.msg}") from error
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc'])) or 'estimate'}: {e['msg']}" for e in error.errors()]
+        raise InputError(file, "; ".join(lines)) from error
+    nominal = file.parent / NOMINAL
+    urdf = _text(nominal) if nominal.is_file() else None
+    suggested = file.parent / NEXT
+    remedies = read_remedies(suggested)[1] if suggested.is_file() else ()
+    return replace(to_estimate(found, urdf, _read_covariances(file.parent / COVARIANCES)), remedies=remedies)
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise InputError(path, "no such file; an estimate is a folder with estimate.json, or a URDF") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, f"cannot be read ({error})") from error
+
+
+def _replace_text(path: Path, text: str) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8", newline="\n")
+    os.replace(part, path)
+
+
+def _write_covariances(path: Path, estimate: Estimate) -> None:
+    part = path.with_name(path.name + ".part")
+    with netcdf.created(part) as file:
+        file.title = "covariance of the parameters of each model, units of the parameters"
+        for model in estimate.models:
+            group = file.createGroup(model.name)
+            netcdf.add_dimensions(group, {"parameter": len(model.parameters)})
+            netcdf.write_labels(group, {"parameter": tuple(p.name for p in model.parameters)})
+            units = {"units": "product of the two parameters' units"}
+            netcdf.write_variable(group, "covariance", model.covariance, ("parameter", "parameter"), "f8", units)
+    os.replace(part, path)
+
+
+def _read_covariances(path: Path) -> dict[str, np.ndarray]:
+    if not path.is_file():
+        return {}
+    with netcdf.opened(path, "write the estimate again") as file:
+        return {name: netcdf.array(group, "covariance") for name, group in file.groups.items()}
+
+
+def calibrated_urdf(urdf: str, chain: Chain) -> str:
+    """The URDF text with the placement twists of `chain` on its joints; all else, comments included, as it was.
+
+    Raises:
+        InputError: A joint of the chain is not in the text.
+    """
+    parser = ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
+    robot = ET.fromstring(urdf, parser=parser)
+    joints = {joint.get("name"): joint for joint in robot.findall("joint")}
+    for name, xi in zip(chain.joints, chain.xi, strict=True):
+        if name not in joints:
+            raise InputError("nominal.urdf", f"no joint {name!r}; it has {sorted(str(j) for j in joints)}")
+        if np.any(xi):
+            _move(joints[name], xi)
+    return '<?xml version="1.0"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def _move(joint: ET.Element, xi: np.ndarray) -> None:
+    origin = joint.find("origin")
+    if origin is None:
+        origin = ET.SubElement(joint, "origin")
+    xyz, rpy = (np.array([float(v) for v in origin.get(key, "0 0 0").split()]) for key in ("xyz", "rpy"))
+    moved = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz) * pin.exp6(xi)
+    origin.set("xyz", " ".join(repr(float(v)) for v in moved.translation))
+    origin.set("rpy", " ".join(repr(float(v)) for v in roll_pitch_yaw(moved.rotation)))
+
+
+def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
+    """Angles (3,) [rad] with Rz(yaw) Ry(pitch) Rx(roll) = R (3, 3) to rounding, everywhere."""
+    yaw = np.arctan2(R[1, 0], R[0, 0])
+    c, s = np.cos(yaw), np.sin(yaw)
+    rest = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
+    return np.array([np.arctan2(-rest[1, 2], rest[1, 1]), np.arctan2(-rest[2, 0], rest[0, 0]), yaw])

@@ -1,0 +1,121 @@
+"""The main model as two small texts other programs read.
+
+    master_calibration.yaml   - joint: NAME            angle = reading - offset            [rad; m where a joint slides]
+                                offset: o              ... - compliance * torque - held * tanh(torque / 0.3 N.m)
+                                compliance: c          [rad/(N.m), m/N], left out where it is 0
+                                held: h                [rad; m], left out where it is 0
+    parameters.csv            name,value,sigma,unit,status,nominal,model, a line each, every model of the estimate
+
+PAL's list of joints and offsets. Reading: what the motor-side encoder reports, in the URDF's sense of the joint;
+angle: joint position of calibrated.urdf. Who adds offsets to readings has to change their sign.
+"""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as checked
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from calibration.errors import InputError
+from calibration.inference.parameters import Model
+from calibration.robot.hand import HandModel
+
+COLUMNS = ("name", "value", "sigma", "unit", "status", "nominal", "model")
+_HEADER = """\
+# Zeros of the motor-side readings, to be used with calibrated.urdf, whose joint positions are these angles:
+#     angle = reading - offset        [rad; m for joints that slide]
+"""
+_ELASTIC = """\
+#     angle = reading - offset - compliance * torque      compliance [rad/(N.m)], torque: what holds the joint at rest
+"""
+_PLAY = """\
+#             - held * tanh(torque / 0.3 N.m)             held [rad], half the play that gravity holds on one flank
+"""
+
+
+@checked(frozen=True, config={"extra": "forbid", "allow_inf_nan": False})
+class Zero:
+    """What turns a joint's reading into its angle.
+
+    Attributes:
+        joint: Its name.
+        offset: Reading at angle 0 [rad, m].
+        compliance: Of its gear [rad/(N.m), m/N].
+        held: Half of its play that gravity holds on one flank [rad, m].
+    """
+
+    joint: str
+    offset: float
+    compliance: float = 0.0
+    held: float = 0.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of parameters.csv; see `estimate.Parameter`."""
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+    status: str
+    nominal: float
+    model: str
+
+
+def zeros_text(hand: HandModel) -> str:
+    """master_calibration.yaml of a calibrated robot."""
+    plays = bool(hand.held.any())
+    lines = [_HEADER + (_ELASTIC if plays or hand.compliance.any() else "") + (_PLAY if plays else "")]
+    for name, *values in zip(hand.chain.joints, hand.offset, hand.compliance, hand.held, strict=True):
+        lines.append(f"- joint: {name}\n  offset: {float(values[0])!r}\n")
+        lines += [f"  {key}: {float(x)!r}\n" for key, x in zip(("compliance", "held"), values[1:], strict=True) if x]
+    return "".join(lines)
+
+
+def read_zeros(path: Path | str) -> tuple[Zero, ...]:
+    """Read master_calibration.yaml.
+
+    Raises:
+        InputError: It is not such a list.
+    """
+    try:
+        entries = YAML(typ="safe", pure=True).load(Path(path).read_text(encoding="utf-8"))
+        return TypeAdapter(tuple[Zero, ...]).validate_python(entries)
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
+        raise InputError(path, "; ".join(lines)) from error
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        raise InputError(path, f"not a list of joints and offsets ({error})") from error
+
+
+def parameters_text(models: Sequence[Model]) -> str:
+    """parameters.csv of these models; numbers read back to the same doubles."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for model in models:
+        for p in model.parameters:
+            writer.writerow([p.name, repr(p.value), repr(p.sigma), p.unit, p.status, repr(p.nominal), model.name])
+    return text.getvalue()
+
+
+def read_parameters(path: Path | str) -> tuple[Row, ...]:
+    """Read parameters.csv.
+
+    Raises:
+        InputError: It is not such a table.
+    """
+    try:
+        with Path(path).open(encoding="utf-8", newline="") as file:
+            return TypeAdapter(tuple[Row, ...]).validate_python([dict(row) for row in csv.DictReader(file)])
+    except ValidationError as error:
+        lines = [f"line {int(e['loc'][0]) + 2}, {e['loc'][-1]}: {e['msg']}" for e in error.errors()]
+        raise InputError(path, "; ".join(lines)) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, f"cannot be read ({error})") from error

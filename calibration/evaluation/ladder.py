@@ -1,0 +1,100 @@
+"""Rows of the ladder: each model's errors over trials, pooled into figures."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from calibration.evaluation.pose_errors import PoseErrors, RowMetrics, dwell_means, row_metrics, turned
+from calibration.mocap.postures import dwell_windows
+from calibration.prediction.predictor import REFERENCE
+from calibration.recording.trial import Trial
+
+Trials = Literal["dynamic", "static", "all"]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Errors of one row in one trial.
+
+    Attributes:
+        model: Row of the ladder.
+        base: `fixed` or `measured`.
+        encoder: `motor`.
+        trial_id: The trial.
+        kind: Its kind.
+        t: (n,) [s, mocap clock].
+        errors: n poses over time, NaN where nothing can be compared.
+        scored: The errors that count: dwell means of a static trial, else the samples after the first second.
+    """
+
+    model: str
+    base: str
+    encoder: str
+    trial_id: str
+    kind: str
+    t: np.ndarray
+    errors: PoseErrors
+    scored: PoseErrors
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the ladder."""
+
+    model: str
+    trials: Trials
+    base: str
+    encoder: str
+    against: str
+    metrics: RowMetrics
+
+
+def scored_errors(t: np.ndarray, errors: PoseErrors, trial: Trial, static: bool) -> PoseErrors:
+    """The errors at t (n,) [s, mocap clock] that count."""
+    if static:
+        return dwell_means(t, errors, dwell_windows(trial))
+    after = t > trial.t_mocap[0] + REFERENCE
+    return PoseErrors(errors.position[after], errors.rotation[after])
+
+
+def ladder(traces: list[Trace], against: str) -> Iterator[Row]:
+    """Rows of dynamic, static and all trials, in the traces' order of models."""
+    keys = dict.fromkeys((t.model, t.base, t.encoder) for t in traces)
+    groups: tuple[tuple[Trials, Callable[[Trace], bool]], ...] = (
+        ("dynamic", lambda t: t.kind != "static"),
+        ("static", lambda t: t.kind == "static"),
+        ("all", lambda t: True),
+    )
+    for model, base, encoder in keys:
+        mine = [t for t in traces if (t.model, t.base, t.encoder) == (model, base, encoder)]
+        for name, belongs in groups:
+            parts = [t.scored for t in mine if belongs(t)]
+            if parts:
+                errors = PoseErrors(
+                    np.concatenate([p.position for p in parts]), np.concatenate([p.rotation for p in parts])
+                )
+                yield Row(model, name, base, encoder, against, row_metrics(errors))
+
+
+def row_entry(row: Row) -> dict[str, Any]:
+    """A row as evaluation.json and score.json have it."""
+    figures = asdict(row.metrics) | turned(row.metrics)
+    figures["per_axis_mm"] = dict(zip("xyz", row.metrics.per_axis_mm, strict=True))
+    names = {"model": row.model, "trials": row.trials, "base": row.base, "encoder": row.encoder}
+    return names | {"against": row.against} | figures
+
+
+def trial_entry(trace: Trace) -> dict[str, Any]:
+    """One row in one trial: where a row is good and where it is not."""
+    m = row_metrics(trace.scored)
+    return {
+        "trial": trace.trial_id,
+        "model": trace.model,
+        "base": trace.base,
+        "encoder": trace.encoder,
+        "n": m.n,
+        "position_rmse_component_mm": m.position_rmse_component_mm,
+        "orientation_rmse_deg": turned(m)["orientation_rmse_deg"],
+    }

@@ -1,0 +1,1 @@
+"""Laboratory formats: C3D, CSV and ROS bags, both ways."""

@@ -1,0 +1,233 @@
+"""CSV files of one trial, read by the tables of the mapping: samples on a clock, or static postures.
+
+A CSV file as named columns of numbers; what is wrong in it is told by line and column.
+"""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+
+from calibration.errors import InputError
+from calibration.formats.mapping.channels import Joints, Markers, Means, Plates, Reader, Recorded
+from calibration.formats.mapping.layouts import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels
+from calibration.formats.mapping.plate_convention import checked_against_cop, to_action
+from calibration.recording.schema import Plate, Setup
+
+_UNITS = ANGLES | LENGTHS
+
+
+def read_csv(files: Sequence[Path], tables: Sequence[CsvTable], setup: Setup) -> Recorded:
+    """What the files of one trial hold; each is of the table with the longest matching suffix.
+
+    Raises:
+        InputError: Something in a file is not as the mapping says.
+    """
+    return reduce(Recorded.with_channels_of, (_read(path, table_of(path, tables), setup) for path in files))
+
+
+def table_of(path: Path, tables: Sequence[CsvTable]) -> CsvTable:
+    """The table a file belongs to.
+
+    Raises:
+        InputError: None has its suffix.
+    """
+    fitting = [t for t in tables if path.name.endswith(t.suffix)]
+    if not fitting:
+        raise InputError(path, f"csv: no table of the mapping has its suffix; there are {[t.suffix for t in tables]}")
+    return max(fitting, key=lambda t: len(t.suffix))
+
+
+def _read(path: Path, table: CsvTable, setup: Setup) -> Recorded:
+    text = read_text(path)
+    position = _positions(text, table) if table.markers else None
+    if table.time is None:
+        q = np.stack([text.numbers([c.motor], _UNITS[c.unit])[:, 0] for c in table.joints.values()], axis=1)
+        means = Means(
+            tuple(table.joints), q, tuple(table.markers), np.asarray(position), float(table.marker_std or 0.0)
+        )
+        return Recorded(str(path), means=means, notes=_unused(text, table))
+    t = text.seconds(table.time.column, table.time.unit)
+    _check_times(text, table.time.column, t)
+    markers = None if position is None else Markers(t, tuple(table.markers), position)
+    plates, notes = _plates(text, table, setup, t)
+    joints = _joints(text, table, t) if table.joints else None
+    others = {"robot": joints, "plate": plates}
+    together = tuple(name for name, group in others.items() if markers is not None and group is not None)
+    return Recorded(str(path), markers, joints, plates, together=together, notes=(*notes, *_unused(text, table)))
+
+
+def csv_reader(tables: Sequence[CsvTable], setup: Setup) -> Reader:
+    """CSV files by the tables of a mapping."""
+    return Reader(
+        lambda files: read_csv(files, tables, setup),
+        lambda path: path.name.removesuffix(table_of(path, tables).suffix),
+    )
+
+
+@dataclass(frozen=True)
+class CsvText:
+    """Cells of a file: `header` names the columns, `cells` (n, c) are as written."""
+
+    path: Path
+    header: tuple[str, ...]
+    cells: np.ndarray
+
+    def numbers(self, columns: Sequence[str], factor: float = 1.0, gaps: bool = False) -> np.ndarray:
+        """Values (n, len(columns)) times `factor`; an empty cell is NaN where `gaps` are allowed.
+
+        Raises:
+            InputError: A column is not there, or a cell is no number.
+        """
+        chosen = self.cells[:, [self.index(name) for name in columns]]
+        try:
+            return np.asarray(np.where(chosen == "", "nan", chosen) if gaps else chosen, dtype=float) * factor
+        except ValueError as error:
+            row, k, text = next((r, k, t) for (r, k), t in np.ndenumerate(chosen) if not _is_number(t, gaps))
+            what = f"{str(text)!r} is no number" if text else "the cell is empty"
+            raise self.error(row, columns[k], f"{what}; only an occluded marker may be left out") from error
+
+    def seconds(self, column: str, unit: str) -> np.ndarray:
+        """Times (n,) [s] of a column in `s`, `ms` or `utc` (since the midnight before the first row)."""
+        if unit != "utc":
+            return self.numbers([column], 1e-3 if unit == "ms" else 1.0)[:, 0]
+        index, stamps = self.index(column), []
+        for row, text in enumerate(self.cells[:, index]):
+            try:
+                stamps.append(datetime.fromisoformat(text.replace("_", "T")).replace(tzinfo=None))
+            except ValueError as error:
+                message = f"{text!r} is no UTC stamp such as 2023-09-20_16:40:52.540797"
+                raise self.error(row, column, message) from error
+        midnight = stamps[0].replace(hour=0, minute=0, second=0, microsecond=0)
+        return np.array([(stamp - midnight).total_seconds() for stamp in stamps])
+
+    def index(self, column: str) -> int:
+        """Place of a column.
+
+        Raises:
+            InputError: There is none of that name.
+        """
+        if column not in self.header:
+            known = ", ".join(self.header)
+            raise InputError(
+                f"{self.path}:1:1", f"{column}: no such column; the file has {known}; correct the mapping file"
+            )
+        return self.header.index(column)
+
+    def error(self, row: int, column: str, message: str) -> InputError:
+        """An error at a cell."""
+        return InputError(f"{self.path}:{row + 2}:{self.index(column) + 1}", f"{column}: {message}")
+
+
+def _positions(text: CsvText, table: CsvTable) -> np.ndarray:
+    """Marker positions (n, m, 3) [m], NaN where occluded."""
+    factor = LENGTHS[table.marker_unit]
+    found = np.stack([text.numbers(c, factor, gaps=True) for c in table.markers.values()], axis=1)
+    zero = (found == 0.0).all(axis=2)
+    if table.gaps == "zero":
+        found[zero] = np.nan
+    elif zero.any():
+        row, k = np.argwhere(zero)[0]
+        column = list(table.markers.values())[k][0]
+        raise text.error(row, column, "the marker is at exactly (0, 0, 0); if that is a gap, map `gaps: zero`")
+    return found
+
+
+def _check_times(text: CsvText, column: str, t: np.ndarray) -> None:
+    back = np.flatnonzero(~(np.diff(t) > 0.0))
+    if len(back):
+        row = int(back[0]) + 1
+        said = "is the same as in the row before" if t[row] == t[row - 1] else "does not increase"
+        raise text.error(row, column, f"time {text.cells[row, text.index(column)]} {said}; remove or sort such rows")
+
+
+def _joints(text: CsvText, table: CsvTable, t: np.ndarray) -> Joints:
+    def of(field: str) -> np.ndarray:
+        columns = []
+        for channel in table.joints.values():
+            name, factor = getattr(channel, field), 1.0 if field == "effort" else _UNITS[channel.unit]
+            known = [np.nan] * len(t) if name is None else text.numbers([name], factor, gaps=field != "motor")[:, 0]
+            columns.append(np.asarray(known))
+        return np.stack(columns, axis=1)
+
+    wrist = None
+    if (w := table.wrist) is not None:
+        sign = 1.0 if w.convention == "action" else -1.0
+        wrist = sign * text.numbers((*w.force, *w.moment), gaps=True)
+    names = tuple(table.joints)
+    return Joints(t, names, of("motor"), of("link"), of("velocity"), of("effort"), of("command"), wrist)
+
+
+def _plates(text: CsvText, table: CsvTable, setup: Setup, t: np.ndarray) -> tuple[Plates | None, tuple[str, ...]]:
+    if not table.plates:
+        return None, ()
+    known, wrenches, notes = {p.name: p for p in setup.plates}, [], []
+    for name, channels in table.plates.items():
+        if name not in known:
+            raise InputError(text.path, f"plate {name!r} of the mapping is not in its setup, which has {sorted(known)}")
+        wrench, note = _wrench(text, channels, known[name])
+        wrenches.append(wrench)
+        notes.append(note)
+    centre = np.array([known[name].centre for name in table.plates])
+    return Plates(t, tuple(table.plates), np.stack(wrenches, axis=1), centre), tuple(notes)
+
+
+def _wrench(text: CsvText, channels: PlateChannels, plate: Plate) -> tuple[np.ndarray, str]:
+    force = text.numbers(channels.force) * channels.signs
+    moment = text.numbers(channels.moment, MOMENTS[channels.moment_unit])
+    wrench = to_action(force, moment, channels, plate)
+    cop = text.numbers(channels.cop, LENGTHS[channels.cop_unit]) if channels.cop else None
+    place = f"{text.path}: {', '.join((*channels.force, *channels.moment))}"
+    return wrench, checked_against_cop(place, force, moment, cop, channels, plate)
+
+
+def _unused(text: CsvText, table: CsvTable) -> tuple[str, ...]:
+    used = {c for columns in table.markers.values() for c in columns}
+    used |= {c for j in table.joints.values() for c in (j.motor, j.link, j.velocity, j.effort, j.command) if c}
+    used |= {c for p in table.plates.values() for c in (*p.force, *p.moment, *(p.cop or ()))}
+    used |= {*table.wrist.force, *table.wrist.moment} if table.wrist else set()
+    used |= {table.time.column} if table.time else set()
+    left = [name for name in text.header if name not in used]
+    return (f"{text.path.name}: columns not used: {', '.join(left)}",) if left else ()
+
+
+def read_text(path: Path) -> CsvText:
+    """Read a file with one header line.
+
+    Raises:
+        InputError: It cannot be read, has no header or no rows, names a column twice, or a row is of another length.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, f"is no CSV text ({error}); export it again") from error
+    if len(rows) < 2:
+        raise InputError(f"{path}:1:1", "no rows below the header; export the file again")
+    header = tuple(name.strip() for name in rows[0])
+    if all(_is_number(name, gaps=False) for name in header[1:]):
+        raise InputError(f"{path}:1:1", "the first line holds numbers; write a header line that names the columns")
+    twice = sorted({name for name in header if header.count(name) > 1})
+    if twice:
+        raise InputError(f"{path}:1:{header.index(twice[0]) + 1}", f"columns named more than once: {twice}")
+    for line, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            message = f"{len(row)} cells, the header has {len(header)}: truncated or damaged; export the file again"
+            raise InputError(f"{path}:{line}:{len(row)}", message)
+    return CsvText(path, header, np.char.strip(np.array(rows[1:], dtype=str)))
+
+
+def _is_number(text: str, gaps: bool) -> bool:
+    if not text:
+        return gaps
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

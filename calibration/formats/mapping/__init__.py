@@ -1,0 +1,1 @@
+"""The mapping from laboratory files to channels of a trial."""

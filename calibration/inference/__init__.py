@@ -1,0 +1,1 @@
+"""Estimation: priors, maximum a posteriori, marginal likelihood, identifiability, outliers."""

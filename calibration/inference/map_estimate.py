@@ -1,0 +1,207 @@
+"""Maximum a posteriori fit of a hand model to static postures, its random errors and its priors' widths estimated too.
+
+    r_i(theta) = log6(T_measured_i^-1 T_B_H(q_i, theta))                local twist of the hand [m, rad]
+    minimise  sum_i w_i r_i' C_i^-1 r_i  +  sum_j ((theta_j - nominal_j) / tolerance_j)^2 / f_h(j)
+    C_i = S_i + Jq_i diag(s^2) Jq_i' (+ position and rotation of the hand)
+
+S_i is the measured pose's covariance, s_j the random error of joint j's reading (play, friction: what no constant
+describes), carried to the hand by that posture's own lever arms. s and f maximise the evidence of the data linearised
+at theta, theta integrated out (`evidence`), on a spread subset where postures are many; Gauss-Newton steps on all of
+them in between.
+References: MacKay, Neural Computation 1992; Hollerbach, Khalil, Gautier, Springer Handbook of Robotics, ch. 6.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import lapack
+
+from calibration.inference.marginal_likelihood import Linearised, Noise, Widths, inverse_and_log_det, moved_by, refined
+from calibration.inference.noise_selection import needed
+from calibration.inference.parameters import Prior
+
+_OUTER = 15
+_PROMISE = 1e-3  # the last Gauss-Newton step promises a smaller decrease of the cost [-], the one after it 1e-7
+_SAME = 1e-2  # outer iterations stop below this change of log s [-], a fraction of what 160 postures tell
+_HASTY, _HASTY_PROMISE = 0.1, 1.0
+_MANY = 960  # components the evidence is asked with: standard deviations to 4 %
+_LEVERAGE = 20.0  # components per parameter above which a posture hardly moves its own prediction
+_ALIKE = 1e-5  # smallest over largest pivot of the normal equations [-]
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is to be fitted.
+
+    Attributes:
+        linearise: Residuals and derivatives at theta (p,).
+        sources: Sources of noise of a linearised problem.
+        prior: Of the parameters.
+        widths: Start values.
+        stated: The random errors are stated beforehand, by a datasheet: all of them are believed, none dropped.
+    """
+
+    linearise: Callable[[np.ndarray], Linearised]
+    sources: Callable[[Linearised], Noise]
+    prior: Prior
+    widths: Widths
+    stated: bool = False
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result of a fit.
+
+    Attributes:
+        at: The problem at the solution.
+        noise: Sources of random errors there.
+        widths: Sizes of the random errors and factors on the priors.
+        covariance: (p, p) of theta.
+        whitener: (n, d, d) W with W' W = C^-1.
+        converged: Whether both theta and the widths stood still.
+    """
+
+    at: Linearised
+    noise: Noise
+    widths: Widths
+    covariance: np.ndarray
+    whitener: np.ndarray
+    converged: bool
+
+    @property
+    def theta(self) -> np.ndarray:
+        """Estimated parameters (p,)."""
+        return self.at.theta
+
+    @property
+    def play(self) -> np.ndarray:
+        """(k,) random reading error of each joint, standard deviation [rad, m]."""
+        return self.widths.noise[: self.at.J_joint.shape[2]]
+
+    @property
+    def hand_error(self) -> np.ndarray:
+        """Random errors of the hand's position [m] and rotation [rad], (2,), (1,) or (0,) as they were asked for."""
+        return self.widths.noise[self.at.J_joint.shape[2] : -1]
+
+    @property
+    def J_white(self) -> np.ndarray:
+        """Whitened Jacobian (d n, p)."""
+        return self.rows_white(np.arange(len(self.at.r)))
+
+    def rows_white(self, chosen: np.ndarray) -> np.ndarray:
+        """That of some postures."""
+        return (self.whitener[chosen] @ self.at.J[chosen]).reshape(-1, len(self.theta))
+
+    @property
+    def r_white(self) -> np.ndarray:
+        """Whitened residuals (n, d) [-]."""
+        return (self.whitener @ self.at.r[..., None])[..., 0]
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A Gauss-Newton step: change of theta (p,), promised decrease of the cost, covariance (p, p), the cost before."""
+
+    change: np.ndarray
+    promise: float
+    covariance: np.ndarray
+    cost: float
+
+
+def solve(
+    problem: Problem, at: Linearised, weigh: Callable[[np.ndarray], np.ndarray] | None = None, hasty: bool = False
+) -> Fit:
+    """Alternate evidence and Gauss-Newton until both stand still.
+
+    Args:
+        problem: What is to be fitted.
+        at: The problem where to start.
+        weigh: Weights (n,) from squared distances (n,) as `distances` gives them; one where it is not given.
+        hasty: Be content with widths to a tenth and theta to a sigma, as a start for all postures.
+    """
+    same, promise = (_HASTY, _HASTY_PROMISE) if hasty else (_SAME, _PROMISE)
+    widths, noise = problem.widths, problem.sources(at)
+    some = spread(len(at.r), at.r.shape[1], _MANY)
+    change, free = np.inf, None
+    for _ in range(_OUTER):
+        settled = change < same
+        old = widths
+        if not settled and (hasty or problem.stated):
+            widths, _ = refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
+        elif not settled:
+            free, widths = needed(at.rows(some), noise.rows(some), problem.prior, widths, free, same)
+        W = noise.whitener(widths.noise)
+        step = _step(problem.prior, at, W, widths)
+        if not settled:
+            change = max(moved_by(old.noise, widths.noise, 10.0 * noise.floor), moved_by(old.prior, widths.prior, 0.0))
+        if weigh is not None and not settled:
+            noise, before = (
+                replace(noise, weight=weigh(distances(at.moved(step.change), noise, widths, step.covariance))),
+                noise,
+            )
+            change = max(change, float(np.abs(noise.weight - before.weight).max()))
+        still = step.promise < promise
+        if still and change < same:
+            return Fit(at.moved(step.change), noise, widths, step.covariance, W, True)
+        lower = at if still else _descended(problem, at, W, widths, step)
+        if lower is None:
+            break
+        at, noise = lower, replace(problem.sources(lower), weight=noise.weight)
+    return Fit(at, noise, widths, step.covariance, W, False)
+
+
+def spread(n: int, d: int, components: int) -> np.ndarray:
+    """Evenly spread ones of n postures with d components each, together about as many as asked for."""
+    return np.unique(np.linspace(0, n - 1, components // d).astype(int))
+
+
+def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarray) -> np.ndarray:
+    """Squared Mahalanobis distance (n,) of each posture from what all others predict [-].
+
+    r' (I - w M)^-1 (I - w M + M)^-1 r,     M = W J covariance J' W'
+    """
+    root, (n, d, p) = noise.roots(widths.noise), at.J.shape
+    r = (root @ at.r[..., None])[..., 0]
+    if n * d > _LEVERAGE * p:
+        return (r**2).sum(axis=1)
+    A = root @ at.J
+    M, eye = A @ covariance @ np.swapaxes(A, 1, 2), np.eye(d)
+    left = eye - noise.weight[:, None, None] * M
+    # Rounding may leave a posture that is nowhere else in the data a negative share.
+    inner = np.linalg.solve(left, np.linalg.solve(left + M, r[..., None]))[..., 0]
+    return np.abs((r * inner).sum(axis=1))
+
+
+def _step(prior: Prior, at: Linearised, W: np.ndarray, widths: Widths) -> _Step:
+    """From the normal equations; by orthogonal factors where data and priors differ too much for those."""
+    scale, (n, d, p) = prior.scale, at.J.shape
+    A, r = (W @ at.J).reshape(n * d, p), (W @ at.r[..., None]).ravel()
+    root = np.sqrt(prior.precision(widths.prior)) * scale
+    off = root * (at.theta - prior.nominal) / scale
+    cost = float(r @ r + off @ off)
+    information = (A.T @ A) * scale * scale[:, None] + np.diag(root**2)
+    factor, failed = lapack.dpotrf(information, lower=True)
+    diagonal = np.diagonal(factor)
+    if failed or diagonal.min() < _ALIKE * diagonal.max():
+        stacked = np.vstack([A * scale, np.diag(root)])
+        change = -np.linalg.lstsq(stacked, np.concatenate([r, off]), rcond=None)[0]
+        promise, covariance = float(((stacked @ change) ** 2).sum()), inverse_and_log_det(information)[0]
+    else:
+        gradient = scale * (A.T @ r) + root * off
+        change = -lapack.dpotrs(factor, gradient, lower=True)[0]
+        promise, covariance = float(-gradient @ change), inverse_and_log_det(information)[0]
+    return _Step(scale * change, promise, covariance * scale * scale[:, None], cost)
+
+
+def _descended(problem: Problem, at: Linearised, W: np.ndarray, widths: Widths, step: _Step) -> Linearised | None:
+    """The problem after a step, halved until the cost at fixed weights does not rise; None where it always does."""
+    prior, precision = problem.prior, problem.prior.precision(widths.prior)
+    for halved in range(12):
+        trial = problem.linearise(at.theta + 0.5**halved * step.change)
+        cost = float(((W @ trial.r[..., None]) ** 2).sum() + (precision * (trial.theta - prior.nominal) ** 2).sum())
+        if cost <= step.cost * (1.0 + 1e-12):
+            return trial
+    return None

@@ -1,0 +1,152 @@
+"""Parameters with their priors, and models as tables of estimated parameters."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+Status = Literal["estimated", "combined", "not_identifiable"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a model.
+
+    Attributes:
+        name: As in the contract.
+        unit: `m`, `rad`, `s` or `-`.
+        nominal: Datasheet value.
+        value: Estimate.
+        sigma: Standard deviation, priors included.
+        status: Whether the data fix it alone, only in combinations, or not at all.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    value: float
+    sigma: float
+    status: Status
+
+
+@dataclass(frozen=True)
+class Combination:
+    """An identifiable combination of parameters.
+
+    Attributes:
+        name: Its leading parameter, whose coefficient is 1.
+        coefficients: (p,) of all parameters.
+        value: [unit of the leading parameter].
+        sigma: Its standard deviation.
+    """
+
+    name: str
+    coefficients: np.ndarray
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Model:
+    """Parameters that were estimated together.
+
+    Attributes:
+        name: Row of the ladder: `registration`, `model_2`, ...
+        parameters: In a fixed order.
+        combinations: Identifiable combinations of more than one parameter; coefficients in the parameters' order.
+        covariance: (p, p).
+        joints: Joints of the chain, base to tip.
+        play: (k,) random reading error of each joint, standard deviation [rad, m]; empty where not estimated.
+        rank: Number of identifiable combinations; 0 where not known.
+        condition: Condition number of the scaled whitened Jacobian [-]; 0 where not known.
+        hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    combinations: tuple[Combination, ...] = ()
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    joints: tuple[str, ...] = ()
+    play: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rank: int = 0
+    condition: float = 0.0
+    hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def value(self, name: str, default: float) -> float:
+        """Estimate of a parameter, `default` where the model has none of that name."""
+        return next((p.value for p in self.parameters if p.name == name), default)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Independent Gaussian priors.
+
+    Attributes:
+        nominal: (p,).
+        tolerance: (p,) standard deviations; inf where there is none.
+        group: (p,) parameters whose tolerances share a factor decided by the data; -1: as it stands.
+    """
+
+    nominal: np.ndarray
+    tolerance: np.ndarray
+    group: np.ndarray
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(p,) finite scale of each parameter: its tolerance, else 1 mm or 1 mrad [m, rad]."""
+        return np.where(np.isfinite(self.tolerance), self.tolerance, 1e-3)
+
+    @property
+    def n_groups(self) -> int:
+        """Number of groups with a factor."""
+        return int(self.group.max(initial=-1)) + 1
+
+    def factor(self, f: np.ndarray) -> np.ndarray:
+        """(p,) factor on each squared tolerance, 1 where the group is -1."""
+        return np.append(f, 1.0)[self.group]
+
+    def precision(self, f: np.ndarray) -> np.ndarray:
+        """(p,) inverse variances with factors f (h,) on the squared tolerances."""
+        return 1.0 / (self.factor(f) * self.tolerance**2)
+
+    def held(self, f: np.ndarray, strength: float) -> float:
+        """Minus twice the logarithm of the priors' own constant, and of what holds f near 1."""
+        sizes = np.bincount(self.group[self.group >= 0], minlength=len(f))
+        return float(((sizes + strength) * np.log(f) + strength / f).sum())
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """Parameters of a model.
+
+    Attributes:
+        names: As in the contract, length p.
+        units: `m` or `rad`, length p.
+        nominal: (p,) datasheet values.
+        tolerance: (p,) standard deviations of the prior; inf where there is none.
+        group: (p,) parameters whose tolerances share a factor that the data decide, -1: as they stand; None: all stand.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    nominal: np.ndarray
+    tolerance: np.ndarray
+    group: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def prior(self) -> Prior:
+        """What is believed of them beforehand."""
+        return Prior(self.nominal, self.tolerance, self.groups)
+
+    @property
+    def groups(self) -> np.ndarray:
+        """(p,) group of each, -1 where its tolerance stands."""
+        return np.full(len(self), -1) if self.group is None else self.group
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(p,) finite scale of each parameter: its tolerance, else 1 mm or 1 mrad [m, rad]."""
+        return self.prior.scale

@@ -1,0 +1,1 @@
+"""Motion capture: marker labels, cluster shapes and poses, postures of the hand."""

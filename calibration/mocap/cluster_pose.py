@@ -1,0 +1,93 @@
+"""Pose of a rigid marker cluster by least squares, all times at once.
+
+    minimise sum_m w_m |p_m - (R x_m + t)|^2        p measured [m, lab], x nominal [m, body], w 1 where seen
+    R  the rotation nearest to   sum_m w_m (p_m - p0)(x_m - x0)',     t = p0 - R x0
+
+With noise sigma per axis and marker, the local twist (linear, angular) of the pose has covariance
+
+    sigma^2 (sum_m A_m' A_m)^-1,   A_m = [I, -[x_m]x]            [m, rad]
+
+Reference: Arun, Huang, Blostein, IEEE PAMI 1987; Umeyama, IEEE PAMI 1991.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.errors import NotEnoughData, ShapeError
+from calibration.numerics.alignment import nearest_rotations
+from calibration.numerics.lie import compose, skew
+from calibration.recording.schema import Body
+from calibration.recording.trial import Trial
+
+_FLAT = 1e-6  # second singular value of a cluster over its first [-] below which it is a line
+
+
+@dataclass(frozen=True)
+class BodyPoses:
+    """Poses of a marker body.
+
+    Attributes:
+        T: (n, 4, 4) T_lab_body, NaN where fewer than 3 markers were seen.
+        residual: (n, m, 3) measured minus fitted marker positions [m, lab], NaN where occluded.
+        covariance: (n, 6, 6) of the local twist for 1 m of noise per axis; times sigma^2 [m, rad].
+    """
+
+    T: np.ndarray
+    residual: np.ndarray
+    covariance: np.ndarray
+
+
+def body_poses(xyz: np.ndarray, positions: np.ndarray) -> BodyPoses:
+    """Poses of a cluster with nominal markers xyz (m, 3) [m] from positions (n, m, 3) [m, lab], NaN = occluded."""
+    if positions.ndim != 3 or positions.shape[1:] != xyz.shape:
+        raise ShapeError("positions", positions.shape, ("n", *xyz.shape))
+    seen = np.isfinite(positions).all(axis=2)
+    w = seen.astype(float)[..., None]
+    count = np.maximum(w.sum(axis=1), 1.0)
+    p = np.where(seen[..., None], positions, 0.0)
+    x0, p0 = (w * xyz).sum(axis=1) / count, p.sum(axis=1) / count
+    R = nearest_rotations(np.swapaxes(w * (p - p0[:, None]), 1, 2) @ (xyz - x0[:, None]))
+    T = compose(R, p0 - (R @ x0[..., None])[..., 0])
+    covariance, usable = _covariances(xyz, seen)
+    T[~usable] = np.nan
+    fitted = (T[:, :3, :3] @ xyz.T + T[:, :3, 3:]).swapaxes(1, 2)
+    return BodyPoses(T, np.where(seen[..., None], positions, np.nan) - fitted, covariance)
+
+
+def poses_of(body: Body, trial: Trial) -> BodyPoses:
+    """Poses of a marker body throughout a trial, at its `t_mocap`; a body without markers is the positions' own frame.
+
+    Raises:
+        NotEnoughData: The trial does not record three of its markers.
+    """
+    if not body.markers:
+        return still_poses(len(trial.t_mocap))
+    recorded = {name: i for i, name in enumerate(trial.marker)}
+    markers = [m for m in body.markers if m.name in recorded]
+    if len(markers) < 3:
+        raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {[m.name for m in markers]} are recorded")
+    columns = [recorded[m.name] for m in markers]
+    return body_poses(np.array([m.xyz for m in markers]), trial.marker_position[:, columns])
+
+
+def still_poses(n: int) -> BodyPoses:
+    """Poses of the body whose frame the marker positions are in: the identity, exactly, n times."""
+    return BodyPoses(np.tile(np.eye(4), (n, 1, 1)), np.full((n, 0, 3), np.nan), np.zeros((n, 6, 6)))
+
+
+def _covariances(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit covariance (n, 6, 6) and whether the visible markers fix a pose (n,), once per visibility pattern."""
+    if len(seen) and seen.all():
+        patterns, which = seen[:1], np.zeros(len(seen), dtype=int)
+    else:
+        _, first, which = np.unique(np.packbits(seen, axis=1), axis=0, return_index=True, return_inverse=True)
+        patterns, which = seen[first], which.reshape(len(seen))
+    covariance = np.full((len(patterns), 6, 6), np.nan)
+    for k, pattern in enumerate(patterns):
+        x = xyz[pattern]
+        spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False) if len(x) >= 3 else np.zeros(2)
+        if spread[1] > _FLAT * max(spread[0], np.finfo(float).tiny):
+            A = np.concatenate([np.broadcast_to(np.eye(3), (len(x), 3, 3)), -skew(x)], axis=2)
+            covariance[k] = np.linalg.inv(np.einsum("mij,mik->jk", A, A))
+    return covariance[which], np.isfinite(covariance[:, 0, 0])[which]

@@ -1,0 +1,227 @@
+"""Static postures: what the encoders read and where the hand was in the base, with covariance.
+
+Means over each dwell, shrunk on both sides; robot samples are taken at the mocap clock. The hand's pose in the base is
+that of the two clusters' averaged markers. Its local twist has covariance
+
+    S = f (C_hand + Ad(T_H_B) C_base Ad(T_H_B)') sigma^2 / n
+
+f >= 1 says how much more the means of quarter dwells scatter than independent samples of sigma would: noise that is
+correlated in time, and motion that has not died out.
+"""
+
+import logging
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.mocap.cluster_pose import BodyPoses, body_poses, poses_of, still_poses
+from calibration.numerics.lie import adjoint, compose, inverse, skew, to_vector
+from calibration.numerics.signals import GAP
+from calibration.recording.clock import Clock
+from calibration.recording.posture_means import PostureMeans
+from calibration.recording.schema import Body, Description, base_body, hand_body, is_point, point_of
+from calibration.recording.trial import Trial
+
+_MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
+BLOCKS = 4
+_REST = 1.0  # [s] at the start of every trial
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Postures:
+    """Static postures of a dataset.
+
+    Attributes:
+        q: (n, n_measured) mean motor-side readings [rad, m].
+        T_base_hand: (n, 4, 4) measured pose of the hand body in the base body; its rotation means nothing where only a
+            point of the hand was seen.
+        covariance: (n, 6, 6) of its local twist [m, rad]; (n, 3, 3) of its position in the base body's axes where only
+            a point was seen; `T_base_hand` then has that point's place.
+        misfit: (n,) rms distance of markers from their nominal places in their cluster [m].
+        label: (n,) trial and number, counted from 0, or time; empty where they have no name.
+        point: (3,) the point that was seen, in the hand's frame [m].
+        motion: (n,) which motion a posture was passed in, counted from 0, -1 where the arm stood; it did if not given.
+    """
+
+    q: np.ndarray
+    T_base_hand: np.ndarray
+    covariance: np.ndarray
+    misfit: np.ndarray
+    label: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=str))
+    point: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    motion: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def __post_init__(self) -> None:
+        if len(self.motion) != len(self.q):
+            object.__setattr__(self, "motion", np.full(len(self.q), -1))
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def components(self) -> int:
+        """Of what is measured a posture: 6 of a pose, 3 of a point."""
+        return int(self.covariance.shape[1])
+
+    def rows(self, chosen: np.ndarray) -> "Postures":
+        """Some of the postures."""
+        label = self.label[chosen] if len(self.label) else self.label
+        T, S = self.T_base_hand[chosen], self.covariance[chosen]
+        return Postures(self.q[chosen], T, S, self.misfit[chosen], label, self.point, self.motion[chosen])
+
+    def joined(self, other: "Postures") -> "Postures":
+        """These postures, then the other ones."""
+        names = [f.name for f in fields(self) if f.name != "point"]
+        both = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in names}
+        return replace(self, **both)
+
+
+def dwell_windows(trial: Trial) -> np.ndarray:
+    """Start and stop of each dwell without its margins, (n, 2) [s, mocap clock]."""
+    return inner_windows(np.stack([trial.dwell_start, trial.dwell_stop], axis=1))
+
+
+def inner_windows(dwells: np.ndarray) -> np.ndarray:
+    """Start and stop of dwells (n, 2) [s] without their margins."""
+    margin = np.minimum(_MARGIN, 0.25 * (dwells[:, 1] - dwells[:, 0]))
+    return np.stack([dwells[:, 0] + margin, dwells[:, 1] - margin], axis=1)
+
+
+def read_postures(description: Description, trials: Iterable[Trial], robot: Clock) -> Postures:
+    """Postures of all dwells of these trials.
+
+    Raises:
+        NotEnoughData: There is none with both clusters visible.
+    """
+    found = [p for trial in trials for p in _of_trial(description, trial, robot)]
+    if not found:
+        raise NotEnoughData("no static calibration posture shows base and hand; record a static trial with dwells")
+    q, T, quarters, unit, misfit, label = (np.array(x) for x in zip(*found, strict=True))
+    unit = unit * description.sigmas.marker**2
+    factor = inflation(quarters, unit)
+    _log.info("%d postures, noise of their means %.1f times that of independent samples", len(q), np.sqrt(factor))
+    return Postures(q, T, factor * unit, misfit, label)
+
+
+def mean_postures(description: Description, means: PostureMeans) -> Postures:
+    """Postures of a file that only has means, those that show base and hand; their covariance is the file's own."""
+    body = hand_body(description)
+    seen = _points if is_point(body) else _poses
+    T, S, squares = seen(means.poses_of(base_body(description)), means, body)
+    good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(means.q_motor).all(axis=1)
+    label = np.array([f"{means.id} {k}" for k in np.flatnonzero(good)], dtype=str)
+    misfit = np.sqrt(np.nanmean(squares[good], axis=1)) if squares.shape[1] else np.zeros(int(good.sum()))
+    point = point_of(body) if is_point(body) else np.zeros(3)
+    return Postures(means.q_motor[good], T[good], S[good], misfit, label, point)
+
+
+def _poses(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """T_base_hand (n, 4, 4), covariance (n, 6, 6) of its local twist, squared distances (n, m) of markers [m2]."""
+    hand = means.poses_of(body)
+    T = inverse(base.T) @ hand.T
+    Ad = adjoint(inverse(T))
+    S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
+    return T, S, (np.concatenate([base.residual, hand.residual], axis=1) ** 2).sum(axis=2)
+
+
+def _points(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same where a point of the hand is seen: its place, and that place's covariance (n, 3, 3), base's axes."""
+    p, variance = means.point_of(body)
+    R = np.swapaxes(base.T[:, :3, :3], 1, 2)
+    p = (R @ (p - base.T[:, :3, 3])[..., None])[..., 0]
+    G = np.concatenate([np.broadcast_to(-np.eye(3), (len(p), 3, 3)), skew(p)], axis=2)
+    S = variance[:, None, None] * np.eye(3) + G @ base.covariance @ np.swapaxes(G, 1, 2)
+    return compose(np.tile(np.eye(3), (len(p), 1, 1)), p), S, (base.residual**2).sum(axis=2)
+
+
+def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
+    """Postures passed through every `spacing` [s] of these trials, one sample each, their first second left out."""
+    found = [_passed(description, trial, robot, spacing) for trial in trials]
+    motion = np.repeat(np.arange(len(found)), [len(of_trial[1]) for of_trial in found])
+    T, q, S, misfit, label = (np.concatenate(x) for x in zip(*found, strict=True))
+    good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
+    S = S * description.sigmas.marker**2
+    return Postures(q, T, S, misfit, label, motion=motion).rows(good)
+
+
+def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
+    rows = passed_rows(trial.t_mocap, spacing)
+    passed = replace(trial, t_mocap=trial.t_mocap[rows], marker_position=trial.marker_position[rows])
+    base, hand = (poses_of(body(description), passed) for body in (base_body, hand_body))
+    T = inverse(base.T) @ hand.T
+    Ad = adjoint(inverse(T))
+    S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
+    t = trial.t_mocap[rows]
+    label = np.array([f"{trial.id} at {after:.1f} s" for after in t - trial.t_mocap[0]], dtype=str)
+    return T, readings_at(trial, robot, t, trial.q_motor), S, np.zeros(len(rows)), label
+
+
+def passed_rows(t: np.ndarray, spacing: float) -> np.ndarray:
+    """A sample every `spacing` of times t (n,) [s], the first second left out."""
+    rows = np.searchsorted(t, np.arange(t[0] + _REST, t[-1], spacing))
+    return np.unique(rows[rows < len(t)])  # arange may pass its end by rounding
+
+
+def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray) -> np.ndarray:
+    """Readings (m, n_joints) taken at `t_robot`, at mocap times t (n,) [s], linear; NaN outside it and in holes."""
+    s = robot.from_mocap(t)
+    columns = (np.interp(s, trial.t_robot, q, left=np.nan, right=np.nan) for q in readings.T)
+    found = np.stack(list(columns), axis=1)
+    after = np.clip(np.searchsorted(trial.t_robot, s), 1, len(trial.t_robot) - 1)
+    found[np.diff(trial.t_robot)[after - 1] > GAP] = np.nan
+    return found
+
+
+def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray | str, ...]]:
+    t_robot = robot.to_mocap(trial.t_robot)
+    bodies = (base_body(description), hand_body(description))
+    for k, (start, stop) in enumerate(dwell_windows(trial)):
+        rows = (t_robot >= start) & (t_robot <= stop)
+        seen = np.flatnonzero((trial.t_mocap >= start) & (trial.t_mocap <= stop))
+        if not rows.any() or len(seen) < BLOCKS:
+            _log.info("%s: dwell %d has no samples", trial.id, k)
+            continue
+        whole, blocks = [seen], np.array_split(seen, BLOCKS)
+        base, hand = (mean_poses(body, trial, whole + blocks) for body in bodies)
+        T = inverse(base.T) @ hand.T
+        if not np.isfinite(T).all():
+            _log.info("%s: base or hand not seen throughout dwell %d", trial.id, k)
+            continue
+        Ad = adjoint(inverse(T[0]))
+        covariance = (hand.covariance[0] + Ad @ base.covariance[0] @ Ad.T) / len(seen)
+        misfit = np.sqrt(np.nanmean(np.concatenate([base.residual[0], hand.residual[0]]) ** 2) * 3.0)
+        yield (
+            trial.q_motor[rows].mean(axis=0),
+            T[0],
+            to_vector(inverse(T[:1]) @ T[1:]),
+            covariance,
+            misfit,
+            f"{trial.id} {k}",
+        )
+
+
+def mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
+    """Poses of a body from its markers averaged over each group of samples."""
+    if not body.markers:
+        return still_poses(len(groups))
+    names = [m.name for m in body.markers if m.name in trial.marker]
+    xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
+    if len(names) < 3:
+        raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {names} are recorded")
+    p = trial.marker_position[:, [trial.marker.index(name) for name in names]]
+    seen = np.isfinite(p).all(axis=2)
+    means = np.full((len(groups), *xyz.shape), np.nan)
+    for k, rows in enumerate(groups):
+        often = seen[rows].sum(axis=0) > 0.5 * len(rows)
+        means[k, often] = np.nanmean(p[rows][:, often], axis=0)
+    return body_poses(xyz, means)
+
+
+def inflation(quarters: np.ndarray, unit: np.ndarray) -> float:
+    """Mean squared Mahalanobis distance, per degree of freedom, of quarter means (n, 4, 6) about their mean."""
+    d = quarters - quarters.mean(axis=1, keepdims=True)
+    squared = np.einsum("nki,nij,nkj->n", d, np.linalg.inv(unit * BLOCKS), d)
+    return max(1.0, float(squared.mean()) / (6 * (BLOCKS - 1)))

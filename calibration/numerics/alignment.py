@@ -1,0 +1,190 @@
+"""Where the laboratory and the hand's marker body are, in closed form, nominal geometry.
+
+    p_i + R_i t = X y_i + x         i = 1..n postures
+
+(R_i, p_i) is the tool's nominal pose, y_i the measured origin of the hand's body, t its place in the tool, (X, x) the
+laboratory in the robot's base: linear in all 15 unknowns while X is any matrix. Its determinant is the cube of the
+scale between robot and laboratory and tells wrong units and mirrored axes; its nearest rotation is the start of a fit.
+
+Rotations nearest to 3x3 matrices, many at once: those that maximise trace(R' B).
+
+    R = ((k + |B|^2) B + l cof(B) - B B' B) / (k l - det B),     k = (l^2 - |B|^2) / 2
+    (l^2 - |B|^2)^2 - 8 l det B - 4 |cof B|^2 = 0                l its largest root, s1 + s2 + sign(det B) s3
+
+(s singular values, |.| Frobenius norms, cof the matrix of cofactors). All roots are real, so that Newton's method falls
+monotonically from an upper bound; a matrix of rank 2 is as good as any. Where s2 + sign(det B) s3 is next to zero, many
+rotations are as near and the singular value decomposition chooses.
+Reference: Markley, Journal of the Astronautical Sciences 1993 (FOAM).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from calibration.errors import NotEnoughData
+from calibration.numerics.lie import compose, inverse, mean, rotation_vector, to_vector
+
+_MANY = 100  # postures that are enough for a start
+_ROUNDS = 8  # of weighing by the inverse of the distance left: the sum of distances is minimised, not of squares
+_FLAT = 1e-12  # eigenvalues of the normal equations below this share of the largest are zero [-]
+_TRIMMED = 4.0  # distances beyond this many medians are left out in the end
+_STEPS = 100
+_STILL = 1e-15  # relative step of the root [-]
+_CLEAR = 1e-5  # smallest denominator over l^3 for which rounding does not matter [-]
+_TURNED = 1e-3  # second singular value of the arm's turns over the first, below which they share one axis [-]
+_ODD = 3.0  # times the median distance left, beyond which a posture is wrong
+_FEWEST = 4  # postures
+_BELOW_PI = 2.8  # [rad] a rotation vector near pi may turn its sign
+
+
+@dataclass(frozen=True)
+class Start:
+    """Frames to start from.
+
+    Attributes:
+        frames: (12,) T_base_B and T_tool_H as translation and rotation vector [m, rad].
+        scale: Size of the robot over that of the laboratory, negative where one is mirrored [-].
+        residual: Distance left at each posture asked [m].
+    """
+
+    frames: np.ndarray
+    scale: float
+    residual: np.ndarray
+
+
+def registration_start(T_tool: np.ndarray, T_lab_hand: np.ndarray, oriented: bool) -> Start:
+    """Start values from nominal tool poses (n, 4, 4) and measured hand poses (n, 4, 4), oriented or positions only."""
+    some = np.unique(np.linspace(0, len(T_tool) - 1, _MANY).astype(int))
+    T_tool, T_lab_hand = T_tool[some], T_lab_hand[some]
+    y, n = T_lab_hand[:, :3, 3], len(T_tool)
+    blocks = [T_tool[:, :3, :3], -np.einsum("ab,nc->nabc", np.eye(3), y).reshape(n, 3, 9)]
+    A = np.concatenate([*blocks, np.broadcast_to(-np.eye(3), (n, 3, 3))], axis=2)
+    b, w = -T_tool[:, :3, 3], np.ones(n)
+    squares = (np.swapaxes(A, 1, 2) @ np.concatenate([A, b[..., None]], axis=2)).reshape(n, 240)
+    for _ in range(_ROUNDS):
+        normal = (w**2 @ squares).reshape(15, 16)
+        x = np.linalg.pinv(normal[:, :15], rcond=_FLAT, hermitian=True) @ normal[:, 15]
+        residual = np.linalg.norm(A @ x - b, axis=1)
+        w = 1.0 / np.sqrt(np.maximum(residual, max(0.1 * np.median(residual), 1e-12)))
+    rows = residual <= _TRIMMED * max(np.median(residual), 1e-12)
+    X = x[3:12].reshape(3, 3)
+    det = float(np.linalg.det(X))
+    U, _, Vt = np.linalg.svd(X)
+    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    # With the rotation known, the two translations are linear.
+    C = np.concatenate([T_tool[:, :3, :3], np.broadcast_to(-np.eye(3), (n, 3, 3))], axis=2)
+    e = y @ R.T + b
+    t = np.linalg.lstsq(C[rows].reshape(-1, 6), e[rows].ravel(), rcond=1e-9)[0]
+    T_base_lab = compose(R, t[3:])
+    T_tool_hand = np.eye(4)
+    if oriented:
+        T_tool_hand = mean((inverse(T_tool) @ T_base_lab @ T_lab_hand)[rows])
+    T_tool_hand[:3, 3] = t[:3]
+    frames = np.concatenate([to_vector(T_base_lab), to_vector(T_tool_hand)])
+    return Start(frames, float(np.cbrt(det)), np.linalg.norm(C @ t - e, axis=1))
+
+
+def nearest_rotations(B: np.ndarray) -> np.ndarray:
+    """R (n, 3, 3) with the largest trace(R' B) of matrices B (n, 3, 3)."""
+    cofactors = _cofactors(B)
+    det, squared = (B[:, 0] * cofactors[:, 0]).sum(axis=1), (B * B).sum(axis=(1, 2))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = _largest_root(det, squared, 4.0 * (cofactors * cofactors).sum(axis=(1, 2)))
+        k = 0.5 * (root * root - squared)
+        below = k * root - det
+        R = (k + squared)[:, None, None] * B + root[:, None, None] * cofactors - B @ (np.swapaxes(B, 1, 2) @ B)
+        R /= below[:, None, None]
+        R = 1.5 * R - 0.5 * R @ (np.swapaxes(R, 1, 2) @ R)  # orthogonal to the last digit
+    clear = below > _CLEAR * root**3
+    if not clear.all():
+        R[~clear] = _decomposed(B[~clear])
+    return R
+
+
+def _largest_root(det: np.ndarray, squared: np.ndarray, fourth: np.ndarray) -> np.ndarray:
+    """Largest root (n,) of (l^2 - squared)^2 - 8 l det - fourth = 0; NaN where all are zero."""
+    root, eight = np.sqrt(3.0 * squared), 8.0 * det
+    for _ in range(_STEPS):
+        m = root * root - squared
+        step = (m * m - root * eight - fourth) / (4.0 * root * m - eight)
+        root = root - step
+        if not (np.abs(step) > _STILL * root).any():
+            break
+    return root
+
+
+def _cofactors(B: np.ndarray) -> np.ndarray:
+    """cof(B) (n, 3, 3), with B' cof(B) = det(B) I: rows are cross products of the other rows."""
+    C = np.empty_like(B)
+    for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            C[:, i, a] = B[:, j, b] * B[:, l, c] - B[:, j, c] * B[:, l, b]
+    return C
+
+
+def _decomposed(B: np.ndarray) -> np.ndarray:
+    """The same by singular values."""
+    U, _, Vt = np.linalg.svd(B)
+    U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
+    return np.asarray(U @ Vt)
+
+
+def start(M: np.ndarray, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """X and Y in closed form, from nothing.
+
+    Raises:
+        NotEnoughData: The arm turns about one axis only.
+    """
+    a, b = (rotation_vector(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], 1, 2)) for T in (M, A))
+    turns = np.linalg.svd(b, compute_uv=False)
+    if len(M) < 3 or turns[1] < _TURNED * turns[0]:
+        raise NotEnoughData(
+            f"{len(M)} postures turn the arm about one axis only; a turn of arm base "
+            "and tool about it cannot be told apart"
+        )
+    U, _, Vt = np.linalg.svd(a.T @ b)
+    R_X = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    R_Y = Rotation.from_matrix(np.swapaxes(R_X @ A[:, :3, :3], 1, 2) @ M[:, :3, :3]).mean().as_matrix()
+    left = np.concatenate([np.broadcast_to(np.eye(3), (len(A), 3, 3)), R_X @ A[:, :3, :3]], axis=2).reshape(-1, 6)
+    p = np.linalg.lstsq(left, (M[:, :3, 3] - A[:, :3, 3] @ R_X.T).ravel(), rcond=None)[0]
+    return compose(R_X, p[:3]), compose(R_Y, p[3:])
+
+
+def hand_eye(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """X, Y (4, 4) with B_i = X A_i Y in the least-squares sense, for poses A, B (n, 4, 4), wrong ones left out.
+
+    Raises:
+        NotEnoughData: Too few postures, or all turned about one direction.
+    """
+    good = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(B).all(axis=(1, 2))
+    A, B = A[good], B[good]
+    if len(A) < _FEWEST or _spread(A) < 1e-3:
+        raise NotEnoughData(f"{len(A)} postures do not turn the hand enough to place its markers; record more")
+    X, Y = _hand_eye(A, B)
+    off = np.linalg.norm((X @ A @ Y)[:, :3, 3] - B[:, :3, 3], axis=1)
+    near = off <= _ODD * np.median(off)
+    return (X, Y) if near.all() else _hand_eye(A[near], B[near])
+
+
+def _hand_eye(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    i, j = np.triu_indices(len(A), 1)
+    turns = [rotation_vector(np.swapaxes(T[i, :3, :3], 1, 2) @ T[j, :3, :3]) for T in (A, B)]
+    clear = np.linalg.norm(turns[0], axis=1) < _BELOW_PI
+    R_Y = Rotation.align_vectors(turns[0][clear], turns[1][clear])[0].as_matrix()
+    R_X = Rotation.from_matrix(B[:, :3, :3] @ R_Y.T @ np.swapaxes(A[:, :3, :3], 1, 2)).mean().as_matrix()
+    return _with_translations(R_X, R_Y, A, B)
+
+
+def _with_translations(R_X: np.ndarray, R_Y: np.ndarray, A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """t_X + R_X R_A t_Y = t_B - R_X t_A, six unknowns."""
+    left = np.concatenate([np.broadcast_to(np.eye(3), (len(A), 3, 3)), R_X @ A[:, :3, :3]], axis=2)
+    right = B[:, :3, 3] - A[:, :3, 3] @ R_X.T
+    t = np.linalg.lstsq(left.reshape(-1, 6), right.ravel(), rcond=None)[0]
+    return compose(R_X, t[:3]), compose(R_Y, t[3:])
+
+
+def _spread(A: np.ndarray) -> float:
+    """Second largest variance of the rotation vectors about their mean [rad2]."""
+    turns = Rotation.from_matrix((inverse(mean(A)[None]) @ A)[:, :3, :3]).as_rotvec()
+    return float(np.sort(np.linalg.eigvalsh(np.cov(turns.T)))[-2])

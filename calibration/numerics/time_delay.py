@@ -1,0 +1,116 @@
+"""Lag between two signals on different clocks.
+
+    y(t) = g x(t - lag) + b + sum_k a_k z_k(t - lag) + sum_k c_k u_k(t) + noise
+
+g, b and the nuisances a, c are eliminated; the lag by Gauss-Newton from a cross-correlation. The residual is not white
+(model error), so the variance of the lag sums the autocorrelation of its influence psi_t = [(A'A)^-1 A']_lag r_t:
+
+    var = sum_|k|<L (1 - |k| / L) sum_t psi_t psi_{t+k}
+Reference: Newey, West, Econometrica 1987.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import correlate, correlation_lags
+
+from calibration.errors import NotEnoughData
+from calibration.numerics.robust_covariance import long_run_variance
+from calibration.numerics.signals import RATE, Signal
+
+_STEPS = 30
+_ENOUGH = 0.5  # share of the motion's variance a lag must explain to be believed [-]
+
+
+@dataclass(frozen=True)
+class Lag:
+    """Result of one comparison.
+
+    Attributes:
+        value: t = s + value [s], s the time on the other clock.
+        sigma: Standard deviation [s].
+        explained: Share of y's variance explained [-].
+    """
+
+    value: float
+    sigma: float
+    explained: float
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two signals that show one motion.
+
+    Attributes:
+        y: The noisier one, c channels on its own clock.
+        x: The other, c channels on its own clock.
+        z: Nuisance terms (n_x, k, c) at the instants of x.
+        u: Nuisance terms (n_y, k, c) at the instants of y.
+    """
+
+    y: Signal
+    x: Signal
+    z: np.ndarray
+    u: np.ndarray
+
+    def turned(self, Q: np.ndarray) -> "Pair":
+        """The same with x on axes turned by Q (c, c)."""
+        return replace(self, x=replace(self.x, x=self.x.x @ Q.T))
+
+
+def coarse_lag(y: Signal, x: Signal) -> float:
+    """Lag [s] of highest cross-correlation, means removed, not normalised.
+
+    At the true lag two records of the same finite motion reach sum x^2, which no other lag can (Cauchy-Schwarz).
+    """
+    c = sum(correlate(a - a.mean(), b - b.mean(), mode="full", method="fft") for a, b in zip(y.x.T, x.x.T, strict=True))
+    shift = correlation_lags(len(y.t), len(x.t))[int(np.argmax(c))]
+    return float(shift / RATE + y.t[0] - x.t[0])
+
+
+def fit_lag(pair: Pair, start: float, drift: float = 0.0) -> Lag:
+    """Lag of y behind x, from `start` [s].
+
+    With a drift the clocks' rates differ and the lag returned is the one at the middle of y.
+
+    Raises:
+        NotEnoughData: Too little overlap, or the two do not show the same motion.
+    """
+    y, x, nuisance = pair.y, pair.x, pair.z
+    columns = CubicSpline(x.t, np.concatenate([x.x[:, None], nuisance], axis=1))
+    middle = 0.5 * (y.t[0] + y.t[-1])
+    lag, step = start, np.inf
+    for _ in range(_STEPS):
+        s = (y.t - middle) / (1.0 + drift) + middle - lag
+        keep = y.valid & (s > x.t[0]) & (s < x.t[-1])
+        keep[keep] &= x.valid[np.round((s[keep] - x.t[0]) * RATE).astype(int)]
+        if keep.sum() < 2.0 * RATE:
+            raise NotEnoughData("the two records overlap for less than two seconds")
+        r, slope, explained = _design(y.x[keep], columns(s[keep]), columns(s[keep], 1), pair.u[keep])
+        step = float(slope @ r / (slope @ slope))
+        lag -= step
+        if abs(step) < 1e-7:
+            break
+    if abs(step) >= 1e-7 or abs(lag - start) > 0.5 or explained < _ENOUGH:
+        raise NotEnoughData(
+            f"the records do not show the same motion (explained {explained:.2f}, lag moved {lag - start:+.3f} s)"
+        )
+    psi = (slope * r / (slope @ slope)).reshape(-1, y.x.shape[1]).sum(axis=1)
+    return Lag(lag, float(np.sqrt(long_run_variance(psi, RATE))), explained)
+
+
+def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Residual of the nuisances, the derivative by -lag orthogonal to them, and the share of y explained."""
+    n, k, c = m.shape
+    own, one = np.einsum("nc,cd->ncd", m[:, 0], np.eye(c)), np.tile(np.eye(c), (n, 1, 1))
+    A = np.concatenate([own, one, np.swapaxes(m[:, 1:], 1, 2), np.swapaxes(u, 1, 2)], axis=2).reshape(n * c, -1)
+    scale = np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
+    U, values, Vt = np.linalg.svd(A / scale, full_matrices=False)
+    U, values, Vt = (x[..., : int((values > 1e-8 * values[0]).sum())] for x in (U, values, Vt.T))
+    a = Vt @ (U.T @ y.ravel() / values) / scale
+    gains, small = a[:c], a[2 * c : 2 * c + k - 1]
+    slope = (m_dot[:, 0] * gains + np.einsum("nkc,k->nc", m_dot[:, 1:], small)).ravel()
+    r, slope = (x - U @ (U.T @ x) for x in (y.ravel(), slope))
+    total = float(((y - y.mean(axis=0)) ** 2).sum())
+    return r, slope, 1.0 - float(r @ r) / max(total, np.finfo(float).tiny)

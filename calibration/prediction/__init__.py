@@ -1,0 +1,1 @@
+"""Predictions: the ladder's rows, the base's pose, the compensator."""

@@ -1,0 +1,139 @@
+"""The base on its suspension in use: the wrench it puts on the floor in, the way it moved out.
+
+    T_lab_base(t) = T_lab_0 exp(x(t)) T_lab_0^-1 T_lab_base(start)        x(t) from the change of the wrench since rest
+
+T_lab_0 is frame 0 (see suspension_rest), the base's own frame where its pose in the lab is not given. The wrench is
+the action on the floor; its first second is the rest it changes from. A recording is low-passed at 10 Hz, forth and
+back; sample by sample the wrench is taken as it comes, and the springs' modes are carried from one to the next.
+
+Variances of x are what the suspension left of trials it had not seen, of each axis; of a base taken to stand still,
+what those trials moved. Both less the noise of motion capture.
+
+Where the base's markers are in a trial, predicted: its first second and a wrench, nothing else.
+
+T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     x from the plate's wrench or from inverse dynamics along q_motor
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData, ShapeError
+from calibration.numerics.lie import adjoint, inverse
+from calibration.numerics.wrench import in_frame
+from calibration.recording.schema import Description
+from calibration.recording.trial import REST, Trial
+from calibration.stages.suspension.base_response import Laboratory, forcing_of
+from calibration.stages.suspension.floor_wrench import floor_load
+from calibration.stages.suspension.model import Source, Suspension
+from calibration.stages.suspension.rest_frame import Rest, rest_of, upright
+
+
+@dataclass(frozen=True)
+class LoadedBase:
+    """A base on its suspension, standing somewhere.
+
+    Attributes:
+        suspension: Of the base.
+        T_lab_0: (4, 4) frame 0.
+        T_0_base: (4, 4) the base frame at the start.
+        centre: (3,) the point the wrench is about [m, lab]; NaN where the laboratory has no plate.
+    """
+
+    suspension: Suspension
+    T_lab_0: np.ndarray
+    T_0_base: np.ndarray
+    centre: np.ndarray
+
+    def moved(self, t: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+        """How the base moved in the lab (n, 4, 4) at t (n,) [s] under the wrench (n, 6) in lab axes.
+
+        Raises:
+            NotEnoughData: Less than a second, or nothing says what point the wrench is about.
+        """
+        self._need_centre()
+        if wrench.shape != (len(t), 6):
+            raise ShapeError("wrench", wrench.shape, (len(t), 6))
+        w = in_frame(wrench[:, None], self.centre[None], self.T_lab_0)
+        forcing = forcing_of(floor_load(t, w, self.T_lab_0, self.centre), float(t[0]))
+        x = self.suspension.displaced(forcing, "plate")
+        return self._in_lab(np.stack([np.interp(t, forcing.t, column) for column in x.T], axis=1))
+
+    def stepped(self, t: float, wrench: np.ndarray, before: "BaseState | None") -> "BaseState":
+        """The base one sample on: its wrench (6,) at t [s]; without a state before, this sample is the first at rest.
+
+        Raises:
+            NotEnoughData: Nothing says what point the wrench is about.
+        """
+        self._need_centre()
+        if wrench.shape != (6,):
+            raise ShapeError("wrench", wrench.shape, (6,))
+        w, modes = in_frame(wrench[None, None], self.centre[None], self.T_lab_0)[0], self.suspension.modes
+        if before is None:
+            return BaseState(t, t, w, 1, np.zeros(len(modes.tau)), np.zeros(len(modes.tau)), np.eye(4)[None])
+        if t <= before.start + REST:
+            n = before.n + 1
+            return replace(before, t=t, rest=before.rest + (w - before.rest) / n, n=n)
+        u = modes.b @ (w - before.rest)
+        y = modes.advanced(before.y, before.u, u, t - before.t)
+        x = (modes.a @ y).real * self.suspension.moves("plate")
+        return replace(before, t=t, u=u, y=y, moved=self._in_lab(x[None]))
+
+    def covariance(self, T_base_hand: np.ndarray, moves: bool) -> np.ndarray:
+        """Covariance (n, 6, 6) that the base adds to the hand's local twist, at T_base_hand (n, 4, 4)."""
+        tried = dict(self.suspension.held_out).get("plate") or self.suspension.held_out[0][1]
+        Ad = adjoint(inverse(self.T_0_base @ T_base_hand))
+        return np.asarray(Ad * tried.variance(tried.moves & moves) @ np.swapaxes(Ad, 1, 2))
+
+    def _need_centre(self) -> None:
+        if not np.isfinite(self.centre).all():
+            raise NotEnoughData("the laboratory has no plate: give a wrench about the base's origin, and no start pose")
+
+    def _in_lab(self, x: np.ndarray) -> np.ndarray:
+        """Motions of the lab (n, 4, 4) by displacements x (n, 6) of frame 0."""
+        return Rest(self.T_lab_0, inverse(self.T_lab_0)).poses(x)
+
+
+def loaded_base(suspension: Suspension, description: Description, T_lab_base: np.ndarray | None) -> LoadedBase:
+    """The base where it stands in the laboratory; where that is not given, the lab is the base frame."""
+    if T_lab_base is None:
+        return LoadedBase(suspension, np.eye(4), np.eye(4), np.zeros(3))
+    T_lab_0 = upright(T_lab_base, description)
+    centre = np.array(description.plates[0].centre) if description.plates else np.full(3, np.nan)
+    return LoadedBase(suspension, T_lab_0, inverse(T_lab_0) @ T_lab_base, centre)
+
+
+@dataclass(frozen=True)
+class BaseState:
+    """What the base is at after a sample.
+
+    Attributes:
+        start: When it was first asked [s].
+        t: The sample's time [s].
+        rest: (6,) wrench at rest, the mean of the first second [N, N.m, frame 0].
+        n: Samples in it.
+        u: (k,) how the wrench drives the modes.
+        y: (k,) where the modes are.
+        moved: (1, 4, 4) how the base moved in the lab.
+    """
+
+    start: float
+    t: float
+    rest: np.ndarray
+    n: int
+    u: np.ndarray
+    y: np.ndarray
+    moved: np.ndarray
+
+
+def base_poses(suspension: Suspension, lab: Laboratory, trial: Trial, source: Source) -> np.ndarray:
+    """T_lab_B (n, 4, 4) of the base's marker body at `t_mocap`; outside the wrench's recording it stays.
+
+    Raises:
+        NotEnoughData: The wrench, or the base's markers of the first second, were not recorded.
+    """
+    rest = rest_of(lab.description, trial, lab.T_base_B)
+    load = lab.plate_load(trial, rest.T_lab_0) if source == "plate" else lab.dynamics_load(trial, rest.T_lab_0)
+    forcing = forcing_of(load, float(trial.t_mocap[0]))
+    x = suspension.displaced(forcing, source)
+    return rest.poses(np.stack([np.interp(trial.t_mocap, forcing.t, column) for column in x.T], axis=1))

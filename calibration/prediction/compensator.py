@@ -1,0 +1,234 @@
+"""The estimate in use: readings in, hand pose and its uncertainty out.
+
+    T_lab_hand = T_lab_base(t) T_base_tool(q - offset) T_tool_H
+
+T_lab_base    as at the start; with a wrench, moved by the suspension from there           see loaded_base
+q             q_motor; with velocities, less the joint models' discrepancy                 see joint_model
+covariance    of the local twist:   J Sigma J' + J_joint diag(sigma^2) J_joint' + Ad diag(v) Ad'
+
+Sigma is that of the parameters; sigma a joint's random reading error at rest or, where its model is used, that of the
+flank and of left-out trials; v what the suspension left of trials it had not seen, for a pose in the lab.
+The geometry is that of the estimate's main model, as in calibrated.urdf.
+"""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from calibration.errors import InputError, NotCalibrated, NotEnoughData, ShapeError
+from calibration.estimate.estimate import Estimate
+from calibration.estimate.files import load_estimate
+from calibration.inference.parameters import Model
+from calibration.numerics.lie import from_vector
+from calibration.prediction.base_pose import BaseState, LoadedBase, loaded_base
+from calibration.recording.schema import Description
+from calibration.robot.chain import Chain, chain_of_frames
+from calibration.robot.hand import HandModel
+from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
+from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.geometry.parameters import parameter_names
+from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
+from calibration.stages.suspension.model import Suspension
+
+_SPACING, _SPAN = 0.05, 1.0  # [s] between samples at most, and of all of them at least, for velocities
+
+
+@dataclass(frozen=True)
+class HandPose:
+    """Predicted poses of the hand body.
+
+    Attributes:
+        T: (n, 4, 4) in the lab, or in the base frame at rest where the base's pose was not given.
+        covariance: (n, 6, 6) of the local twist [m, rad], for a base frame located by its own markers.
+        base: Where the base is, for the next step under a wrench; None else.
+    """
+
+    T: np.ndarray
+    covariance: np.ndarray
+    base: BaseState | None = None
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """The main model of an estimate, with its joint models and its suspension.
+
+    Attributes:
+        hand: The calibrated robot.
+        covariance: (p, p) of its first p parameters, in the order of `HandModel.theta`; the others are known.
+        play: (k,) random reading error of each joint [rad, m].
+        hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; (1,) of the position, (0,) none.
+        joints: Joint models, None where the estimate has none.
+        suspension: None where the estimate has none.
+        laboratory: Where it was found, None where the estimate does not say.
+    """
+
+    hand: HandModel
+    covariance: np.ndarray
+    play: np.ndarray
+    hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    joints: JointModels | None = None
+    suspension: Suspension | None = None
+    laboratory: Description | None = None
+
+    @property
+    def spread(self) -> Spread:
+        """What it is not sure of."""
+        return Spread(self.covariance, self.play, self.hand_error)
+
+    @classmethod
+    def load(cls, folder: Path | str, payload: float | None = None) -> "Compensator":
+        """Read the folder of an estimate; `payload` [kg] is in the hand where it is not the declared one.
+
+        Raises:
+            InputError: The folder is not a saved estimate.
+            NotCalibrated: The estimate must not be used.
+        """
+        estimate = load_estimate(folder)
+        if not estimate.calibrated:
+            raise NotCalibrated([v.message for v in estimate.verdicts if v.verdict == "refused"])
+        if estimate.urdf is None or estimate.robot is None:
+            raise InputError(folder, "not a whole estimate: nominal.urdf or the robot's joints and frames are missing")
+        return cls.of(estimate, payload)
+
+    @classmethod
+    def of(cls, estimate: Estimate, payload: float | None = None) -> "Compensator":
+        """The main model of an estimate that knows its robot."""
+        if estimate.urdf is None or estimate.robot is None:
+            raise NotCalibrated(["it does not say which robot it is about"])
+        robot, laboratory = estimate.robot, estimate.laboratory
+        chain = chain_of_frames(estimate.urdf, robot.joints, robot.base_frame, robot.tool_frame)
+        model = estimate.model(estimate.main)
+        hand = hand_of(model, chain, np.zeros(12))
+        play = model.play if len(model.play) else np.zeros(len(chain.joints))
+        joints = None
+        if estimate.joint_models and laboratory is not None:
+            inputs = input_model(estimate.urdf, laboratory.carrying(payload), hand)
+            joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
+        return cls(hand, _covariance(chain, model), play, model.hand_error, joints, estimate.suspension, laboratory)
+
+    def predict(
+        self,
+        t: np.ndarray,
+        q_motor: np.ndarray,
+        wrench: np.ndarray | None = None,
+        T_lab_base_start: np.ndarray | None = None,
+        velocity: np.ndarray | None = None,
+    ) -> HandPose:
+        """Hand poses at readings q_motor (n, n_joints) [rad, m], taken at t (n,) [s].
+
+        Args:
+            t: Times; from a second of readings at 20 Hz or more the joint models have their velocities.
+            q_motor: Readings, columns as in the estimate.
+            wrench: (n, 6) action on the plate [N, N.m, lab axes, about the plate's centre], the first second at rest;
+                where the base's pose is not given, in the base's axes about its origin.
+            T_lab_base_start: (4, 4) pose of the base frame at the start; identity where not given.
+            velocity: (n, n_joints) of the motor side [rad/s, m/s], where it is known.
+
+        Raises:
+            NotEnoughData: A wrench without a suspension or for less than a second.
+        """
+        t, q = np.asarray(t, dtype=float), np.asarray(q_motor, dtype=float)
+        if q.ndim != 2 or len(t) != len(q):
+            raise ShapeError("q_motor", q.shape, (len(t), "n_joints"))
+        base = self._base(T_lab_base_start)
+        moved = None if wrench is None else _needed(base).moved(t, np.asarray(wrench, dtype=float))
+        found = self._hand(t, q, velocity if velocity is not None else _velocities(t, q))
+        return _in_lab(found, base, moved, T_lab_base_start)
+
+    def points(self, markers: np.ndarray, q_motor: np.ndarray, session: Session | None = None) -> Predicted:
+        """Markers (m, 3) [m] of the hand's body, as the base's marker body sees them, with their band.
+
+        Args:
+            markers: As `bodies` of dataset.json has them.
+            q_motor: (n, n_joints) readings at rest [rad, m].
+            session: Another day: base and marker body are not quite where they were; `Session()` for what is usual.
+        """
+        return predicted_points(self.hand, self.spread, np.asarray(markers, dtype=float), q_motor, session)
+
+    def step(
+        self,
+        t: float,
+        q_motor: np.ndarray,
+        wrench: np.ndarray | None = None,
+        T_lab_base_start: np.ndarray | None = None,
+        velocity: np.ndarray | None = None,
+        before: BaseState | None = None,
+    ) -> HandPose:
+        """The same for one sample q_motor (n_joints,) and nothing after it; arrays of length 1.
+
+        `predict` looks half a second ahead for velocities and for a wrench below 10 Hz. Here the caller's velocity
+        (n_joints,) is used as it is, and none leaves the readings as they are; the wrench (6,) is used as it comes.
+        The base's springs are carried on from `before`, the `base` of the pose one step earlier; its first second is
+        the rest.
+
+        Raises:
+            NotEnoughData: A wrench without a suspension.
+        """
+        q, base = np.asarray(q_motor, dtype=float)[None], self._base(T_lab_base_start)
+        v = None if velocity is None else np.asarray(velocity, dtype=float)[None]
+        in_base = self._hand(np.array([t]), q, v)
+        if wrench is None:
+            return _in_lab(in_base, base, None, T_lab_base_start)
+        state = _needed(base).stepped(t, np.asarray(wrench, dtype=float), before)
+        return replace(_in_lab(in_base, base, state.moved, T_lab_base_start), base=state)
+
+    def _base(self, T_lab_base: np.ndarray | None) -> LoadedBase | None:
+        """The base where it stands, None without a suspension or a laboratory."""
+        if self.suspension is None or self.laboratory is None:
+            return None
+        return loaded_base(self.suspension, self.laboratory, T_lab_base)
+
+    def _hand(self, t: np.ndarray, q: np.ndarray, velocity: np.ndarray | None) -> HandPose:
+        """In the base frame."""
+        variance = np.broadcast_to(self.play**2, (len(q), len(self.play)))
+        if velocity is not None and self.joints is not None:
+            corrected = correct(self.joints, t, q, velocity)
+            q, columns = corrected.q, self.hand.chain.columns
+            variance = np.where(corrected.modelled[columns], corrected.variance[:, columns], variance)
+        found = self.hand.poses_and_derivatives(q, n_parameters=len(self.covariance))
+        T_base_hand = from_vector(self.hand.base) @ found.T
+        covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
+        covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
+        covariance += np.diag(self.spread.hand_variances)
+        return HandPose(T_base_hand, covariance)
+
+
+def _needed(base: LoadedBase | None) -> LoadedBase:
+    if base is None:
+        raise NotEnoughData("this estimate has no suspension for a wrench to move: leave the wrench out")
+    return base
+
+
+def _in_lab(
+    in_base: HandPose, base: LoadedBase | None, moved: np.ndarray | None, T_lab_base: np.ndarray | None
+) -> HandPose:
+    """A pose in the base frame from where the base is, which may have moved (n, 4, 4)."""
+    covariance = in_base.covariance
+    if base is not None and (moved is not None or T_lab_base is not None):
+        covariance = covariance + base.covariance(in_base.T, moved is not None)
+    T = in_base.T if T_lab_base is None else np.asarray(T_lab_base, dtype=float) @ in_base.T
+    return HandPose(T if moved is None else moved @ T, covariance)
+
+
+def _covariance(chain: Chain, model: Model) -> np.ndarray:
+    """Of a model's parameters (p, p), in the order of `HandModel.theta`, as far as one is not known."""
+    names, known = parameter_names(chain), [p.name for p in model.parameters]
+    G = np.array([[float(name == other) for other in known] for name in names])
+    if f"{PREFIX}.x" in known:
+        arm = [known.index(f"{PREFIX}.{axis}") for axis in AXES]
+        first = names.index(f"geometry.{first_joint(chain)}.x")
+        vector = np.array([model.parameters[i].value for i in arm])
+        G[first : first + 6, arm] = placement_derivative(chain, vector)
+    C = np.asarray(G @ model.covariance @ G.T)
+    p = len(C) if C[12 + 7 * len(chain.joints) :].any() else 12 + 7 * len(chain.joints)
+    return C[:p, :p]
+
+
+def _velocities(t: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+    """Motor-side velocities (n, n_joints), None where the readings are too few or too far apart to have any."""
+    steps = np.diff(t)
+    if len(t) < 2 or steps.min() <= 0.0 or steps.max() > _SPACING or t[-1] - t[0] < _SPAN:
+        return None
+    return velocities(t, q)

@@ -1,0 +1,107 @@
+"""Marker bodies registered anew in another session; geometry, zeros and joint models stay as they were calibrated.
+
+    minimise over T_base_B, T_tool_H     sum_i |log6(T_measured_i^-1 T_B_H(q_i))|^2 / tolerance^2        12 parameters
+
+Asked of the dwells of the session's registration trials, which are not scored. Rows of the datasheet, `nominal` and
+`model_1`, are not registered. Encoders that were homed anew are not asked for: their error is part of the prediction's.
+
+A calibrated robot whose markers were put on anew: both frames fitted to a few postures, and what that is worth.
+
+    frames = argmin sum_i |w log6(T_i^-1 T_B_H(q_i))|^2,    error of frames = -L w (J_g dg + e),    L = (w J_f)^+ w
+
+dg ~ N(0, Sigma_g) is the error of all that stays (placements, zeros, gears), e_i the random errors of the postures'
+readings and of the hand, covariance S_i, both as the calibration found them. So frames and geometry are off together:
+
+    covariance of (frames, g) = A Sigma_g A' + (L w S w L', 0),    A = (-L w J_g, 1)
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.postures import dwell_windows
+from calibration.numerics.lie import inverse, mean
+from calibration.prediction.compensator import Compensator
+from calibration.prediction.predictor import Predictor
+from calibration.recording.dataset import Dataset
+from calibration.recording.schema import Description, TrialEntry, base_body, hand_body
+from calibration.recording.trial import Trial
+from calibration.robot.hand import HandModel
+from calibration.stages.geometry.registration import fit_frames, frame_weights
+
+REGISTRATION = "registration"
+_DATASHEET = ("nominal", "model_1")
+
+
+def registration_trials(dataset: Dataset) -> tuple[TrialEntry, ...]:
+    """Static trials of the confirmation session that are there for registering."""
+    return tuple(e for e in dataset.entries("confirmation", "static") if e.motion == REGISTRATION)
+
+
+def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
+    """The same robots with both marker bodies where the confirmation session's registration trials show them.
+
+    Raises:
+        NotEnoughData: No dwell shows base and hand, or they turn about one direction only.
+    """
+    trials = [dataset.read(entry) for entry in registration_trials(dataset)]
+    models = dict(predict.models)
+    for name in models.keys() - set(_DATASHEET):
+        models[name] = fit_frames(models[name], *_postures(predict, name, trials), predict.description)
+    return replace(predict, models=models)
+
+
+def registration_postures(predict: Predictor, name: str, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Mean positions (n, n_joints) a row's geometry is asked with, and measured T_B_H (n, 4, 4), a dwell each."""
+    return _postures(predict, name, [dataset.read(entry) for entry in registration_trials(dataset)])
+
+
+def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:
+    seen = [_dwells(predict, name, trial) for trial in trials]
+    q, T = (np.concatenate(parts) for parts in zip(*seen, strict=True)) if seen else (np.empty(0), np.empty(0))
+    return q, T
+
+
+def _dwells(predict: Predictor, name: str, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """Mean positions (n, n_joints) and measured T_B_H (n, 4, 4) of the dwells that show both bodies."""
+    base, hand = base_body(predict.description), hand_body(predict.description)
+    q = predict.positions(name, "motor", trial)
+    T = inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
+    known = np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
+    inside = [known & (trial.t_mocap >= a) & (trial.t_mocap <= b) for a, b in dwell_windows(trial)]
+    seen = [k for k in inside if k.any()]
+    if not seen:
+        return np.empty((0, q.shape[1])), np.empty((0, 4, 4))
+    return np.array([q[k].mean(axis=0) for k in seen]), np.array([mean(T[k]) for k in seen])
+
+
+def registered_anew(robot: Compensator, q: np.ndarray, T_measured: np.ndarray, description: Description) -> Compensator:
+    """The robot with its marker frames fitted to static postures, its geometry and zeros held.
+
+    Args:
+        robot: As calibrated on another day.
+        q: (n, n_joints) readings at rest [rad, m].
+        T_measured: (n, 4, 4) T_B_H, the hand's marker body in the base's.
+        description: Of the laboratory.
+
+    Raises:
+        NotEnoughData: They turn the hand about one direction only.
+    """
+    hand = fit_frames(robot.hand, q, T_measured, description)
+    return replace(robot, hand=hand, covariance=_covariance(robot, hand, q, frame_weights(description)))
+
+
+def _covariance(robot: Compensator, hand: HandModel, q: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(p, p) of frames and all that stays, postures weighed by `weight` (6,)."""
+    n, p = len(q), len(robot.covariance)
+    found = hand.poses_and_derivatives(q, n_parameters=p)
+    J = (weight[:, None] * found.J).reshape(6 * n, p)
+    L = np.linalg.pinv(J[:, :12])
+    A = np.vstack([-L @ J[:, 12:], np.eye(p - 12)])
+    S = robot.spread.random_errors(found.J_joint)
+    each = (L.reshape(12, n, 6) * weight).transpose(1, 0, 2)
+    covariance = A @ robot.covariance[12:, 12:] @ A.T
+    covariance[:12, :12] += (each @ S @ each.transpose(0, 2, 1)).sum(axis=0)
+    return np.asarray(covariance)

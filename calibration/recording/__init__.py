@@ -1,0 +1,1 @@
+"""Recordings: the dataset folder, its trials and their files."""

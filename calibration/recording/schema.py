@@ -1,0 +1,256 @@
+"""dataset.json: what a laboratory declares about its robot, its instruments and its trials.
+
+SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and tolerances only.
+
+Which marker bodies are the base and the hand.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from calibration.errors import NotEnoughData
+
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Role = Literal["calibration", "validation", "confirmation"]
+Kind = Literal["static", "sweep", "swing", "spin", "drive"]
+BASE, HAND = "base", "gripper"
+
+
+class Declaration(BaseModel):
+    """Strict and frozen: an unknown field or a NaN is an error, not a default."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def refuse_repeated(groups: Mapping[str, Sequence[str]]) -> None:
+    """Raise ValueError for the first group that holds a name more than once."""
+    for group, names in groups.items():
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise ValueError(f"{group} named more than once: {twice}")
+
+
+class Joint(Declaration):
+    """A measured joint: which encoders it has and how often they are logged [Hz]."""
+
+    name: str
+    encoders: tuple[Literal["motor", "link"], ...]
+    rate: Positive
+
+
+class Marker(Declaration):
+    """A marker and its nominal position in its body's frame [m]."""
+
+    name: str
+    xyz: Vector3
+
+
+class Body(Declaration):
+    """A rigid marker cluster; its frame nominally coincides with the frame of `link`, but for `placement`.
+
+    `placement` is the translation [m] and rotation vector [rad] of T_link_body where no drawing puts the two together.
+    """
+
+    name: str
+    link: str
+    markers: tuple[Marker, ...]
+    placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Wheel(Declaration):
+    """A wheel: hub centre and nominal floor contact point, in the base frame [m]."""
+
+    name: str
+    type: Literal["drive", "caster"]
+    centre: Vector3
+    contact: Vector3
+
+
+class Plate(Declaration):
+    """A force plate: surface centre [m, lab], its axes as columns in the lab, edge lengths [m]."""
+
+    name: str
+    centre: Vector3
+    axes: tuple[Vector3, Vector3, Vector3]
+    size: tuple[Positive, Positive]
+
+
+class Payload(Declaration):
+    """A declared load: mass [kg] and centre of mass [m] in the frame of `link`, with its tolerance on the mass [kg]."""
+
+    link: str
+    mass: NonNegative
+    com: Vector3
+    tolerance: NonNegative
+
+
+class Sigmas(Declaration):
+    """Datasheet noise, standard deviations per sample.
+
+    Attributes:
+        marker: Per axis of a moving marker [m].
+        encoder: Per encoder reading [rad].
+        plate_force: Per axis [N].
+        plate_moment: Per axis [N.m].
+    """
+
+    marker: Positive
+    encoder: Positive
+    plate_force: Positive
+    plate_moment: Positive
+
+
+class Tolerances(Declaration):
+    """Datasheet tolerances, as standard deviations; the same for every arm joint.
+
+    Attributes:
+        joint_translation: Joint placement, per axis [m].
+        joint_rotation: Joint placement, per axis [rad].
+        encoder_offset: Zero of the motor encoder [rad, or m for a prismatic joint scaled by 0.1 m/rad].
+        joint_play: Motor-side reading minus joint angle, offset apart [rad].
+        body_translation: Marker cluster on its link, per axis [m].
+        body_rotation: Marker cluster on its link, per axis [rad].
+        link_mass: Relative to the link's mass [-].
+        link_com: Centre of mass, per axis [m].
+    """
+
+    joint_translation: Positive
+    joint_rotation: Positive
+    encoder_offset: Positive
+    joint_play: Positive
+    body_translation: Positive
+    body_rotation: Positive
+    link_mass: Positive
+    link_com: Positive
+
+
+class TrialEntry(Declaration):
+    """One continuous recording; `file` is relative to the dataset folder.
+
+    `payload` is the mass [kg] of the declared payload in this trial, where it differs from the campaign's.
+    """
+
+    id: str
+    role: Role
+    kind: Kind
+    motion: str
+    file: str
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    payload: NonNegative | None = None
+
+
+class Setup(Declaration):
+    """The robot and its instruments.
+
+    `marker_frame` is the frame of the marker positions: `lab`, or the name of a marker body without markers, for files
+    whose positions were already brought into a frame fixed on that body (the base's motion removed).
+    `mocap_clock` names the instruments whose times are the motion capture's own, sampled together by one machine.
+    `wrist_link` is the frame of the wrist's force-torque sensor, whose axes and origin `wrist_wrench` has.
+    """
+
+    robot: str
+    base_frame: str
+    tool_frame: str
+    joints: tuple[Joint, ...]
+    wheels: tuple[Wheel, ...] = ()
+    plates: tuple[Plate, ...] = ()
+    payload: Payload | None = None
+    gravity: Vector3 = (0.0, 0.0, -9.81)
+    marker_frame: str = "lab"
+    mocap_clock: tuple[Literal["robot", "plate"], ...] = ()
+    wrist_link: str | None = None
+    sigmas: Sigmas
+    tolerances: Tolerances
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the measured joints, base to tip."""
+        return tuple(j.name for j in self.joints)
+
+
+class Description(Setup):
+    """The whole of dataset.json."""
+
+    schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
+    bodies: tuple[Body, ...]
+    trials: tuple[TrialEntry, ...]
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True, serialize_by_alias=True
+    )
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> "Description":
+        groups = {
+            "joints": [j.name for j in self.joints],
+            "bodies": [b.name for b in self.bodies],
+            "markers": [m.name for b in self.bodies for m in b.markers],
+            "plates": [p.name for p in self.plates],
+            "trials": [t.id for t in self.trials],
+        }
+        refuse_repeated(groups)
+        return self
+
+    @model_validator(mode="after")
+    def _marker_frame_is_known(self) -> "Description":
+        bare = [b.name for b in self.bodies if not b.markers]
+        allowed = [] if self.marker_frame == "lab" else [self.marker_frame]
+        if bare != allowed:
+            raise ValueError(
+                f"bodies without markers: {bare}, marker_frame: {self.marker_frame!r}; positions are in the lab, or in "
+                "the frame of the one body that has no markers"
+            )
+        return self
+
+    def loaded(self, entry: TrialEntry) -> "Description":
+        """The description with the payload of one trial."""
+        return self.carrying(entry.payload)
+
+    def carrying(self, mass: float | None) -> "Description":
+        """The description with another mass [kg] of its payload; itself where None, or where it has no payload."""
+        if mass is None or self.payload is None:
+            return self
+        return self.model_copy(update={"payload": self.payload.model_copy(update={"mass": mass})})
+
+    @property
+    def alone(self) -> "Description":
+        """The description without its trials."""
+        return self.model_copy(update={"trials": ()})
+
+    def body(self, name: str) -> Body | None:
+        """The marker body of that name, or None where the laboratory has none."""
+        return next((b for b in self.bodies if b.name == name), None)
+
+
+def base_body(description: Description) -> Body:
+    """The marker body on the base frame."""
+    return _body(description, BASE, description.base_frame)
+
+
+def hand_body(description: Description) -> Body:
+    """The marker body at the hand, whose frame is the pose predicted and scored."""
+    return _body(description, HAND, description.tool_frame)
+
+
+def _body(description: Description, name: str, link: str) -> Body:
+    found = description.body(name) or next((b for b in description.bodies if b.link == link), None)
+    if found is None:
+        known = [b.name for b in description.bodies]
+        raise NotEnoughData(f"dataset.json has no marker body {name!r} and none on {link!r}; bodies: {known}")
+    return found
+
+
+def is_point(body: Body) -> bool:
+    """Whether its markers tell a place only."""
+    return 0 < len(body.markers) < 3
+
+
+def point_of(body: Body) -> np.ndarray:
+    """c (3,) [m]."""
+    return np.asarray(np.mean([m.xyz for m in body.markers], axis=0))

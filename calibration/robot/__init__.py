@@ -1,0 +1,1 @@
+"""The nominal robot: chain, kinematics, gravity torques, hand, frames."""

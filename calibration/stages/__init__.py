@@ -1,0 +1,1 @@
+"""The stages of a calibration, in the order of the pipeline."""

@@ -1,0 +1,1 @@
+"""Stage clocks: the instruments' clocks on that of the motion capture."""

@@ -1,0 +1,140 @@
+"""Epoch of an instrument on the motion-capture clock, from lags of several trials.
+
+    t_mocap = s (1 + drift) + offset                      s on the instrument's clock [s]
+    lag_k = offset + drift s_k + noise_k                  s_k the middle of trial k
+    drift_k = drift + noise'_k                            where a trial is long enough to show its own
+    var noise_k = B^2 (sigma_k^2 + floor^2)               B^2 = max(1, chi2 / degrees of freedom)   (Birge ratio)
+
+The model errors of a trial grow with its own sigma: what moves little shows little, and most of it wrong. What all
+trials share is added at the end. A trial far off the median line is left out and named. Times are centred
+before the line is fitted.
+
+How late an instrument shows a motion, alike in all trials, where no recording can tell it from its clock.
+
+Robot: a link is late behind viscous friction c on a mesh of stiffness k by c / k, and where dry friction f winds the
+mesh by f / k over the speed,
+
+    late = c / k + left * wound + u * unseen,     ln(c / k) ~ N(ln 50 us, 0.6^2),   left ~ U(0, 0.2),   u ~ N(1, 1)
+
+c / k of strain-wave gears (0.5 N.m.s/rad on 10 kN.m/rad), a factor of 1.8 either way from cold to worn in; wound is the
+mean lateness of the play that the fit of poses found in the loaded joints. Play operators are not quite what a wound
+gear does, and what a fit leaves of such a term has the sign of what it took: of dry friction alone a tenth was left.
+Friction never makes a link early: play that the fit finds to be early stands for something else, and only widens.
+Short motions do not tell play from lag: of a winding by 0.1 mrad, f / k of such gears (0.6 N.m on 9 kN.m/rad to 0.15 on
+1), unseen is what the fit of each trial would lay to the clock; it is one robot's, and no number of trials averages it.
+Plate: an anti-alias filter's delay is a part of its clock.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import theilslopes
+
+from calibration.errors import NotEnoughData
+from calibration.numerics.time_delay import Lag
+from calibration.recording.clock import Clock
+
+_DRIFT = 1e-4  # prior standard deviation of a clock's drift [-]: 100 ppm
+_FAR = 5.0  # robust standard deviations
+_TRIAL = 5e-5  # [s] floor of a trial's sigma; twice it over the trial is that of its own drift
+_VISCOUS, _COLD = 5e-5, 0.6  # [s] median of c / k; standard deviation of its logarithm
+_LEFT = 0.2  # at most, of what dry friction winds
+_PLATE = 3e-4  # [s]
+
+
+@dataclass(frozen=True)
+class TrialLag:
+    """What one trial says of a clock.
+
+    Attributes:
+        trial_id: The trial.
+        s: Time on the instrument's clock [s] at which lag and drift are uncorrelated.
+        lag: At s.
+        drift: Within the trial [-].
+        drift_sigma: Its standard deviation [-]; infinite where the trial alone does not tell.
+        duration: Of the trial [s].
+        wound: Mean lateness that the fit laid to gears wound by friction, not in the lag [s].
+        unseen: What the fit would lay to the lag of a winding by 0.1 mrad in all loaded joints [s].
+    """
+
+    trial_id: str
+    s: float
+    lag: Lag
+    drift: float = 0.0
+    drift_sigma: float = np.inf
+    duration: float = np.inf
+    wound: float = 0.0
+    unseen: float = 0.0
+
+
+def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> tuple[Clock, tuple[str, ...]]:
+    """The clock, and the ids of the trials left out.
+
+    Args:
+        instrument: Its name.
+        trials: Lags of several trials.
+        common: Standard deviation of what all trials share [s].
+
+    Raises:
+        NotEnoughData: No trial gave a lag.
+    """
+    if not trials:
+        raise NotEnoughData(
+            f"no calibration trial tells the {instrument} clock from the motion-capture clock: record one with 10 s "
+            "of arm motion"
+        )
+    s = np.array([t.s for t in trials])
+    lag = np.array([t.lag.value for t in trials])
+    sigma = np.array([np.hypot(t.lag.sigma, _TRIAL) for t in trials])
+    kept = _inliers(s, lag, sigma)
+    within = np.array([(t.drift, np.hypot(t.drift_sigma, 2.0 * _TRIAL / t.duration)) for t in trials])[kept]
+    (offset, drift), (var_lag, var_drift), centre = _line(s[kept], lag[kept], sigma[kept], within)
+    var_lag += common**2
+    J = np.array([[1.0, -centre], [0.0, 1.0]])
+    covariance = J @ np.diag([var_lag, var_drift]) @ J.T
+    clock = Clock(instrument, float(offset - drift * centre), float(drift), covariance, centre, float(np.sqrt(var_lag)))
+    return clock, tuple(t.trial_id for t, k in zip(trials, kept, strict=True) if not k)
+
+
+def _inliers(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Trials near the Theil-Sen line; all of them when there are fewer than four."""
+    if len(s) < 4:
+        return np.ones(len(s), dtype=bool)
+    slope = float(np.clip(theilslopes(lag, s)[0], -5.0 * _DRIFT, 5.0 * _DRIFT))
+    r = lag - slope * s
+    r = r - np.median(r)
+    spread = 1.4826 * np.median(np.abs(r))
+    return np.abs(r) <= _FAR * np.hypot(spread, sigma)
+
+
+def _line(
+    s: np.ndarray, lag: np.ndarray, sigma: np.ndarray, within: np.ndarray
+) -> tuple[tuple[float, float], tuple[float, float], float]:
+    """(lag at the centre, drift), their variances, and the centre: weighted least squares, a prior on the drift.
+
+    `within` (n, 2) is each trial's own drift and its sigma [-].
+    """
+    w, w_drift = sigma**-2.0, within[:, 1] ** -2.0
+    centre, reference = float(w @ s / w.sum()), float(w @ lag / w.sum())
+    d = s - centre
+    information = float(w @ d**2 + w_drift.sum()) + _DRIFT**-2
+    drift = float(w @ (d * (lag - reference)) + w_drift @ within[:, 0]) / information
+    chi2 = float(w @ (lag - reference - drift * d) ** 2 + w_drift @ (within[:, 0] - drift) ** 2)
+    dof = len(s) + int((w_drift > 0.0).sum()) - 2
+    birge = max(1.0, chi2 / dof) if dof > 0 else 1.0
+    return (reference, drift), (birge / float(w.sum()), birge / information), centre
+
+
+def allowance(instrument: str, lags: Sequence[TrialLag]) -> tuple[float, float]:
+    """Mean and standard deviation [s] of what all trials share."""
+    if instrument == "plate":
+        return 0.0, _PLATE
+    if not lags:
+        return 0.0, 0.0
+    w = np.array([t.lag.sigma for t in lags]) ** -2.0
+    wound, unseen = w @ [(t.wound, t.unseen) for t in lags] / w.sum()
+    viscous = _VISCOUS * np.exp(0.5 * _COLD**2)
+    spread = viscous * np.sqrt(np.expm1(_COLD**2))
+    sigma = np.linalg.norm([spread, _LEFT / np.sqrt(12.0) * wound, unseen])
+    return float(viscous + 0.5 * _LEFT * max(wound, 0.0) + unseen), float(sigma)

@@ -1,0 +1,189 @@
+"""The robot's clock once more, from whole poses, a provisional geometry and the joints that gravity holds.
+
+    r(t) = log6(T_measured(t)^-1 T_B_H(q(t - lag)))
+         = (lag + drift (t - t0)) sum_held J_j dq_j + sum_others d_j J_j dq_j + J_theta e + noise
+           + sum_held J_j (o_j+- + a_j q_j + b_j tau_j + h_jw lost_w(q_j))
+
+Behind a gear the link is not where the motor is, and a gear without load lags by 4 gap / (pi amplitude omega): ten
+milliseconds and more. So a joint speaks of the clock only while its gravity torque tau_j keeps it on a flank; zeros of
+either flank, elasticity and dry friction (play of 0.1 and 0.4 mrad, weights of 1) are its nuisances. Otherwise it has a
+lag of its own and random errors as large as any gear's. e are the errors of the provisional geometry, as large as its
+fit says. The remaining noise is the markers' and each joint's random reading error, by its lever arm.
+"""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.mocap.postures import Postures, read_passing, read_postures
+from calibration.numerics.lie import inverse, rotation_vector
+from calibration.numerics.time_delay import Lag
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+from calibration.robot.chain import Chain
+from calibration.robot.hand import HandModel, nominal_hand
+from calibration.stages.clocks.clock_fit import TrialLag, fit_clock
+from calibration.stages.clocks.lag_covariance import lag_and_drift, without_nuisances
+from calibration.stages.clocks.plate_moments import JointMotion
+from calibration.stages.clocks.pose_samples import Samples, read_samples
+from calibration.stages.geometry.hand_residual import fit
+from calibration.stages.geometry.parameters import geometry_parameters, play_floor, play_start
+
+_SPACING, _PASSED = 0.5, 250  # [s] between postures passed through, at least; so many of them, about
+_MOVES = 0.05  # [rad, m] a joint must move to count as moving
+_LOADED, _TORQUE = 0.1, 0.3  # a joint is loaded while |tau| exceeds this share of its largest, and this [N.m, N]
+_FREE = 0.02  # [rad, m] random error of a joint that is not loaded: more than any gear's play
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Provisional:
+    """A robot good enough to compare clocks by.
+
+    Attributes:
+        hand: Calibrated on the static postures.
+        root: (p, p) Cholesky factor of its parameters' covariance.
+        play: (k,) random reading error of each joint [rad, m].
+        largest: (k,) largest gravity torque of each joint in the campaign [N.m, N].
+    """
+
+    hand: HandModel
+    root: np.ndarray
+    play: np.ndarray
+    largest: np.ndarray
+
+
+def provisional(chain: Chain, description: Description, trials: Sequence[Trial], robot: Clock) -> Provisional:
+    """Calibrate on the static postures and on those passed through, with an approximate clock.
+
+    Raises:
+        NotEnoughData: Base and hand are not seen together, or a fit that does not converge.
+    """
+    parameters = geometry_parameters(chain, description)
+    nominal = nominal_hand(chain, parameters.nominal[:12])
+    postures = _postures(description, trials, robot)
+    start, floor = play_start(chain, description), play_floor(chain, description)
+    found = fit(nominal, parameters, postures, start, floor)
+    if not found.converged:
+        raise NotEnoughData("the provisional geometry did not converge")
+    hand = nominal.with_theta(found.theta)
+    some = np.concatenate([trial.q_motor[:: max(1, len(trial.t_robot) // 200)] for trial in trials])
+    return Provisional(
+        hand, np.linalg.cholesky(found.covariance), found.play, np.abs(_gravity_torques(hand, some)).max(axis=0)
+    )
+
+
+def _postures(description: Description, trials: Sequence[Trial], robot: Clock) -> Postures:
+    """Static postures, if any, and those passed through, evenly spaced over all trials."""
+    seconds = sum(float(trial.t_mocap[-1] - trial.t_mocap[0]) for trial in trials)
+    passed = read_passing(description, trials, robot, max(_SPACING, seconds / _PASSED))
+    try:
+        return read_postures(description, trials, robot).joined(passed)
+    except NotEnoughData:
+        return passed
+
+
+def refined_lags(robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock) -> list[TrialLag]:
+    """Lags of the trials that move loaded joints, around an approximate clock."""
+    lags = []
+    for trial in trials:
+        try:
+            lags.append(_refined(robot, read_samples(description, trial, clock, calm=True), trial.id, clock))
+        except NotEnoughData as error:
+            _log.info("%s: %s", trial.id, error)
+    return lags
+
+
+def link_angles(robot: Provisional, description: Description, trial: Trial, clock: Clock) -> JointMotion:
+    """Joint angles behind the gears: readings, less their zeros, moved by what the hand's pose shows.
+
+        e = -D J' (S + J D J')^-1 r,     D = diag(play^2)
+
+    Joints that are not on the way to the hand keep their readings.
+    """
+    x = read_samples(description, trial, clock, calm=False)
+    J, D = robot.hand.joint_jacobians(x.q), robot.play**2
+    r = _residuals(x.T, robot.hand.poses(x.q))
+    C = x.covariance + (J * D) @ np.swapaxes(J, 1, 2)
+    q = robot.hand.angles(x.q)
+    q[:, robot.hand.chain.columns] -= D * np.einsum("nik,ni->nk", J, np.linalg.solve(C, r[..., None])[..., 0])
+    return JointMotion(x.t, q)
+
+
+def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> TrialLag:
+    """Lag and drift of one trial around an approximate clock, the nuisances eliminated."""
+    hand, columns = robot.hand, robot.hand.chain.columns
+    q, v, tau = x.q[:, columns], x.v[:, columns], _gravity_torques(hand, x.q)
+    held = np.abs(tau) > np.maximum(_TORQUE, _LOADED * robot.largest)
+    speaks = held & (np.ptp(np.where(held, q, _median(q, held)), axis=0) > _MOVES)
+    if not speaks.any():
+        raise NotEnoughData("no joint moves that gravity holds on one flank")
+    at = hand.poses_and_derivatives(x.q, tau, len(robot.root))
+    moved = at.J_joint * np.where(held, robot.play, np.maximum(robot.play, _FREE))[:, None]
+    W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
+    J = W @ at.J_joint
+    shapes = (tau > 0.0, tau < 0.0, q - q.mean(axis=0), tau)
+    free = [J * (v * ~speaks)[:, None], *(J * (speaks * shape)[:, None] for shape in shapes)]
+    known = [J * (speaks * lost)[:, None] for lost in np.moveaxis(x.lost[:, columns], 2, 0)]
+    A = np.concatenate(free, axis=2).reshape(6 * len(v), -1)
+    B = np.concatenate([W @ at.J @ robot.root, *known], axis=2).reshape(6 * len(v), -1)
+    slope = (J * (v * speaks)[:, None]).sum(axis=2)
+    middle = float(np.average(x.t, weights=(slope**2).sum(axis=1)))
+    r = W @ _residuals(x.T, at.T)[..., None]
+    S = np.stack([slope, slope * (x.t - middle)[:, None]], axis=2).reshape(-1, 2)
+    reduced = without_nuisances(A, B, r.ravel(), S, x.t)
+    change, C = lag_and_drift(reduced)
+    played = np.concatenate(known, axis=2).reshape(len(S), -1)
+    wound = played @ reduced.coefficients(change)[-played.shape[1] :]
+    late = float(S[:, 0] @ wound / (S[:, 0] @ S[:, 0]))
+    unseen = -reduced.taken_for(known[0].sum(axis=2).ravel())
+    return replace(_told(change, C, x.t, middle, trial_id, clock), wound=late, unseen=unseen)
+
+
+def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Median (k,) of each joint's held readings (n, k); of all of them where it is never held."""
+    return np.nanmedian(np.where(held | ~held.any(axis=0), q, np.nan), axis=0)
+
+
+def _told(  # noqa: PLR0913  the parts of one line
+    change: np.ndarray, C: np.ndarray, t: np.ndarray, middle: float, trial_id: str, clock: Clock
+) -> TrialLag:
+    """Lag and drift at the instant where they are uncorrelated, from those at `middle` with covariance C."""
+    shift = float(np.clip(-C[0, 1] / C[1, 1], t[0] - middle, t[-1] - middle))
+    at = middle + shift
+    s = float(clock.from_mocap(np.array([at]))[0])
+    sigma = float(np.sqrt(C[0, 0] + 2 * shift * C[0, 1] + shift**2 * C[1, 1]))
+    lag = Lag(at - s + float(change[0] + shift * change[1]), sigma, 1.0)
+    return TrialLag(trial_id, s, lag, clock.drift + float(change[1]), float(np.sqrt(C[1, 1])), float(t[-1] - t[0]))
+
+
+def _residuals(T_measured: np.ndarray, T: np.ndarray) -> np.ndarray:
+    """log6(T_measured^-1 T) to first order in the error, (n, 6) [m, rad]."""
+    error = inverse(T_measured) @ T
+    return np.concatenate([error[:, :3, 3], rotation_vector(error[:, :3, :3])], axis=1)
+
+
+def _gravity_torques(hand: HandModel, q: np.ndarray) -> np.ndarray:
+    """Torques (n, k) [N.m, N] that hold the chain's joints at readings q, nominal masses."""
+    return hand.chain.gravity_torques(hand.angles(q))
+
+
+def refined(
+    robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock, passes: int = 2
+) -> list[TrialLag]:
+    """Lags from poses; each pass starts from the clock of the one before.
+
+    Raises:
+        NotEnoughData: No trial moves a joint that gravity holds.
+    """
+    lags: list[TrialLag] = []
+    for _ in range(passes):
+        lags = refined_lags(robot, description, trials, clock)
+        if not lags:
+            raise NotEnoughData("no trial moves a joint that gravity holds on one flank")
+        clock = fit_clock(clock.instrument, lags)[0]
+    return lags

@@ -1,0 +1,85 @@
+"""Base, hand and readings of one trial on the motion capture's clock, to compare clocks by.
+
+Rates come from readings without what is faster than 6 Hz, zero phase: stamps that jitter by a millisecond would
+otherwise look like accelerations of 5 rad/s2. The readings themselves stay as they are: what jitter adds to them is
+white and averages out over thousands of samples.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from calibration.errors import NotEnoughData
+from calibration.mocap.cluster_pose import BodyPoses, poses_of
+from calibration.numerics.lie import adjoint, inverse
+from calibration.numerics.signals import RATE, Signal, even, low_passed, play
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description, base_body, hand_body
+from calibration.recording.trial import Trial
+
+HALF_WIDTHS = (1e-4, 4e-4)  # [rad, m]
+_CUTOFF = 6.0  # [Hz] of the readings, for their rates
+_STRIDE = 2  # motion-capture samples
+_ENOUGH = 100  # samples
+_JERK, _AFTER = 3.0, 0.3  # samples within _AFTER [s] of faster accelerations [rad/s2, m/s2] are left out: links bounce
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One trial on the motion capture's clock, where base and hand are seen.
+
+    Attributes:
+        t: (n,) [s].
+        q: (n, n_measured) readings [rad, m].
+        v: (n, n_measured) their rates [rad/s, m/s].
+        lost: (n, n_measured, n_widths) what play operators of half widths `HALF_WIDTHS` add to a reading [rad, m].
+        T: (n, 4, 4) measured T_B_H.
+        covariance: (n, 6, 6) of its local twist [m, rad].
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    lost: np.ndarray
+    T: np.ndarray
+    covariance: np.ndarray
+
+
+def read_samples(description: Description, trial: Trial, clock: Clock, calm: bool) -> Samples:
+    """Every other sample, without jerky motion if only `calm` ones are wanted.
+
+    Raises:
+        NotEnoughData: Base and hand are hardly in view, or nothing is calm.
+    """
+    base, hand = poses_of(base_body(description), trial), poses_of(hand_body(description), trial)
+    s, T = clock.from_mocap(trial.t_mocap), inverse(base.T) @ hand.T
+    slow = low_passed(even(trial.t_robot, trial.q_motor), _CUTOFF)
+    rates = np.gradient(slow.x, 1.0 / RATE, axis=0)
+    q, v = _at(s, trial.t_robot, trial.q_motor), _at(s, slow.t, rates)
+    lost = np.stack([_at(s, slow.t, play(slow.x, np.full(q.shape[1], w)) - slow.x) for w in HALF_WIDTHS], axis=2)
+    wanted = np.interp(s, slow.t, (_is_calm(slow, rates) | (not calm)).astype(float), 0.0, 0.0) == 1.0
+    rows = np.flatnonzero(wanted & np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]
+    if len(rows) < _ENOUGH:
+        raise NotEnoughData("base and hand are hardly in view, or all motion is jerky")
+    covariance = _covariances(T, base, hand, rows, description)
+    return Samples(trial.t_mocap[rows], q[rows], v[rows], lost[rows], T[rows], covariance)
+
+
+def _at(s: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(s, t, column, left=np.nan, right=np.nan) for column in x.T], axis=1)
+
+
+def _is_calm(slow: Signal, rates: np.ndarray) -> np.ndarray:
+    """(n,) False within `_AFTER` of fast accelerations, and in holes of the recording."""
+    jerked = np.abs(np.gradient(rates, 1.0 / RATE, axis=0)).max(axis=1) > _JERK
+    near = maximum_filter1d(jerked.astype(float), 2 * int(_AFTER * RATE) + 1)
+    return (near == 0.0) & slow.valid
+
+
+def _covariances(
+    T: np.ndarray, base: BodyPoses, hand: BodyPoses, rows: np.ndarray, description: Description
+) -> np.ndarray:
+    Ad = adjoint(inverse(T[rows]))
+    C = hand.covariance[rows] + Ad @ base.covariance[rows] @ np.swapaxes(Ad, 1, 2)
+    return description.sigmas.marker**2 * C

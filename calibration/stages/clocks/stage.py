@@ -1,0 +1,148 @@
+"""Stage `clocks`: each instrument's epoch on the motion-capture clock, from calibration trials.
+
+Robot, first: angular velocity of the hand in the base, turned onto the tool's axes by the rotation that fits best,
+
+    R w_mocap(t)  =  g w(q, dq)(t - lag) + b + sum a_jk J_j d(play_k(q_j) - q_j)/dt + sum c_j w_before_j x J_j
+
+w from the nominal chain at the motor-side readings, J_j the axis of joint j. The play terms keep a gear's backlash,
+which lags the link behind the motor by 4 gap / (pi amplitude omega), from passing as a clock error; the last ones
+are the zeros of the readings, to first order.
+Then from whole poses, where static postures allow: see `clock_refinement`.
+Plate: its moments Mx, My, turned where they are mirrored (`plate_axes`), against those of the nominal masses, moved as
+markers and encoders say: `inverse_dynamics`.
+"""
+
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.numerics.time_delay import coarse_lag, fit_lag
+from calibration.recording.clock import Clock, shared_clock
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+from calibration.robot.chain import Chain, chain_of
+from calibration.robot.floating_base import floating_model
+from calibration.stages.clocks.clock_fit import TrialLag, allowance, fit_clock
+from calibration.stages.clocks.motions import Motion, plate_motions, robot_motions
+from calibration.stages.clocks.plate_moments import carriers, plate_axes
+from calibration.stages.clocks.pose_refinement import Provisional, provisional, refined
+from calibration.verdict import Verdict
+
+_LATE, _FAR = 2e-3, 5.0  # [s] and standard deviations by which a clock declared shared may be off unsaid
+_log = logging.getLogger(__name__)
+
+
+def synchronise(
+    urdf: str, description: Description, trials: Sequence[Trial]
+) -> tuple[tuple[Clock, ...], tuple[Verdict, ...]]:
+    """Clocks of the instruments recorded in these trials, the robot's first.
+
+    Raises:
+        NotEnoughData: There are encoder readings, but their clock cannot be told from the motion capture's.
+    """
+    with_robot, with_plate = ([t for t in trials if len(getattr(t, f"t_{name}"))] for name in ("robot", "plate"))
+    robot, model, said = None, None, _missing("robot", "no encoder readings")
+    if with_robot:
+        robot, model, said = _robot_clock(chain_of(urdf, description), description, with_robot)
+    plate, more = None, _missing("plate", "no force plate")
+    if with_plate:
+        plate, more = _plate_clock(urdf, description, with_plate, robot, model)
+    return tuple(c for c in (robot, plate) if c is not None), (*said, *more)
+
+
+def _missing(instrument: str, why: str) -> tuple[Verdict, ...]:
+    lost = {"robot": "no hand pose to predict or calibrate", "plate": "no plate wrench"}[instrument]
+    return (Verdict("clocks", "missing", f"{why}: no {instrument} clock, {lost}"),)
+
+
+def _robot_clock(
+    chain: Chain, description: Description, trials: Sequence[Trial]
+) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
+    """The robot's clock, and the provisional robot the plate's is told with."""
+    if "robot" not in description.mocap_clock:
+        return _estimated_robot_clock(chain, description, trials)
+    said: tuple[Verdict, ...] = (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
+    try:
+        found = _estimated_robot_clock(chain, description, trials)[0]
+    except NotEnoughData:
+        return shared_clock("robot"), None, said
+    late = float(found.to_mocap(np.array([found.epoch]))[0]) - found.epoch
+    if abs(late) > max(_LATE, _FAR * found.sigma):
+        message = (
+            f"robot: declared on the motion capture's clock, but its stamps are {-1e3 * late:+.1f} ms late "
+            f"(+- {1e3 * found.sigma:.1f}); take robot out of mocap_clock, or mend the stamps"
+        )
+        said = (*said, Verdict("clocks", "warning", message))
+    return shared_clock("robot"), None, said
+
+
+def _estimated_robot_clock(
+    chain: Chain, description: Description, trials: Sequence[Trial]
+) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
+    robot, verdicts = _clock("robot", robot_motions(description, chain, trials), 1)
+    try:
+        model = provisional(chain, description, trials, robot)
+        robot, verdicts = _concluded("robot", refined(model, description, trials, robot))
+    except NotEnoughData as error:
+        warning = Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}")
+        return robot, None, (*verdicts, warning)
+    return robot, model, verdicts
+
+
+def _plate_clock(
+    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock | None, model: Provisional | None
+) -> tuple[Clock | None, tuple[Verdict, ...]]:
+    if "plate" in description.mocap_clock:
+        return shared_clock("plate"), (Verdict("clocks", "ok", "plate: on the motion capture's clock"),)
+    if robot is None:
+        return None, _missing("plate", "the plate's clock is told from encoder readings, and there are none")
+    parts = carriers(floating_model(urdf, description), description, trials)
+    motions = list(plate_motions(parts, description, trials, robot, model))
+    Q = plate_axes([m.pair for m in motions])
+    try:
+        return _clock("plate", [replace(m, pair=m.pair.turned(Q)) for m in motions], 2)
+    except NotEnoughData as error:
+        return None, (Verdict("clocks", "missing", f"no plate clock: {error}"),)
+
+
+def _clock(instrument: str, motions: Iterable[Motion], passes: int) -> tuple[Clock, tuple[Verdict, ...]]:
+    """The clock from lags of all motions; every pass after the first knows the drift within a trial."""
+    kept, drift, lags = list(motions), 0.0, []
+    starts = {m.trial_id: coarse_lag(m.pair.y, m.pair.x) for m in kept}
+    for _ in range(passes):
+        lags = _lags(kept, starts, drift)
+        starts = {t.trial_id: t.lag.value for t in lags}
+        drift = fit_clock(instrument, lags)[0].drift
+    return _concluded(instrument, lags)
+
+
+def _concluded(instrument: str, lags: list[TrialLag]) -> tuple[Clock, tuple[Verdict, ...]]:
+    """The clock of these lags, and what is to be said of it."""
+    late, common = allowance(instrument, lags)
+    clock, outliers = fit_clock(instrument, lags, common)
+    clock = replace(clock, offset=clock.offset - late)
+    message = (
+        f"{instrument}: offset {clock.offset:.6f} s, drift {1e6 * clock.drift:.1f} ppm, "
+        f"{1e3 * clock.sigma:.3f} ms at its middle, {len(lags) - len(outliers)} trials"
+    )
+    found = [Verdict("clocks", "ok", message)]
+    if outliers:
+        found.append(Verdict("clocks", "warning", f"{instrument}: trials off the others' clock left out: {outliers}"))
+    return clock, tuple(found)
+
+
+def _lags(motions: Sequence[Motion], starts: Mapping[str, float], drift: float) -> list[TrialLag]:
+    """Lags of the motions that have a start [s] and show the same on both clocks."""
+    found = []
+    for motion in (m for m in motions if m.trial_id in starts):
+        try:
+            lag = fit_lag(motion.pair, starts[motion.trial_id], drift)
+        except NotEnoughData as error:
+            _log.info("%s: %s", motion.trial_id, error)
+            continue
+        middle = 0.5 * (motion.pair.y.t[0] + motion.pair.y.t[-1])
+        found.append(TrialLag(motion.trial_id, middle - lag.value, lag))
+    return found

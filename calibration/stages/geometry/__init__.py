@@ -1,0 +1,1 @@
+"""Stages registration and geometry: marker frames, joint placements, zeros, compliance."""

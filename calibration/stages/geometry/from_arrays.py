@@ -1,0 +1,203 @@
+"""Full geometric calibration from arrays: a URDF, joint readings, marker positions. No file, no datasheet.
+
+The laboratory's frame, the marker body's place on the tool and its shape are unknown; three markers or more are
+compressed to one pose a posture, fewer give a position. Estimated are both frames, six increments for every joint
+placement, the zero of every reading and the compliance of every gear, together with the readings' and the hand's random
+errors and the priors' widths (`evidence`). Postures that no error of the robot explains are left out and named.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.errors import NotCalibrated, NotEnoughData, ShapeError
+from calibration.inference.identifiability import Identifiability, identifiability
+from calibration.inference.map_estimate import Fit, spread
+from calibration.inference.outliers import robust_fit
+from calibration.inference.parameters import ParameterSet
+from calibration.mocap.cluster_shape import Cluster, cluster, in_line
+from calibration.mocap.postures import Postures
+from calibration.numerics.alignment import Start, registration_start
+from calibration.numerics.lie import compose
+from calibration.robot.chain import Chain, chain_of_frames
+from calibration.robot.hand import HandModel, nominal_hand
+from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
+from calibration.stages.geometry.gear_deflection import with_gears_averaged
+from calibration.stages.geometry.guards import joint_lengths, unusable_data, unusable_fit
+from calibration.stages.geometry.hand_residual import Errors, hand_problem
+from calibration.stages.geometry.parameters import (
+    COMPLIANCES,
+    DEFLECTION,
+    ZEROS,
+    gear_tolerances,
+    parameter_names,
+    placement_groups,
+)
+from calibration.verdict import Verdict
+
+_STAGE = "geometry"
+_LEAST = 1e-6  # [m, rad] smallest noise of a measured pose
+_FIXED = 1e-6  # [rad]
+_SPREAD = 720  # components from which rank and combinations are told
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Standard deviations to begin with; the data move them.
+
+    Attributes:
+        translation: Of a joint placement, per axis [m].
+        rotation: Of a joint placement, per axis [rad].
+        offset: Of a reading's zero [rad, a tenth of it in m].
+        deflection: Of a gear at its own largest gravity torque [rad, a tenth of it in m].
+        reading: Of a joint's random reading error [rad, a tenth of it in m].
+        position: Of the hand's random position error [m].
+        orientation: Of the hand's random rotation error [rad].
+    """
+
+    translation: float = 4e-3
+    rotation: float = 8e-3
+    offset: float = 4e-2
+    deflection: float = DEFLECTION
+    reading: float = 2e-3
+    position: float = 5e-4
+    orientation: float = 1e-3
+
+
+@dataclass(frozen=True)
+class GeometryFit:
+    """A calibrated robot.
+
+    Attributes:
+        hand: The robot: T_B_H is the marker body's pose in the laboratory.
+        parameters: What was estimated.
+        fit: Values, covariance, random errors.
+        markers: (m, 3) in the hand's frame [m]; one at its origin where a point was seen.
+        left_out: Numbers of the postures that were not used.
+        verdicts: Findings, postures left out among them.
+        known: Rank, condition and combinations of parameters.
+    """
+
+    hand: HandModel
+    parameters: ParameterSet
+    fit: Fit
+    markers: np.ndarray
+    left_out: tuple[int, ...]
+    verdicts: tuple[Verdict, ...]
+    known: Identifiability
+
+    def predict(self, q: np.ndarray) -> np.ndarray:
+        """Marker positions (n, m, 3) [m, lab] at readings q (n, n_joints) [rad, m]."""
+        T = self.hand.poses(q)
+        return np.einsum("nij,mj->nmi", T[:, :3, :3], self.markers) + T[:, None, :3, 3]
+
+    def predict_with_covariance(self, q: np.ndarray, session: Session | None = None) -> Predicted:
+        """The same with covariance, of this session, or of any other one where `session` is given."""
+        spread = Spread(self.fit.covariance, self.fit.play, self.fit.hand_error)
+        return predicted_points(self.hand, spread, self.markers, q, session)
+
+
+def fit_geometry(
+    urdf: str,
+    joints: Sequence[str],
+    tool: str,
+    q: np.ndarray,
+    positions: np.ndarray,
+    base: str = "universe",
+    widths: Widths | None = None,
+) -> GeometryFit:
+    """Calibrate a robot's chain.
+
+    Args:
+        urdf: Text of a URDF.
+        joints: Names of the columns of q.
+        tool: Frame that carries the markers.
+        q: (n, n_joints) readings at rest [rad, m].
+        positions: (n, m, 3) markers in a frame that stands still with the base [m]; NaN where not seen.
+        base: Frame the chain starts from.
+        widths: To begin with.
+
+    Raises:
+        ShapeError, NotEnoughData: The arrays do not belong together or hold no usable posture.
+        NoSuchElement, InputError: Not a joint, frame or URDF.
+        NotCalibrated: The result must not be used, with every reason.
+    """
+    return fit_chain(chain_of_frames(urdf, tuple(joints), base, tool), q, positions, widths or Widths())
+
+
+def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths) -> GeometryFit:
+    """`fit_geometry` of a chain that was made before."""
+    q, positions = np.asarray(q, dtype=float), np.asarray(positions, dtype=float)
+    if positions.ndim != 3 or positions.shape[0] != len(q) or positions.shape[2] != 3:
+        raise ShapeError("positions", positions.shape, (len(q), "markers", 3))
+    postures, markers, usable = _postures(q, positions)
+    oriented = len(markers) > 1
+    start = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
+    if refused := list(unusable_data(chain, postures.q, start, 6 if oriented else 3)):
+        raise NotCalibrated(refused)
+    tau = chain.gravity_torques(postures.q)
+    parameters = _parameters(chain, start, widths, tau, oriented)
+    nominal, reading = nominal_hand(chain, start.frames), widths.reading * joint_lengths(chain)
+    pose = np.array([widths.position, widths.orientation][: 1 + oriented])
+    errors = Errors(reading, 1e-2 * reading, pose)
+    found = robust_fit(
+        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors, tau[some]),
+        len(postures),
+        3 + 3 * oriented,
+        parameters.nominal,
+    )
+    some = spread(len(found.fit.at.r), 3 + 3 * oriented, _SPREAD)
+    known = identifiability(found.fit.rows_white(some), parameters)
+    if refused := list(unusable_fit(chain, parameters, found, known, len(postures))):
+        raise NotCalibrated(refused)
+    fit = with_gears_averaged(found.fit, parameters)
+    left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~found.kept].tolist()}))
+    verdicts = _verdicts(left_out, len(q), known, parameters)
+    return GeometryFit(nominal.with_theta(fit.theta), parameters, fit, markers, left_out, verdicts, known)
+
+
+def _verdicts(
+    left_out: tuple[int, ...], n: int, known: Identifiability, parameters: ParameterSet
+) -> tuple[Verdict, ...]:
+    message = f"{known.rank} combinations of {len(parameters)} parameters from {n - len(left_out)} postures"
+    said = [Verdict(_STAGE, "ok", f"{message}, condition {known.condition:.0f}")]
+    if left_out:
+        message = f"{len(left_out)} of {n} postures contradict the others and were left out, counted from 0: "
+        said.append(Verdict(_STAGE, "warning", message + ", ".join(map(str, left_out))))
+    return tuple(said)
+
+
+def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarray, np.ndarray]:
+    """Postures of the usable rows, the markers in the hand's frame, and which rows (n,) are usable."""
+    finite = np.isfinite(q).all(axis=1)
+    if positions.shape[1] == 1:
+        usable = finite & np.isfinite(positions[:, 0]).all(axis=1)
+        T = compose(np.tile(np.eye(3), (int(usable.sum()), 1, 1)), positions[usable, 0])
+        noise = np.tile(_LEAST**2 * np.eye(3), (len(T), 1, 1))
+        return Postures(q[usable], T, noise, np.zeros(len(T))), np.zeros((1, 3)), usable
+    if in_line(positions):
+        raise NotEnoughData("markers of a body must be three or more, not in line; or give one of them alone")
+    body: Cluster = cluster(positions)
+    usable = finite & ~body.odd & np.isfinite(body.T).all(axis=(1, 2))
+    covariance = body.covariance[usable] + np.diag(np.full(6, _LEAST**2))
+    return Postures(q[usable], body.T[usable], covariance, np.zeros(int(usable.sum()))), body.xyz, usable
+
+
+def _parameters(chain: Chain, start: Start, widths: Widths, tau: np.ndarray, oriented: bool) -> ParameterSet:
+    """Everything, frames without a prior; what a single point cannot tell of the hand's rotation stays at zero."""
+    k, lengths = len(chain.joints), joint_lengths(chain)
+    gears = gear_tolerances(chain, tau, widths.deflection)
+    frames = np.full(12, np.inf)
+    frames[9:] = np.inf if oriented else _FIXED
+    placement = [widths.translation] * 3 + [widths.rotation] * 3
+    slides = [chain.is_prismatic(name) for name in chain.joints]
+    return ParameterSet(
+        parameter_names(chain)[: 12 + 8 * k],
+        ("m", "m", "m", "rad", "rad", "rad") * (2 + k)
+        + tuple("m" if s else "rad" for s in slides)
+        + tuple("m/N" if s else "rad/(N.m)" for s in slides),
+        np.concatenate([start.frames, np.zeros(8 * k)]),
+        np.concatenate([frames, placement * k, widths.offset * lengths, gears]),
+        np.concatenate([np.full(12, -1), placement_groups(k), np.full(k, ZEROS), np.full(k, COMPLIANCES)]),
+    )

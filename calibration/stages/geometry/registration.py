@@ -1,0 +1,136 @@
+"""Stage `registration`: nominal geometry, the two marker bodies placed where the data say.
+
+    minimise  sum_i |log6(T_measured_i^-1 T_base_B^-1 T_base_tool(q_i) T_tool_H)|^2 / tolerance^2      12 parameters
+
+The honest baseline: what is left after it is geometry, zeros, play and the base. Those errors are millimetres where the
+markers' noise is a tenth of one, so position and rotation weigh as the datasheet's tolerance of a marker body does, and
+postures passed through in swings count beside the static ones: a baseline must not hang on where the statics lie.
+A posture much farther from the others' fit than they are, `_STRAY` times their median squared distance, is left out and
+named: a robot's own errors are much alike over its workspace. The first guess minimises distances, not their squares.
+Samples of one swing hang together in time, by the robot's own errors foremost: the covariance is summed over blocks of
+several correlation times, each static posture being one (`block_covariance`). With the arm alone moving, all twelve
+are identifiable once it turns about two directions; where the base stands in the lab is not asked.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from calibration.errors import NotEnoughData
+from calibration.inference.map_estimate import Fit
+from calibration.inference.parameters import Model, ParameterSet
+from calibration.mocap.postures import Postures
+from calibration.numerics.alignment import registration_start
+from calibration.numerics.lie import inverse
+from calibration.numerics.robust_covariance import block_covariance
+from calibration.recording.schema import Description
+from calibration.robot.chain import Chain
+from calibration.robot.hand import HandModel, nominal_hand
+from calibration.stages.geometry.hand_residual import fit_weighted, linearised
+from calibration.stages.geometry.model_of_fit import model_of
+from calibration.stages.geometry.parameters import registration_parameters
+from calibration.verdict import Verdict
+
+STAGE = "registration"
+_STRAY = 16.0  # squared distance over the median one [-]; 2 to 6 is the farthest of clean recordings
+_NEAR = 1e-2  # squared distance, in tolerances, that never strays [-]
+_ROUNDS = 6
+_STEPS = 20
+_STILL = 1e-10  # [m, rad]
+
+
+def register(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
+    """The two frames, and what is to be said of them."""
+    parameters, tol = registration_parameters(chain, description), description.tolerances
+    told = 6 + postures.components  # a point does not show how the hand is turned: that stays as drawn
+    drawn = np.where(np.arange(12) < told, parameters.tolerance, tol.body_rotation)
+    parameters = replace(parameters, tolerance=drawn)
+    W = np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)[: postures.components])
+    found, kept = _without_strays(nominal_hand(chain, parameters.nominal), parameters, postures, W)
+    model = model_of(STAGE, chain, parameters, found)
+    if not found.converged:
+        return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not come to rest"),)
+    if model.rank < told:
+        message = (
+            f"{told - model.rank} of {told} directions are not identified: the arm turned about one direction only, "
+            "so a turn of both frames about it cannot be told apart; move another joint"
+        )
+        return model, (Verdict(STAGE, "warning", message),)
+    model = model_of(STAGE, chain, parameters, _in_time(found, parameters, postures.motion[kept]))
+    shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
+    message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from its drawing"
+    said = [Verdict(STAGE, "ok", message)]
+    if not kept.all():
+        odd = np.flatnonzero(~kept)
+        names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
+        message = (
+            f"{len(odd)} of {len(kept)} postures lie far from where all others put the marker frames and were left "
+        )
+        said.append(Verdict(STAGE, "warning", message + f"out, counted from 0: {names}"))
+    return model, tuple(said)
+
+
+def _in_time(found: Fit, parameters: ParameterSet, motion: np.ndarray) -> Fit:
+    """The fit, samples of one `motion` (n,) no longer taken for independent; as it is where the arm always stood."""
+    if (motion < 0).all():
+        return found
+    J, prior = found.whitener @ found.at.J, 1.0 / parameters.tolerance**2
+    swings = [np.flatnonzero(motion == k) for k in np.unique(motion[motion >= 0])]
+    series = [*np.flatnonzero(motion < 0)[:, None], *swings]
+    blocks = block_covariance([J[rows] for rows in series], [found.r_white[rows] for rows in series], prior)
+    H = found.J_white.T @ found.J_white + np.diag(prior)
+    drawn = np.linalg.solve(H, np.diag(np.sqrt(prior)))
+    return replace(found, covariance=blocks.covariance + drawn @ drawn.T)
+
+
+def _without_strays(
+    hand: HandModel, parameters: ParameterSet, postures: Postures, W: np.ndarray
+) -> tuple[Fit, np.ndarray]:
+    """The fit of the postures that agree, each residual times W (d, d), and which (n,) they are."""
+
+    def distance(theta: np.ndarray) -> np.ndarray:
+        return np.asarray(((linearised(hand, theta, postures).r @ W) ** 2).sum(axis=1))
+
+    def near(distance: np.ndarray) -> np.ndarray:
+        return distance <= max(_STRAY * float(np.median(distance)), _NEAR)
+
+    start = registration_start(hand.chain.poses(postures.q), postures.T_base_hand, postures.components == 6).frames
+    kept = near(min((distance(theta) for theta in (start, parameters.nominal)), key=np.median))
+    for _ in range(_ROUNDS):
+        used = kept
+        found = fit_weighted(hand, parameters, postures.rows(used), np.tile(W, (int(used.sum()), 1, 1)))
+        kept = near(distance(found.theta))
+        if np.array_equal(kept, used):
+            break
+    return found, used
+
+
+def frame_weights(description: Description) -> np.ndarray:
+    """(6,) weights of a pose's errors: in tolerances of a marker body [1/m, 1/rad]."""
+    tol = description.tolerances
+    return 1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)
+
+
+def fit_frames(model: HandModel, q: np.ndarray, T_measured: np.ndarray, description: Description) -> HandModel:
+    """The model with both marker frames fitted to T_measured (n, 4, 4) at q (n, n_joints).
+
+    Raises:
+        NotEnoughData: Fewer than two postures, or they turn the hand about one direction only.
+    """
+    weight = frame_weights(description)
+    if len(q) < 2:
+        raise NotEnoughData(f"{len(q)} registration postures of the confirmation session show base and hand; make more")
+    for _ in range(_STEPS):
+        found = model.poses_and_derivatives(q, n_parameters=12)
+        r = np.array([pin.log6(pin.SE3(E)).vector for E in inverse(T_measured) @ found.T])
+        J = (weight[:, None] * found.J).reshape(-1, 12)
+        if np.linalg.matrix_rank(J, rtol=1e-6) < 12:
+            raise NotEnoughData(
+                f"the {len(q)} registration postures of the confirmation session turn the hand about one direction only"
+            )
+        step = np.linalg.lstsq(J, -(weight * r).ravel(), rcond=None)[0]
+        model = replace(model, base=model.base + step[:6], hand=model.hand + step[6:])
+        if np.abs(step).max() < _STILL:
+            break
+    return model

@@ -1,0 +1,96 @@
+"""Stage `geometry`: joint placements, zeros of the readings and marker frames, datasheet tolerances as priors.
+
+See `map_fit` for the cost and `hand` for the model. With 6D markers on base and hand a chain of R revolute and P
+prismatic joints has 4 R + 2 P + 6 identifiable combinations: 36 for a torso and seven arm joints, 34 with the torso
+still. What the data do not separate stays at what the tolerances make most likely. Postures that contradict all others
+are left out and named.
+
+What gears give under load, and the play that gravity holds, is asked for in row `full`, see `gears`.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from calibration.inference.identifiability import identifiability
+from calibration.inference.outliers import RobustFit, robust_fit
+from calibration.inference.parameters import Model, ParameterSet
+from calibration.mocap.cluster_shape import of_one_shape
+from calibration.mocap.postures import Postures
+from calibration.numerics.alignment import registration_start
+from calibration.recording.schema import Description
+from calibration.robot.chain import Chain
+from calibration.robot.hand import nominal_hand
+from calibration.stages.geometry.guards import (
+    APART,
+    CONDITION,
+    MANY_ODD,
+    implausible,
+    spans,
+    too_little,
+    unusable_data,
+)
+from calibration.stages.geometry.hand_residual import Errors, hand_problem
+from calibration.stages.geometry.model_of_fit import model_of
+from calibration.stages.geometry.parameters import geometry_parameters, play_floor, play_start
+from calibration.verdict import Verdict
+
+STAGE = "geometry"
+
+
+def calibrate_geometry(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
+    """The geometric model; a verdict `refused` says that it must not be used."""
+    parameters = geometry_parameters(chain, description)
+    start, floor = play_start(chain, description), play_floor(chain, description)
+    errors = Errors(np.maximum(start, floor), floor, np.zeros(0), stated=True)
+    robust = fit_robustly(chain, parameters, postures, errors)
+    found = robust.fit
+    known = identifiability(found.J_white, parameters)
+    oriented = postures.components == 6
+    frames = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
+    refused = [*unusable_data(chain, postures.q, frames, postures.components)]
+    refused = refused or [
+        *too_little(known, CONDITION[postures.components]),
+        *implausible(parameters, found, start, chain),
+    ]
+    verdicts = [Verdict(STAGE, "refused", message) for message in refused]
+    verdicts += left_out(postures, robust)
+    still = [name for name, span in zip(chain.joints, spans(chain, postures), strict=True) if span < APART]
+    if still:
+        verdicts.append(
+            Verdict(STAGE, "warning", f"joints that never moved are calibrated at their position only: {still}")
+        )
+    if not refused:
+        used = int(robust.kept.sum())
+        message = f"{known.rank} combinations of {len(parameters)} parameters from {used} postures"
+        verdicts.append(Verdict(STAGE, "ok", f"{message}, condition {known.condition:.0f}"))
+    if not oriented:
+        message = "a point of the hand was seen: its place is calibrated, which way the hand is turned is as drawn"
+        verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
+    return model_of("model_2", chain, parameters, found), tuple(verdicts)
+
+
+def fit_robustly(chain: Chain, parameters: ParameterSet, postures: Postures, errors: Errors) -> RobustFit:
+    """The fit of the postures that agree, from nominal values; none whose markers do not have their body's shape."""
+    nominal, n = nominal_hand(chain, parameters.nominal[:12]), len(postures)
+    rigid = np.flatnonzero(of_one_shape(postures.misfit))
+    found = robust_fit(
+        lambda some: hand_problem(nominal, parameters, postures.rows(rigid[some]), errors),
+        len(rigid),
+        postures.components,
+        parameters.nominal,
+    )
+    kept, distance = np.zeros(n, dtype=bool), np.full(n, np.inf)
+    kept[rigid], distance[rigid] = found.kept, found.distance
+    return RobustFit(found.fit, kept, distance)
+
+
+def left_out(postures: Postures, found: RobustFit) -> Iterator[Verdict]:
+    """The postures that were not used, by name."""
+    odd = np.flatnonzero(~found.kept)
+    if len(odd):
+        names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
+        said = (
+            f"{len(odd)} of {len(postures)} postures contradict the others and were left out, counted from 0: {names}"
+        )
+        yield Verdict(STAGE, "refused" if len(odd) > MANY_ODD * len(postures) else "warning", said)

@@ -1,0 +1,1 @@
+"""Stage joints: the paper's sigmoid-polynomial joint models."""

@@ -1,0 +1,1 @@
+"""Stage suspension: base motion under a wrench."""

@@ -1,0 +1,212 @@
+"""What the base did on its wheels in one trial, and the wrench that made it.
+
+    (K + G) x + C dx/dt + M d2x/dt2 = w
+
+x displacement of the base frame, w change of the wrench since the first second, both in frame 0, low-passed alike.
+With the plate's wrench M = 0: it is what the floor feels. Inverse dynamics holds the base still, so the base's
+inertia M and the shift of its weight are on the left. G is no spring's: forces that are there at rest, f_i at p_i, turn
+with the base (wheels are suspended in its axes), and its weight f moves with its centre of mass c,
+
+    G x = sum_i [theta x f_i ; p_i x (theta x f_i)] - [0 ; (t + theta x c) x f]            second term: dynamics only
+
+The first is 745 N/rad between force and tilt on TIAGo, the second takes W c_z = 270 N.m/rad off roll and pitch.
+
+Trials as sways, by the plate's wrench and by that of inverse dynamics.
+"""
+
+import logging
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicSpline
+
+from calibration.errors import NotEnoughData
+from calibration.mocap.cluster_pose import poses_of
+from calibration.numerics.lie import skew
+from calibration.numerics.signals import CUTOFF, RATE, even, low_passed
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description, base_body
+from calibration.recording.trial import REST, Trial
+from calibration.robot.chain import chain_of
+from calibration.robot.floating_base import floating_model
+from calibration.robot.nominal_frames import nominal_base_body
+from calibration.stages.suspension.floor_wrench import Load, dynamics_load, plate_load
+from calibration.stages.suspension.rest_frame import Rest, rest_of
+
+_INDEPENDENT = 2.0 * CUTOFF * REST  # samples of low-passed noise in the first second
+_RESTLESS = (_INDEPENDENT + 1.0) / (_INDEPENDENT - 1.0)  # of x minus its mean over that second, over variance in it
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Forcing:
+    """What drives the base in one trial.
+
+    Attributes:
+        t: (n,) [s, mocap clock], spacing 1 / RATE.
+        w: (n, 6) change of the wrench since the first second [N, N.m, frame 0].
+        rest: (6,) wrench in the first second.
+        inertia: M (6, 6).
+        tangent: G (6, 6).
+        T_0_plate: (4, 4) centre of the first plate and axes of its readings; frame 0 for dynamics.
+    """
+
+    t: np.ndarray
+    w: np.ndarray
+    rest: np.ndarray
+    inertia: np.ndarray
+    tangent: np.ndarray
+    T_0_plate: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sway:
+    """Forcing and displacement of one trial.
+
+    Attributes:
+        trial_id: The trial.
+        forcing: On the same grid.
+        x: (n, 6) displacement [m, rad, frame 0].
+        valid: (n,) False inside holes of the recording.
+        noise: (6,) mean square that the noise of motion capture adds to x, its reference included.
+    """
+
+    trial_id: str
+    forcing: Forcing
+    x: np.ndarray
+    valid: np.ndarray
+    noise: np.ndarray
+
+
+def forcing_of(load: Load, start: float) -> Forcing:
+    """Change of a load since the first second of the trial, which began at `start` [s, mocap clock].
+
+    Raises:
+        NotEnoughData: The load was not recorded then.
+    """
+    t, w = load.signal.t, load.signal.x
+    early = t <= start + REST
+    if early.sum() < 0.5 * REST * RATE:
+        raise NotEnoughData(f"the wrench of the first second is missing: it begins {t[0] - start:.2f} s into the trial")
+    rest = w[early].mean(axis=0)
+    return Forcing(t, w - rest, rest, load.inertia, _tangent(rest, load), load.T_0_plate)
+
+
+def sway_of(description: Description, trial: Trial, rest: Rest, load: Load, cutoff: float = CUTOFF) -> Sway:
+    """Displacement by the base markers, and the forcing on its grid.
+
+    Raises:
+        NotEnoughData: Markers or wrench are missing.
+    """
+    forcing = forcing_of(load, float(trial.t_mocap[0]))
+    found = low_passed(even(trial.t_mocap, rest.displacement(poses_of(base_body(description), trial).T)), cutoff)
+    keep = (found.t >= forcing.t[0]) & (found.t <= forcing.t[-1])
+    if keep.sum() < 2.0 * RATE:
+        raise NotEnoughData(f"{trial.id}: base markers and wrench overlap for less than two seconds")
+    t, x = found.t[keep], found.x[keep]
+    early = t <= trial.t_mocap[0] + REST
+    w = CubicSpline(forcing.t, forcing.w)(t)
+    on_grid = replace(forcing, t=t, w=w)
+    return Sway(trial.id, on_grid, x - x[early].mean(axis=0), found.valid[keep], x[early].var(axis=0) * _RESTLESS)
+
+
+def _tangent(rest: np.ndarray, load: Load) -> np.ndarray:
+    """G (6, 6) from the wrench at rest: its weight W and centre of pressure, moments (-W y, W x)."""
+    G = np.zeros((6, 6))
+    G[:3, 3:] = -skew(rest[:3] * [0.0, 0.0, 1.0])
+    G[5, 3:5] = rest[4], -rest[3]
+    if load.weight > 0.0:
+        f = np.array([0.0, 0.0, -load.weight])
+        G[3:, :3] += skew(f)
+        G[3:, 3:] -= skew(f) @ skew(load.centre_of_mass)
+    return G
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """What turns a trial into wrenches and displacements.
+
+    Attributes:
+        description: Of the dataset.
+        model: Nominal floating-base model.
+        T_base_B: (4, 4) the base's marker body on the base.
+        robot: Clock of the encoders, None where there are none.
+        plate: Clock of the force plate, None where there is none.
+    """
+
+    description: Description
+    model: pin.Model
+    T_base_B: np.ndarray
+    robot: Clock | None
+    plate: Clock | None
+
+    def plate_load(self, trial: Trial, T_lab_0: np.ndarray) -> Load:
+        """The wrench the plate measured.
+
+        Raises:
+            NotEnoughData: There is no plate, or its clock is not known.
+        """
+        if self.plate is None or len(trial.t_plate) == 0:
+            raise NotEnoughData(f"{trial.id}: no force plate on a known clock")
+        return plate_load(trial, self.plate, T_lab_0)
+
+    def dynamics_load(self, trial: Trial, T_lab_0: np.ndarray) -> Load:
+        """The wrench by inverse dynamics.
+
+        Raises:
+            NotEnoughData: There are no encoder readings on a known clock.
+        """
+        if self.robot is None or len(trial.t_robot) == 0:
+            raise NotEnoughData(f"{trial.id}: no encoder readings on a known clock")
+        return dynamics_load(self.model, self.description, trial, self.robot, T_lab_0)
+
+
+@dataclass(frozen=True)
+class Sways:
+    """Sways of the usable trials; either is empty where there is no such instrument, else in the same order."""
+
+    plate: tuple[Sway, ...]
+    dynamics: tuple[Sway, ...]
+
+    def without(self, names: Iterable[str]) -> "Sways":
+        """Without some trials."""
+        left_out = set(names)
+        return replace(
+            self,
+            plate=tuple(s for s in self.plate if s.trial_id not in left_out),
+            dynamics=tuple(s for s in self.dynamics if s.trial_id not in left_out),
+        )
+
+    @property
+    def forcings(self) -> tuple[list[Forcing], list[Forcing]]:
+        """Of the plate and of the dynamics."""
+        return [s.forcing for s in self.plate], [s.forcing for s in self.dynamics]
+
+
+def laboratory(
+    urdf: str, description: Description, robot: Clock | None, plate: Clock | None, T_base_B: np.ndarray | None = None
+) -> Laboratory:
+    """The laboratory of a dataset; the marker body where it is drawn, unless T_base_B says otherwise."""
+    if T_base_B is None:
+        T_base_B = nominal_base_body(chain_of(urdf, description), description)
+    return Laboratory(description, floating_model(urdf, description), T_base_B, robot, plate)
+
+
+def read_sways(lab: Laboratory, trials: Sequence[Trial]) -> Sways:
+    """Sways of the trials that show the base and its wrench, by every instrument the campaign has."""
+    sources: dict[str, Callable[[Trial, np.ndarray], Load]] = {}
+    if lab.robot is not None and any(len(t.t_robot) for t in trials):
+        sources["dynamics"] = lab.dynamics_load
+    if lab.plate is not None and any(len(t.t_plate) for t in trials):
+        sources["plate"] = lab.plate_load
+    rows = []
+    for trial in trials:
+        try:
+            rest = rest_of(lab.description, trial, lab.T_base_B)
+            rows.append([sway_of(lab.description, trial, rest, load(trial, rest.T_lab_0)) for load in sources.values()])
+        except NotEnoughData as error:
+            _log.info("%s: %s", trial.id, error)
+    columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(sources)}
+    return Sways(columns.get("plate", ()), columns.get("dynamics", ()))

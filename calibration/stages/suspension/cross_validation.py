@@ -1,0 +1,85 @@
+"""Which axes of the base the suspension predicts better than a base that stays: leave one trial out.
+
+    R2_a = 1 - sum_k sum_t (x - x_(-k))_a^2 / sum_k sum_t x_a^2          x_(-k): fitted without trial k, from the wrench
+
+Zero is a base that stays, not the mean. One trial may slip more than all others move; an axis is moved only if R2 is
+positive and, with such a trial counting no more than the others together, is worth it with and without the trial that
+speaks most for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
+capture's noise (its variance at rest) off both sums: what share of the motion itself is the spring's.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.stages.suspension.base_response import Sway
+from calibration.stages.suspension.modal_response import predicted
+
+_WORTH = 0.05  # R2 below which an axis is left still [-]
+_NOISE = 1.25  # how much more than expected the noise may be, known from one second a trial [-]
+_SLIP = 0.1  # share of the motion [-]
+_VISIBLE = 1.5  # motion over noise, mean squares, below which its share cannot be told [-]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Sums over each trial when it was left out, (n_trials, 6).
+
+    Attributes:
+        error: Squared error.
+        motion: Squared displacement.
+        noise: Squared noise to be expected.
+        count: (n_trials,) samples.
+    """
+
+    error: np.ndarray
+    motion: np.ndarray
+    noise: np.ndarray
+    count: np.ndarray
+
+    @property
+    def r2(self) -> np.ndarray:
+        """(6,) of all trials together."""
+        return 1.0 - self.error.sum(axis=0) / np.maximum(self.motion.sum(axis=0), np.finfo(float).tiny)
+
+    def variance(self, moves: np.ndarray) -> np.ndarray:
+        """(6,) mean square of what is left of the displacement where an axis moves, of all of it where it stays."""
+        left = np.where(moves, np.minimum(self.error, np.finfo(float).max), self.motion).sum(axis=0)
+        return np.maximum(left - self.noise.sum(axis=0), 0.0) / max(float(self.count.sum()), 1.0)
+
+    @property
+    def explained(self) -> np.ndarray:
+        """(6,) share of the motion without noise; NaN where there is hardly any."""
+        error, motion, noise = (a.sum(axis=0) for a in (self.error, self.motion, self.noise))
+        visible = motion > _VISIBLE * noise
+        share = 1.0 - (error - noise) / np.where(visible, motion - noise, 1.0)
+        return np.where(visible, np.minimum(share, 1.0), np.nan)
+
+    @property
+    def slips(self) -> np.ndarray:
+        """(6,) axes whose error is more than noise and a tenth of the motion: no spring's alone."""
+        error, motion, noise = (a.sum(axis=0) for a in (self.error, self.motion, self.noise))
+        return np.asarray(error > _NOISE * noise + _SLIP * np.maximum(motion - noise, 0.0))
+
+    @property
+    def moves(self) -> np.ndarray:
+        """(6,) whether to move an axis."""
+        error, axes = np.minimum(self.error, np.finfo(float).max), np.arange(self.motion.shape[1])
+        others = self.motion.sum(axis=0) - self.motion
+        weight = np.minimum(1.0, others / np.maximum(self.motion, np.finfo(float).tiny))
+        motion, gain = weight * self.motion, weight * (self.motion - error)
+        best = gain.argmax(axis=0)
+        rest_motion, rest_gain = (a.sum(axis=0) - a[best, axes] for a in (motion, gain))
+        worth = gain.sum(axis=0) > _WORTH * motion.sum(axis=0)
+        return np.asarray((self.r2 > 0.0) & worth & (rest_gain > _WORTH * rest_motion))
+
+
+def held_out(sways: Sequence[Sway], without: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> HeldOut:
+    """Predict every trial by K and C fitted without it."""
+    rows = []
+    for k, sway in enumerate(sways):
+        e = (sway.x - predicted(*without(k), sway.forcing))[sway.valid]
+        rows.append(((e**2).sum(axis=0), (sway.x[sway.valid] ** 2).sum(axis=0), len(e) * sway.noise, len(e)))
+    error, motion, noise, count = (np.array(a, dtype=float) for a in zip(*rows, strict=True))
+    return HeldOut(error, motion, noise, count)

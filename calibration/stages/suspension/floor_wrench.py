@@ -1,0 +1,109 @@
+"""Wrench of the robot's action on the floor, in frame 0: by the force plate, and by floating-base inverse dynamics.
+
+    plate:     w = sum_p [R' f_p ; R' (m_p + (c_p - o) x f_p)]          c_p plate centre, (R, o) = T_lab_0
+    dynamics:  w = -Ad*(T_0_root) tau_1..6(q, dq, ddq)                   RNEA, base held still, nominal masses, payload
+
+about the origin of frame 0, in its axes [N, N.m]. What the base's own motion adds to `dynamics` is known from
+
+    M   inertia of the whole robot about that origin, (6, 6)             W, c   its weight and centre of mass
+
+Both wrenches are low-passed at 10 Hz without delay, like the displacement: the base resonates at 4 to 6 Hz, a jolt of
+0.1 s has its energy below 10 Hz, and what is above is the motion capture's noise. Nothing of 2.5 Hz would slip.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicSpline
+
+from calibration.numerics.lie import compose, inverse
+from calibration.numerics.signals import CUTOFF, Signal, even, low_passed
+from calibration.numerics.wrench import in_frame
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+
+_DECIMATED = 0.005  # [s] plate samples averaged together
+_MASS_SAMPLES = 20  # configurations the inertia is averaged over
+
+
+@dataclass(frozen=True)
+class Load:
+    """The wrench on the floor along a trial.
+
+    Attributes:
+        signal: w (n, 6) [N, N.m, frame 0], on an even grid of the mocap clock.
+        inertia: M (6, 6) about the origin of frame 0; zero where the base's inertia is in w already (plate).
+        weight: [N]; zero where its change with the base's motion is in w already (plate).
+        centre_of_mass: (3,) [m, frame 0].
+        T_0_plate: (4, 4) centre of the first plate and axes of its readings; frame 0 for dynamics.
+    """
+
+    signal: Signal
+    inertia: np.ndarray
+    weight: float
+    centre_of_mass: np.ndarray
+    T_0_plate: np.ndarray
+
+
+def plate_load(trial: Trial, plate: Clock, T_lab_0: np.ndarray, cutoff: float = CUTOFF) -> Load:
+    """What the plates of a trial measured."""
+    size = max(1, round(_DECIMATED / float(np.median(np.diff(trial.t_plate)))))
+    n = len(trial.t_plate) // size * size
+    t = plate.to_mocap(trial.t_plate[:n]).reshape(-1, size).mean(axis=1)
+    lab = trial.plate_wrench[:n].reshape(-1, size, *trial.plate_wrench.shape[1:]).mean(axis=1)
+    return floor_load(t, in_frame(lab, trial.plate_centre, T_lab_0), T_lab_0, trial.plate_centre[0], cutoff)
+
+
+def floor_load(t: np.ndarray, w: np.ndarray, T_lab_0: np.ndarray, centre: np.ndarray, cutoff: float = CUTOFF) -> Load:
+    """A wrench that the floor felt, w (n, 6) in frame 0 at t (n,) [s], read about a centre (3,) [m, lab]."""
+    T_0_plate = inverse(T_lab_0) @ compose(np.eye(3), centre)
+    return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3), T_0_plate)
+
+
+def dynamics_load(
+    model: pin.Model, description: Description, trial: Trial, robot: Clock, T_lab_0: np.ndarray, cutoff: float = CUTOFF
+) -> Load:
+    """What a floating model (see `inverse_dynamics.floating_model`) does along q_motor, its base standing still."""
+    order = [description.joint_names.index(name) for name in list(model.names)[2:]]
+    q = low_passed(even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order]), cutoff)
+    spline = CubicSpline(q.t, q.x)
+    T_0_root = _root_in_base(model, description)
+    root = pin.SE3(T_lab_0) * T_0_root
+    start = np.concatenate([pin.SE3ToXYZQUAT(root), np.zeros(model.nq - 7)])
+    w = _root_wrenches(model, start, q.x, spline(q.t, 1), spline(q.t, 2)) @ T_0_root.dualAction.T
+    data, M = model.createData(), np.zeros((6, 6))
+    rows = np.linspace(0, len(q.t) - 1, _MASS_SAMPLES).astype(int)
+    for x in q.x[rows]:
+        M += pin.crba(model, data, _configuration(model, start, x))[:6, :6] / len(rows)
+    M = T_0_root.dualAction @ (np.triu(M) + np.triu(M, 1).T) @ T_0_root.inverse().action
+    weight = float(M[0, 0] * np.linalg.norm(description.gravity))
+    com = np.array([M[2, 4] * -1.0, M[2, 3], M[0, 4]]) / M[0, 0]
+    return Load(Signal(q.t, -w, q.valid), M, weight, com, np.eye(4))
+
+
+def _root_in_base(model: pin.Model, description: Description) -> pin.SE3:
+    """T_base_root, root = the body of the free flyer."""
+    return model.frames[model.getFrameId(description.base_frame)].placement.inverse()
+
+
+def _configuration(model: pin.Model, start: np.ndarray, x: np.ndarray) -> np.ndarray:
+    if model.nq - 7 == len(x):
+        return np.concatenate([start[:7], x])
+    neutral = pin.neutral(model)
+    neutral[:7] = start[:7]
+    return pin.integrate(model, neutral, np.concatenate([np.zeros(6), x]))
+
+
+def _root_wrenches(
+    model: pin.Model, start: np.ndarray, q: np.ndarray, v: np.ndarray, a: Sequence[np.ndarray] | np.ndarray
+) -> np.ndarray:
+    """Wrench of the world on the root (n, 6), root axes, about the root's origin."""
+    data, still = model.createData(), np.zeros(6)
+    out = np.empty((len(q), 6))
+    for k, (q_k, v_k, a_k) in enumerate(zip(q, v, a, strict=True)):
+        full = _configuration(model, start, q_k)
+        out[k] = pin.rnea(model, data, full, np.concatenate([still, v_k]), np.concatenate([still, a_k]))[:6]
+    return out

@@ -1,0 +1,156 @@
+"""Stage `suspension`: the base's springs from the base markers and the wrench on the floor, calibration trials alone.
+
+    1  wrong data are told by name (suspension_checks)
+    2  the printed form, displacement -> wrench; refused unless K > 0, C >= 0, it settles, and, run forward on trials it
+       was not fitted to, it is on no axis worse than a base that stays nor, by 2 % of the motion, than
+    3  the reduced 6x6 compliance, fitted wrench -> displacement, which then takes its place
+    4  each axis is moved or left still, by leave-one-trial-out, for each source of the wrench
+
+Where there is no plate the wrench is that of inverse dynamics.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.inference.parameters import Combination, Model
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+from calibration.stages.suspension.base_response import Laboratory, Sway, Sways, laboratory, read_sways
+from calibration.stages.suspension.checks import STAGE, moved_bases, wrong_plate
+from calibration.stages.suspension.cross_validation import HeldOut, held_out
+from calibration.stages.suspension.form_selection import (
+    Springs,
+    compliance_springs,
+    not_positive,
+    printed_springs,
+    refusal,
+)
+from calibration.stages.suspension.model import AXES, Source, Suspension
+from calibration.stages.suspension.wheels import Point, element_parameters, wheel_model, wheel_parameters
+from calibration.verdict import Verdict
+
+
+@dataclass(frozen=True)
+class Form:
+    """What is fitted.
+
+    Attributes:
+        point: r_i of the printed form: `centre` of the hub or `contact`; None: what predicts left-out trials better.
+        full: Whether Kt, Ct, Ktheta, Ctheta are symmetric matrices instead of diagonal ones.
+        coupled: Whether the compliance couples all six axes, as hub centres do, or (x, y, rz) and (z, rx, ry) apart,
+            as contact points in the floor do.
+    """
+
+    point: Point | None = None
+    full: bool = False
+    coupled: bool = False
+
+
+def fit_suspension(
+    urdf: str,
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock | None,
+    plate: Clock | None,
+    T_base_B: np.ndarray | None = None,
+    form: Form | None = None,
+) -> tuple[Suspension | None, tuple[Verdict, ...]]:
+    """The suspension by calibration trials, None where there is none to be had, and what is to be said of it.
+
+    T_base_B (4, 4) places the base's marker body on the base; nominal where it is not given.
+    """
+    lab = laboratory(urdf, description, robot, plate, T_base_B)
+    sways = read_sways(lab, trials)
+    found = list(wrong_plate(description, *sways.forcings)) if sways.plate else []
+    moved = moved_bases(sways.dynamics or sways.plate)
+    told = ", ".join(f"{name} by {how}" for name, how in moved.items())
+    if moved:
+        found.append(Verdict(STAGE, "warning", f"base moved during {told}: left out; brake it, or record again"))
+    sways = sways.without(moved)
+    usable = len(sways.dynamics or sways.plate)
+    if any(v.verdict == "refused" for v in found) or usable < 2:
+        if usable < 2:
+            found.append(
+                Verdict(STAGE, "missing", "no suspension: it takes two trials that show the base and its load")
+            )
+        return None, tuple(found)
+    if not sways.plate:
+        found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
+    suspension, said = _fitted(lab, sways, form or Form())
+    return suspension, (*found, *said)
+
+
+def _fitted(lab: Laboratory, sways: Sways, form: Form) -> tuple[Suspension, list[Verdict]]:
+    used = sways.plate or sways.dynamics
+    springs = compliance_springs(lab.description, used, form.coupled)
+    said = []
+    if lab.description.wheels and sways.plate:
+        springs, verdict = _chosen(lab.description, used, form, springs)
+        said.append(verdict)
+    sources: list[tuple[Source, tuple[Sway, ...]]] = [("plate", sways.plate), ("dynamics", sways.dynamics)]
+    tried = tuple((s, held_out(rows, springs.folds.__getitem__)) for s, rows in sources if rows)
+    slips = tried[0][1].slips
+    parameters = (
+        *element_parameters("K", springs.K, springs.sigmas[0], springs.couples, slips),
+        *element_parameters("C", springs.C, springs.sigmas[1], springs.couples, slips),
+    )
+    combinations: tuple[Combination, ...] = ()
+    if springs.wheels is not None:
+        more, combinations = wheel_parameters(*springs.wheels, len(parameters))
+        parameters += more
+    preload = np.mean([s.forcing.tangent for s in sways.plate], axis=0) if sways.plate else np.zeros((6, 6))
+    suspension = Suspension(
+        "compliance" if springs.wheels is None else "printed",
+        springs.K,
+        springs.C,
+        *springs.sigmas,
+        preload,
+        np.mean([s.forcing.tangent for s in sways.dynamics], axis=0) - preload if sways.dynamics else np.zeros((6, 6)),
+        tried,
+        parameters,
+        combinations,
+    )
+    return suspension, said + [_judged(s, h) for s, h in tried]
+
+
+def _chosen(description: Description, sways: Sequence[Sway], form: Form, reduced: Springs) -> tuple[Springs, Verdict]:
+    """The printed form, about the points that predict better, or the reduced one where that is refused."""
+    points: tuple[Point, ...] = (form.point,) if form.point else ("centre", "contact")
+    found: list[tuple[float, Springs, str, Point]] = []
+    for point in points:
+        springs = printed_springs(description, wheel_model(description.wheels, point, form.full), sways)
+        why, worth = not_positive(springs), -np.inf
+        if not why:
+            tried = held_out(sways, springs.folds.__getitem__)
+            why = refusal(springs, tried, held_out(sways, reduced.folds.__getitem__))
+            worth = float(np.clip(tried.r2, -1.0, 1.0).sum())
+        found.append((worth, springs, why, point))
+    _, springs, why, point = max(found, key=lambda f: f[0])
+    if not why:
+        return springs, Verdict(
+            STAGE, "ok", f"printed form with r_i the wheels' {point} points, displacement to wrench"
+        )
+    message = (
+        f"printed form (r_i the wheels' {point} points, displacement to wrench) refused: {why}; the 6x6 compliance "
+        "fitted wrench to displacement takes its place"
+    )
+    return reduced, Verdict(STAGE, "warning", message)
+
+
+def _judged(source: Source, tried: HeldOut) -> Verdict:
+    """What the axes are worth."""
+    told = ", ".join(f"{a} {r2:.2f}" for a, r2 in zip(AXES, np.maximum(tried.r2, -9.99), strict=True))
+    still = [a for a, moves in zip(AXES, tried.moves, strict=True) if not moves]
+    message = f"from {source}, left-out trials: R2 against a base that stays {told}"
+    if still:
+        message += f"; left still: {', '.join(still)} (they slip, or do not move visibly)"
+    return Verdict(STAGE, "ok" if tried.moves[3:5].all() else "warning", message)
+
+
+def suspension_model(suspension: Suspension) -> Model:
+    """Row `model_1`: the suspension's parameters; what has no sigma is not known."""
+    sigma = np.nan_to_num([p.sigma for p in suspension.parameters], nan=0.0)
+    return Model("model_1", suspension.parameters, suspension.combinations, np.diag(sigma**2))

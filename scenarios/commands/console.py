@@ -1,0 +1,197 @@
+"""What the command line shows: progress on stderr, tables on stdout."""
+
+import json
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from scenarios.steps.run import Progress
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+    from scenarios.datasets.index import Row
+
+PLAIN_WIDTH = 120
+"""Width of a table where there is no terminal [characters]."""
+
+PLAIN_PERIOD = 5.0
+"""Time between two progress lines of one step where there is no terminal [s]."""
+
+
+@contextmanager
+def progress() -> Iterator[Progress]:
+    """Yield what shows the progress of the steps: a bar each on a terminal, a line now and then elsewhere."""
+    console = Console(stderr=True)
+    if console.is_terminal and not console.is_dumb_terminal:
+        with _bars(console) as show:
+            yield show
+    else:
+        yield _lines(console)
+
+
+@contextmanager
+def _bars(console: Console) -> Iterator[Progress]:
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    steps: dict[str, TaskID] = {}
+    step_name, at_what = (TextColumn(text, markup=False) for text in ("{task.description:<10}", "{task.fields[at]}"))
+    with Bars(step_name, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), at_what, console=console) as bars:
+
+        def show(step: str, at: str, fraction: float) -> None:
+            if step not in steps:
+                _finish(bars, steps)
+                steps[step] = bars.add_task(step, total=1.0, at=at)
+            bars.update(steps[step], completed=fraction, at=at)
+
+        yield show
+        _finish(bars, steps)
+
+
+def _finish(bars: Any, steps: dict[str, "TaskID"]) -> None:
+    for task in steps.values():
+        bars.update(task, completed=1.0, at="")
+        bars.stop_task(task)
+
+
+def _lines(console: Console) -> Progress:
+    last_step, last_time = "", 0.0
+
+    def show(step: str, at: str, fraction: float) -> None:
+        nonlocal last_step, last_time
+        now = time.monotonic()
+        if step != last_step or now - last_time > PLAIN_PERIOD:
+            line = f"{step} {fraction:4.0%} {at}" if fraction or at else step
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+            last_step, last_time = step, now
+
+    return show
+
+
+def note(text: str) -> None:
+    """Print a line on stderr that stays, above the bars where there are some."""
+    print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+
+def show(table: Table | None) -> None:
+    """Print a table on stdout, where there is one."""
+    if table is None:
+        return
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=PLAIN_WIDTH)
+    console.print(table)
+
+
+def show_rows(rows: "Sequence[Row]", most: int = 5) -> None:
+    """Print how many runs of a collection ended well, and on stderr why some did not."""
+    bad = [row for row in rows if row.status != "ok"]
+    Console().print(
+        f"{len(rows) - len(bad)} of {len(rows)} runs, {sum(row.bytes for row in rows) / 1e6:.1f} MB", highlight=False
+    )
+    errors = Console(stderr=True)
+    for row in bad[:most]:
+        errors.print(f"run {row.id} {row.status}: {row.reason}", markup=False, highlight=False, soft_wrap=True)
+    if len(bad) > most:
+        errors.print(f"and {len(bad) - most} more; index.csv has them all", highlight=False)
+
+
+def ladder(results: Path) -> Table:
+    """Return the table of a folder's evaluation: against the truth where score.json has it, else against mocap."""
+    path = results / "score.json"
+    rows = _rows(path if path.is_file() else results / "evaluation.json", "rows")
+    against = ", ".join(sorted({row["against"] for row in rows}))
+    return _errors(f"Held-out error of the hand, against {against}", rows)
+
+
+def confirmation(results: Path) -> Table | None:
+    """Return the table of another session's errors, or None where no other session was recorded."""
+    rows = _rows(results / "evaluation.json", "confirmation")
+    return _errors("Another session, marker bodies registered anew, against mocap", rows) if rows else None
+
+
+def points(results: Path) -> Table | None:
+    """Return the table of single markers with the band promised for any session, or None where there are none."""
+    rows = json.loads((results / "evaluation.json").read_text(encoding="utf-8")).get("points", [])
+    table = _table("marker", "row", "trial", "RMSE\nnorm [mm]", "largest\n[mm]", "95 % band\n[mm]", "inside\n[%]")
+    table.title, table.title_justify = "Markers of the hand, with the band for any session", "left"
+    for column in table.columns[3:]:
+        column.justify = "right"
+    for row in rows:
+        figures = (f"{row[key]:.2f}" for key in ("rmse_norm_mm", "max_norm_mm", "band_95_mm"))
+        table.add_row(row["marker"], row["model"], row["trial"], *figures, f"{100.0 * row['inside']:.0f}")
+    return table if rows else None
+
+
+def _errors(title: str, rows: Sequence[dict[str, Any]]) -> Table:
+    columns = ("position RMSE\nper component [mm]", "position RMSE\nnorm [mm]", "orientation\nRMSE [deg]")
+    table = _table("row", "base", "encoder", "trials", *columns)
+    table.title, table.title_justify = title, "left"
+    for column in table.columns[4:]:
+        column.justify = "right"
+    for row in rows:
+        position = (f"{row[key]:.2f}" for key in ("position_rmse_component_mm", "position_rmse_norm_mm"))
+        names = (str(row[key]) for key in ("model", "base", "encoder", "trials"))
+        turned = row["orientation_rmse_deg"]
+        table.add_row(*names, *position, "-" if turned is None else f"{turned:.3f}")
+    return table
+
+
+def frames(results: Path) -> Table | None:
+    """Return the table of estimated frames beside their truth; None unless the estimate is about frames."""
+    main = json.loads((results / "estimate" / "estimate.json").read_text(encoding="utf-8"))["main"]
+    if main != "arm_tool":
+        return None
+    table = _table("frame", "unit", "estimate", "truth", "error", "sigma")
+    table.title, table.title_justify = "Frames, against truth", "left"
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for p in json.loads((results / "score.json").read_text(encoding="utf-8"))["parameters"]:
+        if p["name"].startswith("frame.") and p["estimate"] is not None:
+            values = (p["estimate"], p["truth"], p["estimate"] - p["truth"], p["sigma"])
+            table.add_row(p["name"], f"m{p['unit']}", *(f"{1e3 * value:.3f}" for value in values))
+    return table
+
+
+def remarks(results: Path) -> list[str]:
+    """Return what an evaluation says of its trials and rows, to know before its figures are used."""
+    evaluation = json.loads((results / "evaluation.json").read_text(encoding="utf-8"))
+    return [v["message"] for v in evaluation.get("verdicts", [])]
+
+
+def verdicts(found: Sequence[Any]) -> Table:
+    """Return the table of what each stage says of its own result."""
+    table = _table("stage", "verdict", "message")
+    for verdict in found:
+        table.add_row(*(escape(str(text)) for text in (verdict.stage, verdict.verdict, verdict.message)))
+    return table
+
+
+def records(found: Sequence[dict[str, str]]) -> Table:
+    """Return a table with a line for each record, its names as columns."""
+    table = _table(*found[0])
+    for record in found:
+        table.add_row(*(escape(text) for text in record.values()))
+    return table
+
+
+def _table(*columns: str) -> Table:
+    """Return an empty table without lines; a unit in brackets is no markup."""
+    table = Table(box=None, pad_edge=False)
+    for name in columns:
+        table.add_column(escape(name), overflow="fold")
+    return table
+
+
+def _rows(path: Path, key: str) -> list[dict[str, Any]]:
+    """Return the rows of dynamic and of static trials; what is of both together stands in the file."""
+    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8")).get(key, [])
+    return [row for row in rows if row["trials"] != "all"]

@@ -1,0 +1,43 @@
+"""The commands that make many runs: `dataset`."""
+
+from typing import Annotated
+
+import typer
+
+from scenarios.commands.options import FAILED, Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
+from scenarios.errors import ScenarioError
+
+
+def dataset(  # noqa: PLR0913  an option each
+    scenario: ScenarioName,
+    out: Out,
+    n: Annotated[int, typer.Option("-n", min=1, metavar="N", help="How many robots.")],
+    workers: Workers = 0,
+    scheduler: Scheduler = None,
+    blind: Annotated[bool, typer.Option("--blind", help="Leave truth, seeds and scenario out.")] = False,
+    seed: Seed = None,
+    overrides: Overrides = None,
+) -> None:
+    """Record N robots of a scenario; the same command goes on where it was stopped."""
+    from scenarios.commands import console
+    from scenarios.datasets import workers as engine
+    from scenarios.datasets.collection import Plan, collect
+    from scenarios.datasets.run_content import recordings, recordings_and_truth
+    from scenarios.steps import run
+
+    if workers and scheduler:
+        raise ScenarioError("--workers and --scheduler: name one of them")
+    plan = Plan(
+        run.load(scenario, overriding(overrides, seed)), n, out, recordings if blind else recordings_and_truth, blind
+    )
+    with console.progress() as progress:
+        rows = collect(
+            plan,
+            engine.Workers(workers, scheduler),
+            lambda at, share: progress("dataset", at, share),
+            announce=console.note,
+        )
+    console.show_rows(rows)
+    typer.echo(f"Index: {out / 'index.csv'}")
+    if all(row.status != "ok" for row in rows):
+        raise typer.Exit(FAILED)

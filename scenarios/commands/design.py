@@ -1,0 +1,48 @@
+"""The command `design`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from scenarios.commands.options import Overrides, ScenarioName, Seed, overriding
+from scenarios.errors import ScenarioError
+
+
+def design(  # noqa: PLR0913  an option each
+    scenario: ScenarioName,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The YAML file to write.")],
+    n: Annotated[int, typer.Option("-n", min=5, max=500, metavar="N", help="How many postures.")] = 30,
+    criterion: Annotated[
+        Literal["D", "E", "G"],
+        typer.Option(help="D: least volume; E: least worst direction; G: least worst-case error of the hand."),
+    ] = "G",
+    campaign: Annotated[
+        Path | None, typer.Option(metavar="YAML", help="Write the scenario that records them, too.")
+    ] = None,
+    seed: Seed = None,
+    overrides: Overrides = None,
+) -> None:
+    """Choose the postures that calibrate best, and the side each joint comes from."""
+    from scenarios.commands import console
+    from scenarios.steps import run
+    from scenarios.steps.design import design as designed
+
+    for path in (p for p in (out, campaign) if p is not None and p.is_dir()):
+        raise ScenarioError(f"{path}: is a folder; name a file")
+    with console.progress() as progress:
+        progress("design", "", 0.0)
+        found = designed(run.load(scenario, overriding(overrides, seed)), n, criterion, out, campaign)
+    plan, against = found.plan, found.comparison
+    typer.echo(
+        f"{n} postures, {plan.design.prospect.B.shape[2]} identifiable combinations; predicted error of the hand at "
+        f"worst {1e3 * against.designed:.2f} mm, {100.0 * against.gain:.0f} % below the median of "
+        f"{len(against.random)} random sets"
+    )
+    typer.echo(
+        f"Sides: the joints' play would move it by {1e3 * plan.sides.one_sided.max():.2f} mm if every joint always "
+        f"came from below, by {1e3 * plan.sides.bias.max():.2f} mm as told in the file"
+    )
+    if plan.tour.contact:
+        typer.echo(f"Not reached by a straight move clear of the robot: postures {list(plan.tour.contact)} (from 0)")
+    typer.echo(f"Postures: {out}" + (f"\nScenario: {campaign}" if campaign else ""))

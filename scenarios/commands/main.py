@@ -1,0 +1,215 @@
+"""The command `tiago-twin`.
+
+Exit code 0: done. 1: the simulation or the fit failed, or its result must not be used. 2: wrong input.
+"""
+
+import logging
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from scenarios.commands import dataset as command_dataset
+from scenarios.commands import design as command_design
+from scenarios.commands import import_export, quicklook, video
+from scenarios.commands import reality as command_reality
+from scenarios.commands import study as command_study
+from scenarios.commands.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
+from scenarios.errors import ScenarioError
+
+WRONG_INPUT = 2
+TERMINATED = 128 + signal.SIGTERM
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="A robot whose truth is known, measured, calibrated and judged.",
+)
+
+
+@app.callback()
+def options(verbose: Annotated[bool, typer.Option("--verbose", help="Say more on stderr.")] = False) -> None:
+    """Set up logging."""
+    level = logging.INFO if verbose else logging.WARNING
+    logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
+
+
+@app.command("list")
+def list_scenarios() -> None:
+    """List the scenarios."""
+    from scenarios.files import registry
+    from scenarios.steps import run as steps
+
+    for name in registry.names():
+        typer.echo(f"{name}  {steps.load(name).description}")
+
+
+@app.command()
+def run(
+    scenario: ScenarioName,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The run folder; runs/NAME unless given.")] = None,
+    seed: Seed = None,
+    quick: Quick = False,
+    overrides: Overrides = None,
+) -> None:
+    """Simulate, calibrate, evaluate and report."""
+    from scenarios.commands import console
+    from scenarios.steps import run as steps
+
+    loaded = steps.load(scenario, overriding(overrides, seed))
+    out = out or Path("runs") / loaded.name
+    with console.progress() as progress:
+        result = steps.run(loaded, out, quick=quick, progress=progress)
+    if (table := console.frames(out)) is not None:
+        console.show(console.verdicts([v for v in result.estimate.verdicts if v.stage in ("base_frame", "arm_tool")]))
+        console.show(table)
+    console.show(console.ladder(out))
+    for line in console.remarks(out):
+        typer.echo(line)
+    console.show(console.confirmation(out))
+    typer.echo(f"\nReport: {out / 'report.html'}")
+
+
+@app.command()
+def simulate(
+    scenario: ScenarioName,
+    out: Out,
+    seed: Seed = None,
+    quick: Quick = False,
+    overrides: Overrides = None,
+    also: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Record the postures of a record_next.yaml, too.")
+    ] = None,
+) -> None:
+    """Write dataset/ and truth/ of a scenario."""
+    from scenarios.commands import console
+    from scenarios.steps import run as steps
+
+    loaded = steps.load(scenario, overriding(overrides, seed))
+    if also is not None:
+        from scenarios.steps.design import recording_too
+
+        loaded = recording_too(loaded, also)
+    with console.progress() as progress:
+        steps.simulate(loaded.quick() if quick else loaded, out, progress)
+    typer.echo(f"Dataset: {out / 'dataset'}\nTruth: {out / 'truth'}")
+
+
+@app.command()
+def calibrate(
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder, the twin's or a real one.")],
+    out: Out,
+    stages: Annotated[str | None, typer.Option(metavar="A,B,...", help="Only these stages, in this order.")] = None,
+    terms: Annotated[
+        str | None, typer.Option(metavar="printed|tensor|total", help="Terms of the joint models; total by default.")
+    ] = None,
+    suspension: Annotated[
+        str | None, typer.Option(metavar="diagonal|full", help="Each wheel's springs; diagonal by default.")
+    ] = None,
+) -> None:
+    """Write an estimate from a dataset folder alone."""
+    from scenarios.commands import console
+    from scenarios.steps import run as steps
+
+    chosen = None if stages is None else [stage.strip() for stage in stages.split(",")]
+    with console.progress() as progress:
+        options = steps.options(terms=terms, suspension=suspension)
+        estimate = steps.calibrate(dataset, out, chosen, progress, options)
+    console.show(console.verdicts(estimate.verdicts))
+    typer.echo(f"\nEstimate: {out}")
+    if not estimate.calibrated:
+        typer.echo("The estimate must not be used; the refused verdicts say why.", err=True)
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+def evaluate(
+    estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE", help="An estimate folder or file.")],
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder.")],
+    out: Out,
+    truth: Annotated[Path | None, typer.Option(metavar="TRUTH", help="A truth folder: adds score.json.")] = None,
+) -> None:
+    """Write the held-out error of an estimate."""
+    from scenarios.commands import console
+    from scenarios.steps import run as steps
+
+    with console.progress() as progress:
+        steps.evaluate(estimate, dataset, out, truth, progress)
+    console.show(console.ladder(out))
+    console.show(console.points(out))
+    for line in console.remarks(out):
+        typer.echo(line)
+    console.show(console.confirmation(out))
+
+
+@app.command()
+def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
+    """Write report.html from what a run folder holds."""
+    from scenarios.commands import console
+    from scenarios.steps import run as steps
+
+    with console.progress() as progress:
+        page = steps.report(run_folder, progress)
+    typer.echo(f"Report: {page}")
+
+
+import_ = app.command("import")(import_export.import_)
+export = app.command()(import_export.export)
+dataset = app.command()(command_dataset.dataset)
+design = app.command()(command_design.design)
+study = app.command()(command_study.study)
+look = app.command()(quicklook.look)
+picture = app.command()(video.picture)
+reality = app.command()(command_reality.reality)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command and exit with its code; what a user can mend or must know is told without a traceback."""
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        app(args=arguments, prog_name="tiago-twin")
+    except SystemExit:
+        raise
+    except ScenarioError as error:
+        _fail(error, WRONG_INPUT)
+    except OSError as error:
+        _fail(error, FAILED)
+    except _raised("CalibrationError", "TwinError") as error:
+        _fail(error, WRONG_INPUT if isinstance(error, _raised("InputError")) else FAILED)
+    except (AttributeError, ImportError, RuntimeError) as error:
+        if not _of_importing_mujoco(error):
+            raise
+        setting = os.environ.get("MUJOCO_GL", "")
+        _fail(f"MuJoCo cannot be imported ({error}) with MUJOCO_GL={setting!r}; unset it, or set it to off", FAILED)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _raised(*names: str) -> tuple[type[Exception], ...]:
+    """Errors of the engines by their names, of those that are imported: the others raised nothing and import slowly."""
+    modules = [sys.modules[name] for name in ("calibration.errors", "twin.errors") if name in sys.modules]
+    return tuple(getattr(module, name) for module in modules for name in names if hasattr(module, name))
+
+
+def _of_importing_mujoco(error: Exception) -> bool:
+    """Whether MuJoCo was being imported: it looks for a graphics driver then, and lets pass what that raises."""
+    names = (str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__))
+    return "mujoco" not in sys.modules and any(name.partition(".")[0] == "mujoco" for name in names)
+
+
+def _fail(error: Exception | str, code: int) -> None:
+    typer.echo(str(error), err=True)
+    sys.exit(code)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    """Leave through the same clean-up as on Ctrl-C."""
+    sys.exit(TERMINATED)

@@ -1,0 +1,23 @@
+"""The command `tiago-twin look`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.commands.options import Out
+
+
+def look(
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder, the twin's or a real one.")],
+    out: Out,
+    trial: Annotated[list[str] | None, typer.Option(metavar="ID", help="Only this trial; repeatable.")] = None,
+) -> None:
+    """Draw what was recorded: markers and gaps, wrench and centre of pressure, encoder differences."""
+    from scenarios.quicklook.page import look as draw
+
+    for one in draw(dataset, out, trial or ()):
+        typer.echo(f"{one.entry.id}: {one.entry.role}, {one.entry.kind}")
+        for line in one.said:
+            typer.echo(f"  {line}")
+    typer.echo(f"Pictures: {out}")

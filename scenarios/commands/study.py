@@ -1,0 +1,87 @@
+"""The command `study`."""
+
+from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from scenarios.commands.options import FAILED, Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
+from scenarios.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from scenarios.steps.run import Progress
+
+
+def study(  # noqa: PLR0913  an option each
+    kind: Annotated[Literal["coverage", "power"], typer.Argument(metavar="{coverage,power}", help="What to find out.")],
+    scenario: ScenarioName,
+    out: Out,
+    n: Annotated[int, typer.Option("-n", min=2, metavar="N", help="How many robots, for each value.")],
+    vary: Annotated[
+        str | None, typer.Option(metavar="PATH=V1,V2,...", help="power: a value of the scenario and what it is set to.")
+    ] = None,
+    matched: Annotated[
+        bool, typer.Option("--matched", help="Robots that are what the geometric model says, without physics.")
+    ] = False,
+    workers: Workers = 0,
+    scheduler: Scheduler = None,
+    seed: Seed = None,
+    overrides: Overrides = None,
+) -> None:
+    """Calibrate many robots and judge the method: its intervals, or how often it shows a gain."""
+    from scenarios.commands import console
+    from scenarios.datasets import workers as engine
+    from scenarios.datasets.collection import Plan, collect
+    from scenarios.steps import run
+    from scenarios.studies import statistics as study
+    from scenarios.studies.full_run import judged
+    from scenarios.studies.matched_run import matched as without_physics
+
+    if workers and scheduler:
+        raise ScenarioError("--workers and --scheduler: name one of them")
+    path, values = _varied(kind, vary)
+    produce = without_physics if matched else judged
+    levels, found = [], []
+    with console.progress() as progress:
+        for k, value in enumerate(values):
+            changed = [f"{path}={value}"] if path else []
+            loaded = run.load(scenario, [*overriding(overrides, seed), *changed])
+            folder = out / f"level_{k}" if path else out
+            at = f"{path}={value} " if path else ""
+            who = engine.Workers(workers, scheduler)
+            rows = collect(Plan(loaded, n, folder, produce), who, partial(_tell, progress, at), announce=console.note)
+            levels.append(study.level(value, rows))
+            found = list(study.parameters(folder, rows))
+    study.save(out / "study.json", levels, found if kind == "coverage" else [])
+    console.show(console.records([_flat(asdict(x)) for x in levels]))
+    if kind == "coverage":
+        console.show(console.records([_flat(asdict(p)) for p in sorted(found, key=lambda p: p.coverage_95)[:10]]))
+    typer.echo(f"Study: {out / 'study.json'}")
+    if all(x.calibrated.value == 0.0 for x in levels):
+        raise typer.Exit(FAILED)
+
+
+def _tell(progress: "Progress", value: str, at: str, share: float) -> None:
+    progress("study", value + at, share)
+
+
+def _varied(kind: str, vary: str | None) -> tuple[str, list[str]]:
+    """Path and values of --vary; one level without a value where there is none."""
+    if vary is None:
+        return "", [""]
+    path, sign, values = vary.partition("=")
+    if kind != "power" or not sign or not all(values.split(",")):
+        raise ScenarioError(f"--vary {vary}: belongs to power, as path.to.field=value,value,...")
+    return path, values.split(",")
+
+
+def _flat(record: dict[str, object]) -> dict[str, str]:
+    """Words of a record's values; an interval as value [low, high]."""
+    return {name: _word(value) for name, value in record.items() if value != ""}
+
+
+def _word(value: object) -> str:
+    if isinstance(value, dict):
+        return f"{value['value']:.3g} [{value['low']:.3g}, {value['high']:.3g}]"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

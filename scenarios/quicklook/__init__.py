@@ -1,0 +1,1 @@
+"""What was recorded, at a glance."""

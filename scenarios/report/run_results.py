@@ -1,0 +1,115 @@
+"""What a run folder holds, read for its report: every file but evaluation.json may be missing."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+import calibration
+from calibration.recording.schema import Description
+from scenarios.errors import ScenarioError
+from scenarios.report.result_files import Derived, Evaluation, ScenarioNote, Score, Truth
+from scenarios.report.sections.recordings import Recorded, recorded
+from scenarios.report.traces import Trace, read_traces
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Results:
+    """All that a report is made of.
+
+    Attributes:
+        evaluation: Errors against the motion capture.
+        traces: Errors of each row in each trial, in the order of the file.
+        score: Errors against the truth, where it is known.
+        estimate: What the calibration found.
+        stiffness: The true K of the base on its wheels, where it is known; NaN where nothing gives.
+        damping: The true C.
+        scenario: Name, seed and versions.
+        dataset: The recordings.
+        recorded: The trials, in the order of dataset.json.
+        sha256: Of dataset.json.
+        picture: PNG of the robot.
+    """
+
+    evaluation: Evaluation
+    traces: tuple[Trace, ...]
+    score: Score | None
+    estimate: calibration.Estimate | None
+    stiffness: np.ndarray | None
+    damping: np.ndarray | None
+    scenario: ScenarioNote
+    dataset: calibration.Dataset | None
+    recorded: tuple[Recorded, ...]
+    sha256: str | None
+    picture: bytes | None
+
+    @property
+    def description(self) -> Description | None:
+        """The whole of dataset.json."""
+        return self.dataset.description if self.dataset else None
+
+
+def read(run: Path) -> Results:
+    """Read a run folder.
+
+    Raises:
+        ScenarioError: There is no evaluation, or a file cannot be read.
+        InputError: The dataset or the estimate cannot be read.
+    """
+    evaluation = run / "evaluation.json"
+    if not evaluation.is_file():
+        raise ScenarioError(f"{run}: holds no evaluation.json; make it with tiago-twin evaluate, see its --help")
+    estimate, dataset, picture = run / "estimate", run / "dataset", run / "figures" / "twin.png"
+    loaded = calibration.load(dataset) if (dataset / "dataset.json").is_file() else None
+    trials = loaded.description.trials if loaded else ()
+    truth = run / "truth" / "truth.json"
+    derived = _json(truth, Truth).derived if truth.is_file() else Derived()
+    return Results(
+        evaluation=_json(evaluation, Evaluation),
+        traces=read_traces(run / "evaluation.nc"),
+        score=_json(run / "score.json", Score) if (run / "score.json").is_file() else None,
+        estimate=calibration.load_estimate(estimate) if (estimate / "estimate.json").is_file() else None,
+        scenario=_scenario(run / "scenario.yaml"),
+        stiffness=_matrix(derived.K),
+        damping=_matrix(derived.C),
+        dataset=loaded,
+        recorded=tuple(recorded(dataset / t.file, t) for t in trials),
+        sha256=hashlib.sha256((dataset / "dataset.json").read_bytes()).hexdigest() if loaded else None,
+        picture=picture.read_bytes() if picture.is_file() else None,
+    )
+
+
+def _matrix(rows: tuple[tuple[float | None, ...], ...] | None) -> np.ndarray | None:
+    return None if rows is None else np.array(rows, dtype=float)
+
+
+def _json(path: Path, model: type[M]) -> M:
+    try:
+        return model.model_validate(json.loads(path.read_text(encoding="utf-8")))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: broken JSON: {error}; make it again with tiago-twin evaluate") from error
+    except ValidationError as error:
+        raise ScenarioError(_findings(path, error)) from error
+
+
+def _scenario(path: Path) -> ScenarioNote:
+    if not path.is_file():
+        return ScenarioNote()
+    try:
+        return ScenarioNote.model_validate(YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")))
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: broken YAML: {error}") from error
+    except ValidationError as error:
+        raise ScenarioError(_findings(path, error)) from error
+
+
+def _findings(path: Path, error: ValidationError) -> str:
+    return "\n".join(f"{path}: {'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors())

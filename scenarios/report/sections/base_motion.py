@@ -1,0 +1,201 @@
+"""The base's motion in one held-out trial: measured by its markers, predicted by the suspension.
+
+x = (t, theta)  displacement of the base frame since the first second [mm, mrad], axes of the base at rest
+R2_a = 1 - sum (x - x_hat)_a^2 / sum x_a^2         zero is a base that stays; the first second does not count
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from calibration.errors import NotEnoughData
+from calibration.mocap.cluster_pose import poses_of
+from calibration.numerics.lie import from_vector
+from calibration.numerics.signals import CUTOFF, even, low_passed
+from calibration.prediction.base_pose import base_poses
+from calibration.prediction.predictor import REFERENCE, Predictor, predictor
+from calibration.recording.schema import TrialEntry, base_body
+from calibration.recording.trial import Trial
+from calibration.stages.suspension.base_response import laboratory
+from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.rest_frame import rest_of
+from scenarios.plots import ESTIMATE, OTHER, Line, drawing, figure, measured_beside
+from scenarios.report.formatting import fixed
+from scenarios.report.run_results import Results
+
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+UNITS = ("mm", "mm", "mm", "mrad", "mrad", "mrad")
+_UNIT = 1e3  # mm in a metre, mrad in a radian
+_LINES = {"plate": (ESTIMATE, 1.7), "dynamics": (OTHER, 0.7)}
+_HEIGHT = 5.2  # [inch] of the figure
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """The base as one source of the wrench predicts it.
+
+    Attributes:
+        source: `plate` or `dynamics`.
+        x: (n, 6) [mm, mrad].
+        r2: (6,) over all that counts.
+        r2_middle: (6,) over the middle half of the trial, away from the jolts of start and stop.
+        moves: (6,) axes that are moved.
+    """
+
+    source: str
+    x: np.ndarray
+    r2: np.ndarray
+    r2_middle: np.ndarray
+    moves: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sway:
+    """The base in one trial.
+
+    Attributes:
+        trial: Its name.
+        t: (n,) [s from the trial's start].
+        measured: (n, 6) [mm, mrad], NaN where not seen.
+        predicted: By source of the wrench.
+    """
+
+    trial: str
+    t: np.ndarray
+    measured: np.ndarray
+    predicted: tuple[Predicted, ...]
+
+    @property
+    def scored(self) -> np.ndarray:
+        """(n,) what counts."""
+        return np.asarray((self.t > REFERENCE) & np.isfinite(self.measured).all(axis=1))
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(n,) the middle half of the trial."""
+        return np.asarray(self.scored & (np.abs(self.t / self.t[-1] - 0.5) < 0.25))
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Peak to peak of the measured motion (6,) [mm, mrad]."""
+        return np.ptp(self.measured[self.scored], axis=0)
+
+    @property
+    def shifted(self) -> np.ndarray:
+        """Where the base stands in the last second (6,) [mm, mrad]; it began at zero."""
+        return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - REFERENCE], axis=0))
+
+    @property
+    def noise(self) -> np.ndarray:
+        """Rms (6,) [mm, mrad] of the markers' noise, by the first second at rest."""
+        return np.asarray(np.nanstd(self.measured[self.t <= REFERENCE], axis=0))
+
+    def left(self, predicted: Predicted) -> np.ndarray:
+        """Rms (6,) [mm, mrad] that a prediction leaves."""
+        return np.sqrt(((self.measured - predicted.x)[self.scored] ** 2).mean(axis=0))
+
+
+@dataclass(frozen=True)
+class AxisSway:
+    """One axis of one trial.
+
+    Attributes:
+        axis: Its name.
+        unit: Of what follows.
+        spread: Peak to peak of what was measured.
+        shifted: Where it stands in the end, measured.
+        noise: Rms of the markers' noise.
+        found: By source of the wrench: R2 and that of the middle half, None where the axis is left still, and the rms
+            that is left.
+    """
+
+    axis: str
+    unit: str
+    spread: float
+    shifted: float
+    noise: float
+    found: tuple[tuple[float | None, float | None, float], ...]
+
+
+def sway(results: Results) -> tuple[Sway | None, str]:
+    """The first held-out moving trial; or none, and why."""
+    estimate, dataset = results.estimate, results.dataset
+    if dataset is None:
+        return None, "the dataset is not in the run folder"
+    if estimate is None or not estimate.calibrated or estimate.suspension is None:
+        return None, "no suspension was identified"
+    entry = next((e for e in dataset.entries("validation") if e.kind != "static"), None)
+    if entry is None:
+        return None, "no held-out trial moves"
+    try:
+        return _of_trial(predictor(estimate, dataset), estimate.suspension, entry, dataset.read(entry)), ""
+    except NotEnoughData as error:
+        return None, str(error)
+
+
+def _of_trial(prepared: Predictor, suspension: Suspension, entry: TrialEntry, trial: Trial) -> Sway:
+    description, base = prepared.description.loaded(entry), from_vector(prepared.models["model_1"].base)
+    lab = laboratory(prepared.urdf, description, prepared.robot, prepared.plate, base)
+    rest = rest_of(description, trial, base)
+    smooth = low_passed(even(trial.t_mocap, rest.displacement(poses_of(base_body(description), trial).T)), CUTOFF)
+    measured = np.where(smooth.valid[:, None], _UNIT * smooth.x, np.nan)
+    alone = Sway(entry.id, smooth.t - trial.t_mocap[0], measured, ())
+    predicted = []
+    for source, _ in suspension.held_out:
+        if source == "dynamics" or (prepared.plate is not None and len(trial.t_plate)):
+            at_mocap = _UNIT * rest.displacement(base_poses(suspension, lab, trial, source))
+            x = np.stack([np.interp(smooth.t, trial.t_mocap, column) for column in at_mocap.T], axis=1)
+            whole, middle = (_r2(measured, x, rows) for rows in (alone.scored, alone.middle))
+            predicted.append(Predicted(source, x, whole, middle, suspension.moves(source)))
+    if not predicted:
+        raise NotEnoughData(f"trial {entry.id} has no wrench of a source the suspension was tried with")
+    return replace(alone, predicted=tuple(predicted))
+
+
+def lines(found: Sway) -> tuple[AxisSway, ...]:
+    """The axes in order."""
+    spread, noise, left = found.spread, found.noise, {p.source: found.left(p) for p in found.predicted}
+    return tuple(
+        AxisSway(
+            AXES[k],
+            UNITS[k],
+            float(spread[k]),
+            float(found.shifted[k]),
+            float(noise[k]),
+            tuple((*_moved(p, k), float(left[p.source][k])) for p in found.predicted),
+        )
+        for k in range(6)
+    )
+
+
+def _moved(p: Predicted, k: int) -> tuple[float | None, float | None]:
+    return (float(p.r2[k]), float(p.r2_middle[k])) if p.moves[k] else (None, None)
+
+
+def _r2(measured: np.ndarray, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    error, motion = (((a)[rows] ** 2).sum(axis=0) for a in (measured - x, measured))
+    return np.asarray(1.0 - error / np.maximum(motion, np.finfo(float).tiny))
+
+
+def drawn(found: Sway) -> Figure:
+    """Measured and predicted motion, translation on the left, rotation on the right."""
+    with drawing():
+        page = figure(10.0, _HEIGHT)
+        axes = page.subplots(3, 2, sharex=True)
+        page.subplots_adjust(0.06, 0.45 / _HEIGHT, 0.99, 1.0 - 0.45 / _HEIGHT, hspace=0.34)
+        for k, (axis, unit) in enumerate(zip(AXES, UNITS, strict=True)):
+            ax = axes[k % 3, k // 3]
+            lines = [Line(f"predicted from {p.source}", found.t, p.x[:, k], *_LINES[p.source]) for p in found.predicted]
+            measured_beside(Line("measured", found.t, found.measured[:, k], "black"), lines, f"{axis} [{unit}]", ax)
+            ax.set_title("R2 " + ", ".join(f"{p.source} {_worth(p, k)}" for p in found.predicted), fontweight="normal")
+        for ax in axes[2]:
+            ax.set_xlabel("time since the start of the trial [s]")
+        page.align_ylabels(axes)
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        page.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.05, 1.0), ncols=len(labels))
+    return page
+
+
+def _worth(p: Predicted, k: int) -> str:
+    return fixed(float(max(p.r2[k], -9.99)), 2) if p.moves[k] else "left still"

@@ -1,0 +1,50 @@
+"""Rows of the ladder trial by trial, where trials differ by what the hand carries or by a push."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scenarios.report.ladder import Step
+from scenarios.report.result_files import TrialErrors
+from scenarios.report.run_results import Results
+
+_MODELS = ("nominal", "registration", "model_1", "model_2", "model_3", "full")
+PUSH = "push"
+
+
+@dataclass(frozen=True)
+class LoadedTrial:
+    """A trial and what its hand carries [kg], None where that is not declared; whether it is pushed."""
+
+    trial: str
+    payload: float | None
+    pushed: bool
+
+
+@dataclass(frozen=True)
+class LoadRow:
+    """A row of the ladder over those trials, None where it was not scored."""
+
+    label: str
+    errors: tuple[TrialErrors | None, ...]
+
+
+def loaded_trials(results: Results) -> tuple[LoadedTrial, ...]:
+    """Held-out moving trials; none unless they differ in payload or push."""
+    description = results.description
+    if description is None:
+        return ()
+    declared = description.payload.mass if description.payload else None
+    found = tuple(
+        LoadedTrial(e.id, declared if e.payload is None else e.payload, PUSH in e.motion)
+        for e in description.trials
+        if e.role == "validation" and e.kind != "static"
+    )
+    return found if len({(t.payload, t.pushed) for t in found}) > 1 else ()
+
+
+def load_rows(results: Results, steps: Sequence[Step], trials: Sequence[LoadedTrial]) -> tuple[LoadRow, ...]:
+    """Predictive rows of the ladder, in its order."""
+    errors = {(e.model, e.base, e.encoder, e.trial): e for e in results.evaluation.trials}
+    rows = [s for s in steps if s.encoder == "motor" and s.base != "measured" and s.model in _MODELS]
+    found = (LoadRow(s.label, tuple(errors.get((s.model, s.base, s.encoder, t.trial)) for t in trials)) for s in rows)
+    return tuple(row for row in found if any(row.errors))

@@ -1,0 +1,113 @@
+"""The step `design`: postures for the robot and the laboratory of a scenario, before anything is recorded.
+
+Only what the scenario declares to a laboratory is used: nominal robot, marker bodies, datasheet sigmas, tolerances.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from scenarios.errors import ScenarioError
+from scenarios.files import output_folder
+
+if TYPE_CHECKING:
+    from calibration.design.exchange import Criterion
+    from calibration.design.plan import Comparison, Plan, Sample
+    from scenarios.files.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Designed:
+    """A design that was written, and how it compares."""
+
+    plan: "Plan"
+    comparison: "Comparison"
+
+
+def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, campaign: Path | None = None) -> Designed:
+    """Choose n postures and write them to the file `out`, and to `campaign` the scenario that records them.
+
+    Raises:
+        NotEnoughData: The robot has hardly any posture clear of itself and in sight.
+        ScenarioError: `out` cannot be written.
+    """
+    import mjcf
+    from calibration.design.plan import compared, nominal_task, plan
+    from calibration.recording.experiment import to_text
+    from scenarios.files import yaml_file
+    from twin.campaign.dataset_description import declaration
+    from twin.random_streams import generator
+
+    description = declaration(scenario.twin, ())
+    rng = generator(scenario.seed, "design")
+    found = plan(nominal_task(mjcf.urdf(), description, rng, _work()), n, criterion, rng)
+    against = compared(found, rng)
+    worst, usual = 1e3 * against.designed, 1e3 * float(np.median(against.random))
+    why = (
+        f"{n} postures by criterion {criterion}: standard deviation of the predicted hand {worst:.2f} mm at worst, "
+        f"{usual:.2f} mm with as many random ones"
+    )
+    with output_folder.updating(out.parent, [out.name]) as new:
+        text = to_text(description.joint_names, [found.remedy("geometry", why)])
+        (new / out.name).write_text(text, encoding="utf-8", newline="\n")
+    if campaign is not None:
+        with output_folder.updating(campaign.parent, [campaign.name]) as new:
+            yaml_file.write(new / campaign.name, recording(scenario, found))
+    return Designed(found, against)
+
+
+def _work() -> "Sample":
+    """Draws postures as the twin's campaigns do: in front of the robot, the hand in sight."""
+    import mjcf
+    from twin.motions import postures
+
+    nominal = mjcf.model()
+
+    def draw(n: int, rng: np.random.Generator) -> np.ndarray:
+        return rng.permutation(postures.draw(nominal, n, rng))
+
+    return draw
+
+
+def recording_too(scenario: "Scenario", file: Path) -> "Scenario":
+    """The scenario with the postures of a file after its own calibration postures, each reached from its side.
+
+    Raises:
+        InputError: It is no file of postures and motions.
+        ScenarioError: It is of another robot, or asks for no posture.
+    """
+    import mjcf
+    from calibration.recording.experiment import read_remedies
+    from twin.motions.motion import RATE
+    from twin.motions.schedule import schedule
+    from twin.motions.swings import JOINTS
+
+    joints, remedies = read_remedies(file)
+    asked = [p for r in remedies for p in r.postures]
+    if joints != JOINTS:
+        raise ScenarioError(f"{file}: joints are {list(joints)}; the twin has {list(JOINTS)}")
+    if not asked:
+        raise ScenarioError(f"{file}: asks for no posture; motions are recorded by hand, see its `motions`")
+    campaign = scenario.twin.campaign
+    own = schedule(replace(campaign, only=("postures",)), mjcf.model(), scenario.seed)[0]
+    rests = [tuple(map(float, own.command[round(stop * RATE)])) for _, stop in own.dwells]
+    sides = campaign.given_approaches or ((0,) * len(JOINTS),) * len(rests)
+    try:
+        return _with_postures(scenario, (*rests, *(p.q for p in asked)), (*sides, *(p.approach for p in asked)))
+    except ValidationError as error:
+        beyond = [f"{file}: {found['msg']} (got {found['input']})" for found in error.errors()]
+        raise ScenarioError("\n".join(beyond)) from error
+
+
+def recording(scenario: "Scenario", plan: "Plan") -> "Scenario":
+    """The scenario with the postures of a plan as its calibration postures, each reached from the side it says."""
+    return _with_postures(scenario, tuple(p.q for p in plan.postures), tuple(p.approach for p in plan.postures))
+
+
+def _with_postures(scenario: "Scenario", given: Any, sides: Any) -> "Scenario":
+    """The scenario with these calibration postures (n, 8), each reached from its side (n, 8)."""
+    changed = replace(scenario.twin.campaign, given_postures=given, given_approaches=sides)
+    return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)})

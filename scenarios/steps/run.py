@@ -1,0 +1,240 @@
+"""The steps of a campaign, each from a scenario or from files to files.
+
+    simulate: a scenario -> dataset/, truth/        calibrate: dataset/ -> estimate/
+    evaluate: estimate/, dataset/ -> evaluation.json, and score.json with truth/        report: all of it -> report.html
+
+Only dataset/ crosses from the simulation to the calibration. What a step writes is there whole or not at all.
+Importing this module is cheap: the engines are imported by the step that needs them.
+"""
+
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenarios.errors import ScenarioError
+from scenarios.files import output_folder as folder
+from scenarios.steps.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from calibration import Estimate, Evaluation
+    from calibration.options import Options
+    from scenarios.files.scenario import Scenario
+    from scenarios.score.score import Score
+
+Progress = Callable[[str, str, float], None]
+"""Called with the step, what it is at, and the fraction of the step that is done [-]."""
+
+PACKAGES = ("tiago-twin", "mujoco", "pin", "numpy", "scipy")
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A run that was written.
+
+    Attributes:
+        folder: The run folder.
+        scenario: What was run, as resolved.
+        estimate: What the calibration found.
+        evaluation: Its held-out error against the recordings.
+        score: Its error against the truth.
+    """
+
+    folder: Path
+    scenario: "Scenario"
+    estimate: "Estimate"
+    evaluation: "Evaluation"
+    score: "Score"
+
+
+def silent(step: str, at: str, fraction: float) -> None:
+    """Show no progress."""
+
+
+def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
+    """Read a scenario, one of ours by its name or any by its path; `path.to.field=value` overrides its values.
+
+    A run's scenario.yaml is a scenario: the versions noted in it are read and not used.
+
+    Raises:
+        ScenarioError: There is none, or something in it is wrong; all findings at once.
+    """
+    from scenarios.files import registry
+
+    path = registry.find(name_or_path)  # an unknown name is told before the engines are imported
+
+    from scenarios.files import extends, yaml_file
+    from scenarios.files.scenario import Scenario
+
+    path, extending = extends.resolve(path)
+    return yaml_file.read(path, Scenario, [*extending, *overrides], {"versions": dict[str, str]})
+
+
+def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress: Progress = silent) -> RunResult:
+    """Simulate, calibrate, evaluate and report into the run folder `out`.
+
+    Args:
+        scenario: What to run.
+        out: The run folder; an earlier run there is replaced once this one is complete.
+        quick: Run the scenario's short variant.
+        progress: Told how far each step is.
+
+    Raises:
+        ScenarioError: `out` must not be overwritten.
+        TwinError: The simulation failed.
+        CalibrationError: The data do not allow a result that may be used; nothing is written.
+    """
+    scenario = scenario.quick() if quick else scenario
+    with folder.replacing(out, folder.RUN) as new, one_blas_thread():
+        _simulate(scenario, new, progress)
+        estimate = _calibrate(new / "dataset", new / "estimate", None, scenario.calibration, progress)
+        evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
+        score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation, progress)
+        _report(new, progress)
+    return RunResult(Path(out), scenario, estimate, evaluation, score)
+
+
+def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent) -> None:
+    """Write dataset/, truth/ and scenario.yaml into the run folder `out`."""
+    with folder.replacing(out, folder.RUN) as new, one_blas_thread():
+        _simulate(scenario, new, progress)
+
+
+def calibrate(
+    dataset: Path | str,
+    out: Path | str,
+    stages: Sequence[str] | None = None,
+    progress: Progress = silent,
+    options: "Options | None" = None,
+) -> "Estimate":
+    """Write the estimate folder `out` from a dataset folder alone.
+
+    The estimate says itself whether it may be used; it is written either way.
+
+    Args:
+        dataset: A dataset folder, the twin's or a real one.
+        out: The estimate folder; an earlier one there is replaced.
+        stages: Only these; None runs every stage.
+        progress: Told how far it is.
+        options: What is chosen; None: the defaults.
+
+    Raises:
+        ScenarioError: `out` must not be overwritten, or a stage does not exist.
+        CalibrationError: The dataset cannot be read, or does not allow a result.
+    """
+    from calibration.pipeline import STAGES
+
+    unknown = [name for name in stages or () if name not in STAGES]
+    if unknown:
+        raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
+    with folder.replacing(out, folder.ESTIMATE) as new, one_blas_thread():
+        return _calibrate(Path(dataset), new, stages, options, progress)
+
+
+def options(**chosen: str | None) -> "Options":
+    """Options of a calibration from the command line's words; those that are None stay at their defaults.
+
+    Raises:
+        ScenarioError: A word is not one of those possible.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    from calibration.options import Options
+
+    given = {name: value for name, value in chosen.items() if value is not None}
+    try:
+        found: Options = TypeAdapter(Options).validate_python(given)
+    except ValidationError as error:
+        lines = [f"--{e['loc'][0]}: {e['msg']} (got {e['input']!r})" for e in error.errors()]
+        raise ScenarioError("\n".join(lines)) from error
+    return found
+
+
+def evaluate(
+    estimate: Path | str,
+    dataset: Path | str,
+    out: Path | str,
+    truth: Path | str | None = None,
+    progress: Progress = silent,
+) -> tuple["Evaluation", "Score | None"]:
+    """Write evaluation.json into the folder `out`, and score.json where a truth is given; the rest of `out` stays."""
+    with folder.updating(out, folder.EVALUATION) as new, one_blas_thread():
+        evaluation = _evaluate(Path(estimate), Path(dataset), new, progress)
+        score = None
+        if truth is not None:
+            score = _score(Path(estimate), Path(dataset), new, Path(truth), evaluation, progress)
+    return evaluation, score
+
+
+def report(run_folder: Path | str, progress: Progress = silent) -> Path:
+    """Write report.html of a run folder from what is saved there; return its path.
+
+    Raises:
+        ScenarioError: The folder holds no evaluation, or a file that cannot be read.
+    """
+    _report(Path(run_folder), progress)
+    return Path(run_folder) / "report.html"
+
+
+def versions() -> dict[str, str]:
+    """Versions of what decides the figures of a run."""
+    return {"python": platform.python_version(), **{package: version(package) for package in PACKAGES}}
+
+
+def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
+    import twin
+    from scenarios.files import yaml_file
+    from twin.rendering.robot_image import picture
+
+    progress("simulate", "", 0.0)
+    yaml_file.write(out / "scenario.yaml", scenario, beside={"versions": versions()})
+    twin.record(scenario.twin, scenario.seed, out, lambda at, fraction: progress("simulate", at, fraction))
+    (out / "figures").mkdir()
+    picture(scenario.twin, scenario.seed, out / "figures" / "twin.png")
+
+
+def _calibrate(
+    dataset: Path, out: Path, stages: Sequence[str] | None, options: "Options | None", progress: Progress
+) -> "Estimate":
+    import calibration
+
+    progress("calibrate", "", 0.0)
+    estimate = calibration.calibrate(
+        calibration.load(dataset), stages, lambda at, fraction: progress("calibrate", at, fraction), options
+    )
+    calibration.save_estimate(estimate, out)
+    return estimate
+
+
+def _evaluate(estimate: Path, dataset: Path, out: Path, progress: Progress) -> "Evaluation":
+    import calibration
+
+    progress("evaluate", "", 0.0)
+    evaluation = calibration.evaluate(
+        calibration.load_estimate(estimate),
+        calibration.load(dataset),
+        lambda at, fraction: progress("evaluate", at, fraction),
+    )
+    evaluation.save(out)
+    return evaluation
+
+
+def _score(
+    estimate: Path, dataset: Path, out: Path, truth: Path, evaluation: "Evaluation", progress: Progress
+) -> "Score":
+    import calibration
+    from scenarios.score.score import score
+
+    progress("score", "", 0.0)
+    scored = score(calibration.load_estimate(estimate), calibration.load(dataset), truth, evaluation)
+    scored.save(out)
+    return scored
+
+
+def _report(run_folder: Path, progress: Progress) -> None:
+    from scenarios import report as page
+
+    progress("report", "", 0.0)
+    page.write(run_folder)

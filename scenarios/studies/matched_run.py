@@ -1,0 +1,88 @@
+"""A run of a matched study: a robot that is what the geometric model says it is, without physics, judged by its truth.
+
+Frames, joint placements and zeros are drawn from the datasheet's tolerances, readings err by its play, marker bodies'
+means by the markers' noise; Pinocchio says where the hand is. What the fit promises must then hold: where it does not,
+the fit is wrong, and not the model.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from scipy import stats
+
+from calibration.errors import NotCalibrated
+from calibration.mocap.cluster_pose import body_poses
+from calibration.mocap.postures import Postures
+from calibration.numerics.lie import adjoint, exp6, inverse
+from calibration.recording.schema import Description, base_body, hand_body
+from calibration.robot.chain import chain_of
+from calibration.robot.hand import HandModel, nominal_hand
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.geometry.parameters import geometry_parameters, play_start
+from calibration.stages.geometry.registration import register
+from calibration.stages.geometry.stage import calibrate_geometry
+from scenarios.datasets.run_spec import Magnitude
+from scenarios.files.scenario import Scenario
+from scenarios.score.score import judge_parameters
+from twin.truth import Parameter
+
+_NEW = 30  # postures the fit has not seen
+_LEVEL = 0.025  # one-sided
+
+
+def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
+    """Write score.json of one robot; as many postures as the scenario's campaign has.
+
+    Raises:
+        NotCalibrated: There is no result that may be used.
+    """
+    import mjcf
+    from twin.campaign.dataset_description import declaration
+    from twin.motions import postures
+    from twin.random_streams import generator
+
+    rng, campaign = generator(scenario.seed, "matched"), scenario.twin.campaign
+    description, n = declaration(scenario.twin, ()), campaign.calibration_postures
+    chain = chain_of(mjcf.urdf(), description)
+    parameters = geometry_parameters(chain, description)
+    theta = parameters.nominal + parameters.tolerance * rng.normal(size=len(parameters))
+    true = nominal_hand(chain, parameters.nominal[:12]).with_theta(theta)
+    readings = rng.permutation(postures.draw(mjcf.model(), n + _NEW, rng))
+    moved = readings[:n] + play_start(chain, description) * rng.normal(size=(n, len(chain.joints)))
+    samples = campaign.dwell * scenario.twin.instruments.mocap_rate
+    seen = _measured(description, readings[:n], true.poses(moved), samples, rng)
+    model, verdicts = calibrate_geometry(chain, description, seen)
+    if refused := [v.message for v in verdicts if v.verdict == "refused"]:
+        raise NotCalibrated(refused)
+    judged = judge_parameters(model, map(Parameter, parameters.names, parameters.units, theta.tolist()))
+    judged.save(out)
+    rows = {"registration": register(chain, description, seen)[0], "model_2": model}
+    errors = {name: _errors(hand_of(m, chain, parameters.nominal[:12]), true, readings[n:]) for name, m in rows.items()}
+    gain = stats.ttest_rel(errors["registration"], errors["model_2"], alternative="greater").pvalue
+    return (
+        Magnitude("coverage_95", judged.coverage_95),
+        Magnitude("n_judged", float(judged.n_judged)),
+        Magnitude("nees_per_dof", judged.nees / judged.dof),
+        *(Magnitude(f"{name}_mm", 1e3 * float(np.sqrt((e**2).mean() / 3.0))) for name, e in errors.items()),
+        Magnitude("detected", float(gain < _LEVEL)),
+    )
+
+
+def _measured(
+    description: Description, readings: np.ndarray, T: np.ndarray, samples: float, rng: np.random.Generator
+) -> Postures:
+    """Means over `samples` of what the markers show of the hand at T (n, 4, 4) in the base body."""
+    base, hand = (_unit_covariance(np.array([m.xyz for m in b(description).markers])) for b in (base_body, hand_body))
+    Ad = adjoint(inverse(T))
+    S = (hand + Ad @ base @ np.swapaxes(Ad, 1, 2)) * description.sigmas.marker**2 / samples
+    noise = (np.linalg.cholesky(S) @ rng.normal(size=(len(T), 6, 1)))[..., 0]
+    return Postures(readings, T @ exp6(noise), S, np.zeros(len(T)))
+
+
+def _unit_covariance(xyz: np.ndarray) -> np.ndarray:
+    return body_poses(xyz, xyz[None]).covariance[0]
+
+
+def _errors(hand: HandModel, true: HandModel, q: np.ndarray) -> np.ndarray:
+    """Distance of the hand from where it is, (n,) [m]."""
+    return np.linalg.norm(hand.poses(q)[:, :3, 3] - true.poses(q)[:, :3, 3], axis=1)

@@ -1,0 +1,1 @@
+"""Fixtures and assertions for other people's test suites."""

@@ -1,0 +1,86 @@
+"""Nuisances of a design: their effect on the hand, the pull on a fit that does not ask for them, the rules' updates."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import mjcf
+from calibration.design.exchange import _RULES, _Steps
+from calibration.design.information import departing, departures_of, moments, prospect
+from calibration.numerics.lie import log6
+from calibration.robot.chain import chain_of
+from calibration.robot.hand import nominal_hand
+from calibration.stages.geometry.parameters import geometry_parameters, play_start
+from scenarios import load
+from twin.campaign.dataset_description import declaration
+
+DESCRIBED = declaration(load("humanoids2024").twin, ())
+CHAIN = chain_of(mjcf.urdf(), DESCRIBED)
+PARAMETERS = geometry_parameters(CHAIN, DESCRIBED)
+HAND = nominal_hand(CHAIN, PARAMETERS.nominal[:12])
+PLAY = play_start(CHAIN, DESCRIBED)
+Q = np.random.default_rng(0).uniform(*(np.clip(x, -2.0, 2.0) for x in CHAIN.limits()), size=(40, len(CHAIN.measured)))
+DEPARTURES = departures_of(CHAIN, Q)
+
+
+def test_moments_are_those_of_inverse_dynamics_across_the_axis():
+    model, found = CHAIN.nominal, moments(CHAIN, Q[:5])
+    data = model.createData()
+    for q, of_posture in zip(CHAIN.configurations(Q[:5]), found, strict=True):
+        pin.rnea(model, data, q, np.zeros(model.nv), np.zeros(model.nv))
+        for name, M in zip(CHAIN.joints, of_posture, strict=True):
+            i = model.getJointId(name)
+            axis = CHAIN.drawn.axis[CHAIN.joints.index(name)] * (not CHAIN.is_prismatic(name))
+            force = data.f[i].angular
+            R = model.jointPlacements[i].rotation.T @ data.liMi[i].rotation
+            np.testing.assert_allclose(M, R @ (force - axis * (axis @ force)), atol=1e-9)
+
+
+@pytest.mark.parametrize("z", range(8))
+def test_a_nuisance_moves_the_hand_as_the_robot_would(z):
+    q, step = Q[:6], 1e-3
+    G = DEPARTURES.effects(HAND, q, HAND.poses_and_derivatives(q, n_parameters=len(PARAMETERS)))[:, :, z]
+    M, T0 = moments(CHAIN, q), HAND.poses(q)
+    for k in range(len(q)):
+        xi = np.zeros((8, 6))
+        xi[z, 3:] = step * DEPARTURES.bending[z] * M[k, z]
+        T1 = replace(HAND, chain=CHAIN.with_placements(xi)).poses(q[k : k + 1])
+        moved = log6(np.linalg.inv(T0[k : k + 1]) @ T1)[0] / step
+        np.testing.assert_allclose(G[k], moved, atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def told():
+    noise = prospect(HAND, PARAMETERS, DESCRIBED, np.maximum(PLAY, 1e-4), Q[:30], Q[30:])
+    return departing(noise, HAND, DESCRIBED, np.maximum(PLAY, 1e-4), DEPARTURES, Q[30:])
+
+
+def test_the_pull_is_that_of_the_fit(told):
+    """Ridge regression of data that hold one nuisance and no noise leaves the hand off by P C m z - Z z."""
+    chosen, z = np.arange(25), np.random.default_rng(1).normal(size=8)
+    B, y = told.B[chosen].reshape(150, -1), told.H[chosen].reshape(150, -1) @ z
+    x = np.linalg.lstsq(np.vstack([B, np.eye(B.shape[1])]), np.append(y, np.zeros(B.shape[1])), rcond=None)[0]
+    C, m = told.after(chosen), told.pulled(chosen)
+    np.testing.assert_allclose(told.P @ x, told.P @ (C @ m @ z), atol=1e-10)
+    squared = told.hand(C, m) ** 2 - told.hand(C) ** 2
+    each = np.stack([told.P @ (C @ m[:, k]) - told.Z[:, :, k] for k in range(8)])
+    np.testing.assert_allclose(squared, (each**2).sum(axis=(0, 2)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("criterion", ["D", "G"])
+def test_each_candidate_is_worth_what_the_criterion_says_with_it(told, criterion):
+    rule, taken = _RULES[criterion], np.arange(12)
+    C, m = told.after(taken), told.pulled(taken)
+    BC = told.B @ C
+    K = BC @ np.swapaxes(told.B, 1, 2) + np.eye(6)
+    inverse = np.linalg.inv(np.linalg.cholesky(K))
+    values = rule.values(told, _Steps(C, m, K, inverse @ BC, inverse @ (told.H - BC @ m)))
+    sets = [np.append(taken, k) for k in range(30)]
+    direct = np.array([rule.value(told, told.after(some), told.pulled(some)) for some in sets])
+    if criterion == "D":
+        np.testing.assert_allclose(values - values[0], direct - direct[0], atol=1e-8)
+    else:
+        np.testing.assert_allclose((values / values[0]) ** (1.0 / 16.0), direct / direct[0], rtol=1e-8)
+    assert np.argsort(values[12:])[0] == np.argsort(direct[12:])[0]

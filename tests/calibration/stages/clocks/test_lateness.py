@@ -1,0 +1,59 @@
+"""What a link's lateness takes off the clock: the moments of the formula, by draws; what the fit lays to winding."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration.numerics.time_delay import Lag
+from calibration.recording.clock import Clock
+from calibration.robot.chain import chain_of
+from calibration.stages.clocks.clock_fit import TrialLag, allowance
+from calibration.stages.clocks.pose_refinement import provisional, refined_lags
+from tests.doubles import geared_robot, rigid_robot
+
+CLOCK = Clock("robot", 3.9, 40e-6, np.zeros((2, 2)), 20.0, 1e-4)
+
+
+def lag(wound: float, sigma: float = 1e-4, unseen: float = 0.0) -> TrialLag:
+    return TrialLag("swing", 10.0, Lag(3.9, sigma, 1.0), wound=wound, unseen=unseen)
+
+
+@pytest.mark.parametrize(("wound", "unseen"), [(0.0, 0.0), (4e-4, 0.0), (2e-4, 1e-4)])
+def test_mean_and_spread_are_those_of_the_formula(wound, unseen):
+    rng, n = np.random.default_rng(0), 400_000
+    late = 5e-5 * np.exp(0.6 * rng.normal(size=n)) + rng.uniform(0.0, 0.2, n) * wound
+    late += rng.normal(1.0, 1.0, n) * unseen
+    np.testing.assert_allclose(allowance("robot", [lag(wound, unseen=unseen)]), (late.mean(), late.std()), rtol=0.01)
+
+
+def test_trials_count_by_what_they_tell_of_the_clock_and_a_plate_is_not_geared():
+    both = [lag(4e-4, 1e-4), lag(0.0, 2e-4)]
+    np.testing.assert_allclose(allowance("robot", both), allowance("robot", [lag(3.2e-4)]))
+    assert allowance("plate", both) == (0.0, 3e-4)
+
+
+def test_play_that_is_early_widens_and_does_not_shift():
+    early, none = allowance("robot", [lag(-4e-4)]), allowance("robot", [lag(0.0)])
+    assert early[0] == none[0] and early[1] == allowance("robot", [lag(4e-4)])[1] > none[1]
+
+
+def test_friction_that_winds_the_gears_is_found_and_not_where_there_is_none():
+    truth, description, chain = (
+        rigid_robot.defects(0),
+        rigid_robot.described(),
+        chain_of(mjcf.urdf(), rigid_robot.described()),
+    )
+    found, unseen = [], 0.0
+    for friction in (1e-12, 2.0):
+        rng = np.random.default_rng(5)
+        drives = geared_robot.gears(rng)
+        drives = replace(drives, coulomb=friction * drives.coulomb, viscous=0.0 * drives.viscous)
+        trial = geared_robot.record(truth, drives, geared_robot.swing(rng, 20.0), 12.0, rng)
+        model = provisional(chain, description, [trial], CLOCK)
+        (told,) = refined_lags(model, description, [trial], CLOCK)
+        found.append(told.wound)
+        unseen = told.unseen
+    assert found[1] - found[0] > 1e-4 > abs(found[0])
+    assert 0.0 < unseen < 1e-4  # 0.1 mrad at 0.3 rad/s are 0.3 ms, most of which the fit tells from the lag

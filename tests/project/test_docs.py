@@ -1,0 +1,78 @@
+"""What the documents say can be done can be done."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from scenarios.commands.main import app
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+DOCUMENTS = ("README.md", "CHANGELOG.md", "DECISIONS.md", "CITATION.cff")
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """Code blocks of a language."""
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def targets() -> set[str]:
+    """Targets of the Makefile."""
+    return set(re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def commands() -> set[str]:
+    """Commands of tiago-twin."""
+    return {str(command.name or command.callback.__name__) for command in app.registered_commands if command.callback}
+
+
+def test_every_make_target_that_is_written_down_exists():
+    written = set(re.findall(r"(?:^|`)make ([a-z-]+)", README, re.MULTILINE))
+    assert {"demo", "test", "check", "slow"} <= written <= targets()
+
+
+def test_make_help_names_every_target():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert set(re.findall(r'@echo "make ([a-z-]+)', makefile)) == targets() - {"help"}
+
+
+def test_every_command_that_is_written_down_exists_and_the_other_way_round():
+    table = set(re.findall(r"^\| `([a-z]+)[ `]", README.partition("## The command")[2], re.MULTILINE))
+    assert table & commands() == commands()
+    used = {
+        line.split("tiago-twin ")[1].split()[0]
+        for line in "".join(blocks(README, "bash")).splitlines()
+        if "-twin " in line
+    }
+    assert used - {"--help"} <= commands()
+
+
+@pytest.mark.parametrize("block", blocks(README, "python"))
+def test_python_in_the_readme_compiles(block):
+    compile(block, "README.md", "exec")
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_links_within_the_project_lead_somewhere(name):
+    text = (ROOT / name).read_text(encoding="utf-8")
+    for link in re.findall(r"\]\(([^)#:]+)\)", text):
+        assert (ROOT / link).is_file(), link
+
+
+def test_requirements_are_exact_pins_without_a_host():
+    lines = (ROOT / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    assert [
+        line
+        for line in lines
+        if not re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.+!]+(; python_version < \"3\.\d+\")?", line)
+    ] == []
+
+
+def test_the_citation_names_this_version_and_the_three_sources():
+    citation = YAML(typ="safe", pure=True).load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    assert [reference["year"] for reference in citation["references"]] == [2024, 2022, 2023]

@@ -1,0 +1,109 @@
+"""The command line: what it runs and what it tells. The engines are replaced by small fakes."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from calibration.options import Options
+from scenarios.files.output_folder import RUN
+from tests.scenarios.commands.stand_ins import Twin, blas_threads, here
+
+
+def test_help_and_import_touch_no_engine():
+    heavy = {"mujoco", "pinocchio", "numpy", "scipy", "matplotlib", "pydantic", "ruamel", "jinja2"}
+    script = f"import sys, scenarios, scenarios.commands.main; print(*({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_the_installed_command_is_this_one():
+    done = subprocess.run([Path(sys.executable).parent / "tiago-twin", "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    for name in ("list", "run", "simulate", "calibrate", "evaluate", "report"):
+        assert f"  {name} " in done.stdout
+
+
+def test_list_names_the_scenarios_a_line_each(engines, tiago_twin):
+    assert tiago_twin("list") == (0, "small  A small example\n", "")
+
+
+def test_run_writes_the_folder_and_prints_ladder_and_report(engines, tiago_twin):
+    code, out, err = tiago_twin("run", "small")
+    assert code == 0, err
+    written = {path.name for path in Path("runs/small").iterdir()}
+    assert written == RUN.entries - {"evaluation.nc"}
+    assert "floor" in out and "4.57" in out and "against truth" in out
+    assert f"Report: {Path('runs/small/report.html')}" in out
+
+
+def test_only_the_dataset_reaches_the_calibration(engines, tiago_twin):
+    tiago_twin("run", "small")
+    dataset, stages = engines.calls["calibrate"]
+    assert (dataset.name, stages) == ("dataset", None)
+
+
+def test_engines_work_with_one_blas_thread_and_nobody_else_is_limited(engines, tiago_twin):
+    with threadpool_limits(2, "blas"):
+        tiago_twin("run", "small")
+        assert set(engines.calls["blas"]) == {1}
+        assert set(blas_threads()) == {2}
+
+
+def test_progress_is_told_on_stderr_without_a_terminal(engines, tiago_twin):
+    code, out, err = tiago_twin("run", "small")
+    assert [line.split()[0] for line in err.splitlines()] == ["simulate", "calibrate", "evaluate", "score", "report"]
+    assert "simulate" not in out
+
+
+def test_seed_quick_and_set_change_the_scenario(engines, tiago_twin):
+    tiago_twin("run", "small", "--seed", "8", "--quick", "--set", "twin.gap=1e-3", "--out", "x")
+    assert engines.calls["record"] == (Twin(gap=1e-3), 8)
+    assert "description: short" in Path("x/scenario.yaml").read_text()
+
+
+def test_the_scenario_of_a_run_makes_the_same_run(engines, tiago_twin):
+    assert tiago_twin("run", "small", "--seed", "8", "--set", "twin.gap=0.012345678901234567", "--out", "a")[0] == 0
+    assert "numpy:" in Path("a/scenario.yaml").read_text()
+    assert tiago_twin("run", "a/scenario.yaml", "--out", "b")[0] == 0
+    files = here()
+    assert {k: v for k, v in files.items() if k[0] == "b"} == {f"b{k[1:]}": v for k, v in files.items() if k[0] == "a"}
+
+
+def test_simulate_writes_dataset_and_truth(engines, tiago_twin):
+    assert tiago_twin("simulate", "small", "--out", "x")[0] == 0
+    assert {path.name for path in Path("x").iterdir()} == {"scenario.yaml", "dataset", "truth", "figures"}
+
+
+def test_the_calibration_is_told_what_the_scenario_or_the_command_line_chose(engines, tiago_twin):
+    tiago_twin("run", "small", "--out", "x")
+    assert engines.calls["options"] == (Options(terms="tensor"),)
+    tiago_twin("calibrate", "x/dataset", "--out", "x/estimate", "--terms", "printed", "--suspension", "full")
+    assert engines.calls["options"] == (Options("printed", "full"),)
+    tiago_twin("calibrate", "x/dataset", "--out", "x/estimate")
+    assert engines.calls["options"] == (Options(),)
+
+
+def test_calibrate_takes_stages_and_prints_verdicts(engines, tiago_twin):
+    tiago_twin("simulate", "small", "--out", "x")
+    code, out, _ = tiago_twin("calibrate", "x/dataset", "--out", "x/estimate", "--stages", "clocks, geometry")
+    assert (code, engines.calls["calibrate"][1]) == (0, ["clocks", "geometry"])
+    assert "clocks" in out and "0.1 ms" in out
+    assert Path("x/estimate/estimate.json").is_file() and Path("x/dataset").is_dir()
+
+
+def test_evaluate_adds_to_a_run_and_leaves_the_rest(engines, tiago_twin):
+    tiago_twin("run", "small", "--out", "x")
+    before = {path.name for path in Path("x").iterdir()}
+    code, out, _ = tiago_twin("evaluate", "x/estimate", "x/dataset", "--out", "x")
+    assert (code, "against mocap" in out) == (0, True)
+    assert {path.name for path in Path("x").iterdir()} == before - {"score.json"}
+    code, out, _ = tiago_twin("evaluate", "x/estimate", "x/dataset", "--truth", "x/truth", "--out", "x")
+    assert (code, "against truth" in out) == (0, True)
+
+
+def test_report_is_made_from_a_run_folder(engines, tiago_twin):
+    tiago_twin("run", "small", "--out", "x")
+    Path("x/report.html").unlink()
+    assert tiago_twin("report", "x")[:2] == (0, "Report: x/report.html\n")

@@ -1,0 +1,268 @@
+"""The report: one file that says what a run found, from saved results, whatever of them there is."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from calibration import Evaluation
+from calibration.errors import InputError
+from calibration.evaluation.ladder import ladder
+from calibration.verdict import Verdict
+from scenarios.commands import main
+from scenarios.errors import ScenarioError
+from scenarios.report import figures, write
+from scenarios.report.formatting import cell, count, decimals, error, fixed, readable, significant
+from scenarios.report.ladder import Step, headline_model
+from scenarios.report.ladder import ladder as ordered
+from scenarios.report.run_results import read
+from tests.doubles.html_page import Page
+from tests.doubles.run_folder import (
+    PIXEL,
+    SCENARIO,
+    traces,
+    write_dataset,
+    write_estimate,
+    write_evaluation,
+    write_score,
+)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A run folder with everything in it."""
+    run = tmp_path_factory.mktemp("run")
+    write_evaluation(run)
+    write_score(run)
+    write_dataset(run / "dataset")
+    write_estimate(
+        run / "estimate", Verdict("clocks", "ok", "fine"), Verdict("geometry", "warning", "arm_3 never moved")
+    )
+    (run / "scenario.yaml").write_text(SCENARIO)
+    (run / "figures").mkdir()
+    (run / "figures/twin.png").write_bytes(PIXEL)
+    write(run)
+    return run
+
+
+@pytest.fixture
+def run(whole, tmp_path):
+    return Path(shutil.copytree(whole, tmp_path / "run"))
+
+
+@pytest.fixture
+def plain(monkeypatch):
+    """Pages without figures are written faster."""
+    for name in ("boxes", "traces", "forest", "z_scores"):
+        monkeypatch.setattr(figures, name, lambda *_: None)
+
+
+def test_the_page_is_one_file_that_refers_to_nothing_else(whole):
+    page = Page(whole / "report.html")
+    outside = [link for link in page.links if not link.startswith(("#", "data:"))]
+    assert outside == ["https://doi.org/10.1109/Humanoids58906.2024.10769790"]
+    assert not {"script", "iframe", "link", "object"} & {tag for tag, _ in page.tags}
+    assert "@import" not in (whole / "report.html").read_text()
+    assert set(re.findall(r"url\(([^)]*)\)", (whole / "report.html").read_text())) <= {f"#{i}" for i in page.ids}
+    assert len(page.ids) == len(set(page.ids))
+    assert (whole / "report.html").stat().st_size < 2e6
+
+
+def test_the_same_results_give_the_same_bytes_wherever_they_are(whole, run):
+    first = {path.name: path.read_bytes() for path in (whole / "report.html", *(whole / "figures").iterdir())}
+    write(run)
+    write(run)
+    assert {path.name: path.read_bytes() for path in (run / "report.html", *(run / "figures").iterdir())} == first
+    assert str(run) not in (run / "report.html").read_text()
+
+
+def test_tables_and_figures_are_numbered_in_their_order(whole):
+    text = Page(whole / "report.html").text
+    for kind, n in (("Table", 7), ("Figure", 7)):
+        assert [int(k) for k in re.findall(rf"{kind} (\d+)\. ", text)] == list(range(1, n + 1))
+
+
+def test_the_page_can_be_read_without_seeing(whole):
+    page = Page(whole / "report.html")
+    assert dict(page.tags)["html"]["lang"] == "en"
+    assert all(found.get("alt") for tag, found in page.tags if tag == "img")
+    assert all(found.get("aria-label") for _, found in page.tags if found.get("role") in ("img", "region"))
+    assert all("scope" in found for tag, found in page.tags if tag == "th")
+
+
+def test_the_verdict_comes_first_with_the_figures_of_the_rows(whole):
+    text = Page(whole / "report.html").text
+    rows = {(r.model, r.base, r.trials): r for r in read(whole).evaluation.rows}
+    nominal, ours = (rows[model, "fixed", "dynamic"] for model in ("nominal", "model_2"))
+    verdict = text[text.index("Verdict") : text.index("What these figures are")]
+    for row in (nominal, ours, rows["registration", "fixed", "dynamic"], rows["model_2", "measured", "dynamic"]):
+        assert error(row.position_rmse_component_mm) in verdict
+        assert error(row.position_rmse_norm_mm) in verdict
+        assert error(row.orientation_rmse_deg) in verdict
+    assert "Warning, geometry: arm_3 never moved" in verdict
+    assert "synthetic twin" in text
+    assert "no bias is removed" in text
+    assert "A small <example>" in text, "text is escaped"
+
+
+def test_the_ladder_has_every_row_in_order_with_its_kind(whole):
+    steps = ordered(read(whole), "dynamic")
+    models = ["nominal", "nominal", "model_2", "model_2", "registration", "registration", "gauss", "gauss", "floor"]
+    assert [s.model for s in steps] == models
+    assert [s.base for s in steps][:4] == ["fixed", "measured", "fixed", "measured"]
+    assert [s.kind for s in steps][:2] == ["predictive", "oracle: base"]
+    assert Step("m", "measured", "link", "dynamic", None, None).kind == "oracle: base and encoder"
+    assert steps[-1].kind == "floor"
+    text = Page(whole / "report.html").text
+    for step in steps:
+        for row in filter(None, (step.mocap, step.truth)):
+            assert cell(row.position_p95_norm_mm) in text
+
+
+def test_parameters_stand_beside_their_truth_with_what_was_left_out(whole):
+    text = Page(whole / "report.html").text
+    assert re.search(r"\d+ of 31 intervals of 95 % hold the truth", text)
+    assert "−1 geometry.turn.rz" in text, "terms of a combination"
+    assert "Not estimated: 1 of link masses." in text
+    assert {p.name for p in (whole / "figures").iterdir()} == {
+        "errors.svg",
+        "joint.svg",
+        "parameters.svg",
+        "traces.svg",
+        "twin.png",
+        "wheels.svg",
+        "z_scores.svg",
+    }
+
+
+def test_the_page_says_what_was_recorded_and_how_to_make_it_again(whole):
+    text = Page(whole / "report.html").text
+    assert "xyz validation swing 2.0" in text
+    assert "0.437 kg on hand" in text
+    assert "robot 3.9000 1.00 12.0 1.0 0.50" in text, "the clock with its standard deviations"
+    assert "tiago-twin run scenario.yaml" in text
+    assert "mujoco 4.0.0" in text
+    assert re.search(r"sha256 [0-9a-f]{64}", text)
+
+
+@pytest.mark.parametrize(
+    ("missing", "gone"),
+    [
+        ("score.json", "against the truth"),
+        ("figures", "The twin, seed"),
+        ("estimate", "What each stage said"),
+        ("dataset", "What was recorded"),
+        ("scenario.yaml", "seed 7"),
+    ],
+)
+def test_what_is_missing_is_left_out(run, plain, missing, gone):
+    assert gone in Page(run / "report.html").text
+    shutil.rmtree(run / missing) if (run / missing).is_dir() else (run / missing).unlink()
+    write(run)
+    text = Page(run / "report.html").text
+    assert gone not in text
+    assert "Held-out error of the hand, dynamic trials" in text
+
+
+def test_without_samples_there_are_tables_alone(run):
+    (run / "evaluation.nc").unlink()
+    write(run)
+    text = Page(run / "report.html").text
+    assert "Distribution of the errors" not in text
+    assert "Held-out error of the hand, dynamic trials" in text
+    assert not (run / "figures/errors.svg").exists()
+
+
+def test_real_data_are_not_called_a_twin(run):
+    (run / "score.json").unlink()
+    write(run)
+    text = Page(run / "report.html").text
+    assert "All figures are of a synthetic twin" not in text
+    assert "No truth is known" in text
+    assert "Departures from nominal" in text
+    assert not (run / "figures/z_scores.svg").exists(), "a figure of an earlier report"
+
+
+def test_a_calibration_that_does_not_help_is_said_to_be_one(run, plain):
+    write_evaluation(run, models={"nominal": 5.0, "registration": 4.0, "model_2": 9.0})
+    (run / "score.json").unlink()
+    write(run)
+    text = Page(run / "report.html").text
+    assert "no better than fitting the marker frames alone" in text
+    assert "down from" not in text
+
+
+def test_intervals_that_are_too_narrow_are_told(run, plain):
+    score = json.loads((run / "score.json").read_text())
+    for parameter in score["parameters"][:20]:
+        parameter["estimate"] += 0.1
+    (run / "score.json").write_text(json.dumps(score))
+    write(run)
+    assert "Warning, uncertainty: the 95 % intervals are too narrow" in Page(run / "report.html").text
+
+
+def test_what_the_evaluation_says_of_its_trials_comes_first(run, plain):
+    content = json.loads((run / "evaluation.json").read_text())
+    content["verdicts"] = [{"stage": "evaluation", "verdict": "warning", "message": "base moved during xyz"}]
+    (run / "evaluation.json").write_text(json.dumps(content))
+    write(run)
+    assert "Warning, evaluation: base moved during xyz" in Page(run / "report.html").text
+
+
+def test_static_trials_alone_are_enough(run, plain):
+    found = [t for t in traces() if t.kind == "static"]
+    Evaluation(tuple(ladder(found, "mocap")), tuple(found)).save(run)
+    (run / "score.json").unlink()
+    write(run)
+    assert "On held-out static trials" in Page(run / "report.html").text
+
+
+def test_the_headline_is_the_main_model_where_it_was_evaluated(whole):
+    results = read(whole)
+    assert headline_model(results, ordered(results, "dynamic")) == "model_2"
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "said"),
+    [
+        ("evaluation.json", None, "holds no evaluation.json"),
+        ("evaluation.json", "{", "broken JSON"),
+        ("evaluation.json", '{"rows": [{"model": 3}]}', "rows.0.model"),
+        ("score.json", "{}", "rows: Field required"),
+        ("scenario.yaml", "a: [", "broken YAML"),
+        ("evaluation.nc", "not netCDF", "evaluation.nc"),
+    ],
+)
+def test_what_cannot_be_read_is_named(run, file, content, said):
+    before = (run / "report.html").read_bytes()
+    (run / file).unlink() if content is None else (run / file).write_text(content)
+    with pytest.raises((ScenarioError, InputError), match=re.escape(said)):
+        write(run)
+    assert (run / "report.html").read_bytes() == before
+
+
+def test_the_command_writes_the_report(run, plain):
+    (run / "report.html").unlink()
+    with pytest.raises(SystemExit) as left:
+        main.main(["report", str(run)])
+    assert left.value.code == 0
+    assert (run / "report.html").is_file()
+
+
+def test_numbers_have_the_digits_that_mean_something():
+    assert (significant(12.345), significant(0.001234), significant(1234567.0)) == ("12.3", "0.00123", "1.23e6")
+    assert (significant(9.999), significant(-0.5, 2), significant(0.0), significant(None)) == (
+        "10.0",
+        "−0.50",
+        "0",
+        "–",
+    )
+    assert (fixed(-1234.5, 1), fixed(float("nan"), 2), count(10398)) == ("−1\u202f234.5", "–", "10\u202f398")
+    assert (fixed(-1e-4, 2), fixed(-0.006, 2)) == ("0.00", "−0.01")
+    assert (error(23.012), error(3.0549), error(0.957), error(0.0061)) == ("23.0", "3.05", "0.96", "0.01")
+    assert (cell(3.0549), cell(0.0061), cell(0.0), cell(None)) == ("3.05", "0.006", "0.00", "–")
+    assert [decimals(s) for s in (0.0996, 0.17, 1.04, 26.0, 0.0, None)] == [2, 2, 1, 0, 3, 3]
+    assert readable("clock.robot.drift", "-") == (1e6, "ppm")
+    assert readable("gear.arm_1_joint.compliance", "rad/(N.m)") == (1.0, "rad/(N.m)")

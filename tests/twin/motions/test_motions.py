@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from twin.errors import Unreachable
+from twin.motions import motion as motions
+from twin.motions import postures
+from twin.motions.motion import RATE
+from twin.motions.schedule import schedule
+from twin.motions.swings import CALIBRATION_SWINGS, JOINTS
+from twin.simulation.rollout import simulate
+
+
+def test_path_time_ramps_cruises_and_stops():
+    t = np.linspace(-1.0, 11.0, 1201)
+    s = motions.path_time(t, 10.0, 0.5)
+    speed = np.gradient(s, t)
+    assert s[0] == 0.0 and s[-1] == pytest.approx(9.5)
+    assert np.all(np.diff(s) >= 0.0)
+    np.testing.assert_allclose(speed[(t > 0.6) & (t < 9.4)], 1.0, atol=1e-9)
+    np.testing.assert_allclose(speed[np.abs(t - 0.25) < 0.005], 0.5, atol=0.03)
+
+
+def test_every_trial_starts_and_ends_with_a_second_of_rest_inside_the_limits(config, nominal):
+    limits = np.array([nominal.joint(j).range for j in JOINTS])
+    for motion in schedule(config.campaign, nominal, 3):
+        rest = round(RATE)
+        assert np.ptp(motion.command[: rest + 1], axis=0).max() == 0.0, motion.id
+        assert np.all((motion.command >= limits[:, 0]) & (motion.command <= limits[:, 1])), motion.id
+        if motion.kind != "static":
+            assert np.ptp(motion.command[-rest:], axis=0).max() == 0.0, motion.id
+
+
+def test_dwells_are_where_the_command_stands_still(config, nominal):
+    motion = schedule(config.campaign, nominal, 3)[0]
+    t = np.arange(len(motion.command)) / RATE
+    assert len(motion.dwells) == config.campaign.calibration_postures == len(motion.approach)
+    for (start, stop), approach in zip(motion.dwells, motion.approach, strict=True):
+        inside = (t >= start - 1e-9) & (t <= stop + 1e-9)
+        assert np.ptp(motion.command[inside], axis=0).max() < 1e-12
+        arriving = motion.command[inside][0] - motion.command[np.flatnonzero(inside)[0] - 5]
+        np.testing.assert_array_equal(np.sign(np.round(arriving, 9)), approach)
+
+
+def test_no_validation_posture_is_a_calibration_posture(config, nominal):
+    trials = {m.id: m for m in schedule(config.campaign, nominal, 3)}
+    a, b = trials["postures"], trials["postures_validation"]
+    ends = [m.command[np.round(m.dwells[:, 1] * RATE).astype(int)] for m in (a, b)]
+    nearest = np.abs(ends[0][:, None] - ends[1][None]).max(axis=2).min()
+    assert nearest > 0.05
+
+
+def test_postures_that_do_not_exist_are_told(nominal, monkeypatch):
+    monkeypatch.setattr(postures, "_admissible", lambda *a: False)
+    with pytest.raises(Unreachable, match="found 0 of 3 postures"):
+        postures.draw(nominal, 3, np.random.default_rng(0))
+
+
+def test_a_soft_start_is_soft(config):
+    def first_step(ramp):
+        campaign = replace(config.campaign, ramp=ramp)
+        path = CALIBRATION_SWINGS["around_z"]
+        q = motions.swing("a", "calibration", "swing", path, 6.0, campaign).command
+        return np.abs(np.diff(q, 2, axis=0)).max() * RATE**2
+
+    assert first_step(1.5) < 0.2 * first_step(0.12)
+
+
+@pytest.mark.parametrize(("duration", "amplitude"), [(3.0, 0.15), (6.0, 0.3), (12.0, 0.6), (20.0, 0.6)])
+def test_a_short_sweep_is_smaller_rather_than_faster(duration, amplitude):
+    path = motions.sweep_path("arm_1_joint", duration)
+    assert max(path.amplitude) == pytest.approx(amplitude)
+    t = np.linspace(0.0, duration, 1000)
+    assert np.abs(np.gradient(path.at(t), t, axis=0)).max() < 0.63
+
+
+def test_the_sweep_of_a_quick_campaign_leaves_the_base_where_it_was(lab):
+    path = motions.sweep_path("arm_1_joint", 3.0)
+    motion = motions.swing("s", "calibration", "sweep", path, 3.0, lab.config.campaign)
+    base = simulate(lab.twin, motion, lab.T_lab_base).poses["base_footprint"]
+    moved = np.linalg.inv(base[0]) @ base[-1]
+    assert np.linalg.norm(moved[:3, 3]) < 1e-3 and abs(np.arctan2(moved[1, 0], moved[0, 0])) < 2e-3

@@ -1,0 +1,1 @@
+"""Benches of the base: load test, gravity stiffness, slip load, replayed wrenches."""

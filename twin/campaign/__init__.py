@@ -1,0 +1,1 @@
+"""One robot in its laboratory: its dataset and its truth."""

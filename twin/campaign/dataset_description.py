@@ -1,0 +1,81 @@
+"""What the laboratory is told: dataset.json, from datasheet values only."""
+
+from typing import cast
+
+import numpy as np
+
+import mjcf
+from calibration.recording.schema import (
+    Body,
+    Description,
+    Joint,
+    Marker,
+    Payload,
+    Plate,
+    Sigmas,
+    Tolerances,
+    TrialEntry,
+    Vector3,
+    Wheel,
+)
+from twin.campaign.robot import BASE, TOOL, TORSO
+from twin.config.instruments import Instruments
+from twin.config.twin import TwinConfig
+from twin.simulation.force_plates import PLATE, T_lab_plate, Tiles
+from twin.simulation.wrist_sensor import WRIST_SENSOR
+
+
+def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:
+    """The description of a recorded campaign; nothing drawn enters it."""
+    i, d = config.instruments, config.datasheet
+    joints = [Joint(name=TORSO, encoders=("motor",), rate=i.robot_rate)]
+    joints += [Joint(name=n, encoders=("motor", "link"), rate=i.robot_rate) for n in config.arm]
+    finest = max(j.quantum for j in config.arm.values())
+    return Description(
+        robot="tiago",
+        base_frame=BASE,
+        tool_frame=TOOL,
+        joints=tuple(joints),
+        bodies=tuple(
+            Body(name=n, link=b.link, markers=tuple(Marker(name=m, xyz=p) for m, p in b.markers.items()))
+            for n, b in i.bodies.items()
+        ),
+        wheels=tuple(Wheel(name=w.name, type=w.type, centre=w.centre, contact=w.contact) for w in mjcf.wheels()),
+        plates=_plates(i),
+        payload=_payload(config),
+        wrist_link=None if i.wrist is None else WRIST_SENSOR,
+        sigmas=Sigmas(
+            marker=i.marker_noise, encoder=finest, plate_force=i.plate_force_noise, plate_moment=i.plate_moment_noise
+        ),
+        tolerances=Tolerances(
+            joint_translation=d.joint_translation,
+            joint_rotation=d.joint_rotation,
+            encoder_offset=d.encoder_offset,
+            joint_play=d.joint_play,
+            body_translation=d.body_translation,
+            body_rotation=d.body_rotation,
+            link_mass=d.link_mass,
+            link_com=d.link_com,
+        ),
+        trials=trials,
+    )
+
+
+def _plates(instruments: Instruments) -> tuple[Plate, ...]:
+    spec = mjcf.spec()
+    T = T_lab_plate(spec.body(PLATE), instruments.plate_place)
+    axes = cast(tuple[Vector3, Vector3, Vector3], tuple(map(_vector, T[:3, :3].T)))
+    cut = Tiles(instruments.plate_grid).cut(*(2.0 * spec.geom(PLATE).size[:2]).tolist())
+    return tuple(
+        Plate(name=t.name, centre=_vector(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size) for t in cut
+    )
+
+
+def _vector(v: np.ndarray) -> Vector3:
+    x, y, z = (float(c) for c in v)
+    return x, y, z
+
+
+def _payload(config: TwinConfig) -> Payload | None:
+    p = config.payload
+    return Payload(link=TOOL, mass=p.mass, com=p.com, tolerance=config.datasheet.payload_mass) if p.mass else None

@@ -1,0 +1,156 @@
+"""A whole campaign: one robot of the series, every trial simulated, measured and written.
+
+    OUT/dataset/{dataset.json, nominal.urdf, trials/*.nc}      what a laboratory has
+    OUT/truth/{truth.json, trials/*.nc}                        what nobody has
+
+Trials run in parallel threads (the simulation holds no interpreter lock); random streams are named after the trial
+and the instrument, so that the files do not depend on the number of threads.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import mjcf
+from calibration.recording.schema import TrialEntry
+from calibration.recording.trial import Trial, write_trial
+from twin import truth
+from twin.base_tests.gravity_stiffness import gravity_stiffness
+from twin.base_tests.slip_load import slip_loads
+from twin.campaign import second_session as session
+from twin.campaign.dataset_description import declaration
+from twin.campaign.instrument_constants import constants
+from twin.campaign.laboratory import EPOCH, Laboratory, built, laboratory, second_session
+from twin.campaign.measure import instrument_errors, is_carried, measure, plate_centre
+from twin.campaign.second_session import CONFIRMATION
+from twin.config.twin import TwinConfig
+from twin.defects.defect import Defect
+from twin.defects.inertia import Payload
+from twin.defects.thermal_drift import Warming
+from twin.defects.wheels.rolling_wheel import Rolling
+from twin.defects.wheels.stiffness import spatial_stiffness
+from twin.defects.wheels.wheel import Wheel
+from twin.motions.motion import Motion
+from twin.motions.schedule import schedule
+from twin.simulation.build import Twin
+from twin.simulation.kinematic import arm_frame, carried
+from twin.simulation.rollout import simulate
+from twin.simulation.states import States
+from twin.truth import Parameter
+
+Progress = Callable[[str, float], None]
+Watch = Callable[[Trial], None]
+
+
+def record(
+    config: TwinConfig,
+    seed: int,
+    out: Path,
+    progress: Progress | None = None,
+    threads: int | None = None,
+    watch: Watch = lambda trial: None,
+) -> None:
+    """Simulate a campaign and write OUT/dataset and OUT/truth.
+
+    Args:
+        config: Robot and laboratory.
+        seed: Root of every random stream.
+        out: Folder to write into.
+        progress: Called with a text and the fraction done.
+        threads: How many trials are simulated at once; None: one for each core.
+        watch: Called with each trial once it is written, by the thread that made it.
+
+    Raises:
+        TwinError: The simulation failed; said where.
+    """
+    lab = laboratory(config, seed)
+    for folder in ("dataset/trials", "truth/trials"):
+        (out / folder).mkdir(parents=True, exist_ok=True)
+    motions = schedule(config.campaign, mjcf.model(), seed)
+    later = second_session(lab) if any(m.role == CONFIRMATION for m in motions) else lab
+    starts = EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
+    entries, done, total = [], 0.0, sum(m.duration for m in motions)
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        sessions = (later if m.role == CONFIRMATION else lab for m in motions)
+        jobs = [
+            pool.submit(_one, s, m, float(t), out, watch) for s, m, t in zip(sessions, motions, starts, strict=True)
+        ]
+        try:
+            for motion, job in zip(motions, jobs, strict=True):
+                entries.append(job.result())
+                done += motion.duration
+                if progress:
+                    progress(f"simulated {motion.id}, {motion.duration:.0f} s", done / total)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    description = declaration(config, tuple(entries))
+    (out / "dataset/dataset.json").write_text(description.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    (out / "dataset/nominal.urdf").write_text(mjcf.urdf(), encoding="utf-8")
+    _write_truth(lab, later if later is not lab else None, out / "truth")
+
+
+def _one(lab: Laboratory, motion: Motion, start: float, out: Path, watch: Watch) -> TrialEntry:
+    states = _states(lab, motion, start - EPOCH + motion.duration / 2.0)
+    trial, true = measure(lab, motion, states, start)
+    file = f"trials/{motion.id}.nc"
+    digest = write_trial(out / "dataset" / file, trial)
+    truth.write_trial(out / "truth" / file, true)
+    watch(trial)
+    return TrialEntry(
+        id=motion.id,
+        role=motion.role,
+        kind=motion.kind,
+        motion=motion.name,
+        file=file,
+        sha256=digest,
+        payload=motion.payload,
+    )
+
+
+def _states(lab: Laboratory, motion: Motion, time: float) -> States:
+    """What the motion does at `time` [s] of the campaign."""
+    move = carried if is_carried(lab, motion) else simulate
+    return move(_in_trial(lab, motion, time), motion, lab.T_lab_base)
+
+
+def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
+    """The robot with the motion's payload in its hand, as warm as it is at `time` [s] of the campaign."""
+
+    def now(defect: Defect) -> Defect:
+        if isinstance(defect, Payload) and motion.payload is not None:
+            return replace(defect, mass=motion.payload)
+        if isinstance(defect, Wheel) and motion.base is not None and not is_carried(lab, motion):
+            return Rolling(defect)
+        return replace(defect, time=time) if isinstance(defect, Warming) else defect
+
+    defects = tuple(now(d) for d in lab.robot.defects)
+    if all(a is b for a, b in zip(defects, lab.robot.defects, strict=True)):
+        return lab.twin
+    return built(lab.config, defects, lab.twin.links)
+
+
+def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:
+    robot = lab.robot
+    K, C = spatial_stiffness(robot.wheels)
+    parameters: list[Parameter] = list(lab.twin.truth)
+    for source in (*robot.encoders, *robot.clusters, *robot.loose, *instrument_errors(lab)):
+        parameters += source.parameters()
+    parameters += constants(lab.config)
+    if "wheels" in lab.config.campaign.driving.forms:
+        parameters += (p for wheel in robot.wheels for p in Rolling(wheel).parameters())
+    if lab.config.campaign.driving.forms:
+        parameters += arm_frame(lab.twin, next(iter(lab.config.arm)))
+    derived = {"K": K, "C": C, "K_gravity": gravity_stiffness(lab.twin, robot.wheels)}
+    derived |= {"slip_load": slip_loads(lab.twin, robot.wheels)}
+    derived |= {"T_lab_base": lab.T_lab_base, "plate_centre": plate_centre(lab.twin.model)}
+    derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}
+    if later is not None:
+        parameters += session.parameters(later.robot)
+        derived |= {f"{CONFIRMATION}.T_lab_base": later.T_lab_base}
+        derived |= {f"{CONFIRMATION}.T_{c.frames.replace('.', '_')}": c.T_link_body for c in later.robot.clusters}
+    truth.write_parameters(folder / "truth.json", parameters, derived)

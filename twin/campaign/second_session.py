@@ -1,0 +1,46 @@
+"""Another session with the same robot: base moved, markers remounted, encoders homed anew.
+
+Streams are named after the session, so that it changes nothing of the first one.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from twin.campaign.robot import Robot, cluster
+from twin.config.twin import TwinConfig
+from twin.instruments.encoder import Encoder
+from twin.random_streams import generator
+from twin.transforms import exp6
+from twin.truth import Parameter
+
+CONFIRMATION = "confirmation"
+
+
+def remounted(config: TwinConfig, robot: Robot, seed: int, session: str = CONFIRMATION) -> Robot:
+    """The robot with its markers remounted, none loose, and its motors homed anew; link encoders are absolute."""
+
+    def homed(encoder: Encoder) -> Encoder:
+        if encoder.side != "motor" or encoder.prismatic:
+            return encoder
+        shift = config.session.encoder_zero * float(generator(seed, session, "zero", encoder.joint_name).normal())
+        return replace(encoder, offset=encoder.offset + shift)
+
+    bodies = config.instruments.bodies.items()
+    clusters = tuple(cluster(name, body, seed, session) for name, body in bodies)
+    return replace(robot, encoders=tuple(homed(e) for e in robot.encoders), clusters=clusters, loose=())
+
+
+def moved(config: TwinConfig, T_lab_base: np.ndarray, seed: int, session: str = CONFIRMATION) -> np.ndarray:
+    """T_lab_base (4, 4) after the base was moved."""
+    x, y, yaw = generator(seed, session, "base").uniform(-1.0, 1.0, size=3)
+    T = T_lab_base @ exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, config.session.base_rotation * yaw]))
+    T[:2, 3] += config.session.base_translation * np.array([x, y])
+    return T
+
+
+def parameters(robot: Robot, session: str = CONFIRMATION) -> tuple[Parameter, ...]:
+    """What is true in that session only, `session.` before each name."""
+    motor = (e for e in robot.encoders if e.side == "motor")
+    found = (p for source in (*motor, *robot.clusters) for p in source.parameters())
+    return tuple(p._replace(name=f"{session}.{p.name}") for p in found)

@@ -1,0 +1,1 @@
+"""A robot and its campaign as a scenario states them."""

@@ -1,0 +1,86 @@
+"""What a scenario says of the base: its wheels and what they stand on; SI units."""
+
+from typing import Literal
+
+from pydantic import ValidationInfo, field_validator
+from pydantic.dataclasses import dataclass
+
+from twin.config.values import STRICT, NonNegative, Point, Positive, Vector3
+
+
+@dataclass(frozen=True, config=STRICT)
+class WheelType:
+    """How one type of wheel stands.
+
+    Attributes:
+        stiffness: Bushing kx, ky, kz [N/m].
+        damping: Bushing cx, cy, cz [N.s/m].
+        contact_stiffness: Normal, on the floor [N/m].
+        contact_damping: Normal, on the floor, and of slip: friction takes none away without [N.s/m].
+        friction: Coefficient mu [-].
+        torsion: Bushing krx, kry, krz [N.m/rad]: krz alone, or all three; 0: fixed to the base about that axis.
+        torsion_damping: Bushing crx, cry, crz [N.m.s/rad].
+        torsional_friction: Of the contact, moment about the normal over normal force [m].
+        rolling_friction: Of the contact, moment about a tangent over normal force [m].
+        guide_friction: Coulomb's, of the bushing along z [N]: a vertical load below it moves the contact alone.
+        turning_force: Along x and along y at which a caster turns instead of sliding, whatever its load [N]; 0: never.
+    """
+
+    stiffness: tuple[Positive, Positive, Positive]
+    damping: tuple[NonNegative, NonNegative, NonNegative]
+    contact_stiffness: Positive
+    contact_damping: Positive
+    friction: NonNegative
+    torsion: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    torsion_damping: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    torsional_friction: NonNegative = 0.02
+    rolling_friction: NonNegative = 0.02
+    guide_friction: NonNegative = 0.0
+    turning_force: NonNegative = 0.0
+
+    @field_validator("torsion")
+    @classmethod
+    def _carried(cls, torsion: Vector3) -> Vector3:
+        """A wheel that can tilt about one tangent alone would roll away."""
+        if (torsion[0] > 0.0) != (torsion[1] > 0.0) or (torsion[0] > 0.0 and torsion[2] == 0.0):
+            raise ValueError("torsional stiffness about z alone or about x, y and z; the others must be 0")
+        return torsion
+
+    @field_validator("torsion_damping")
+    @classmethod
+    def _twisting(cls, damping: Vector3, info: ValidationInfo) -> Vector3:
+        """A wheel fixed to the base does not turn against it."""
+        if any(c > 0.0 and k == 0.0 for c, k in zip(damping, info.data.get("torsion", damping), strict=True)):
+            raise ValueError("torsional damping needs torsional stiffness about the same axis")
+        return damping
+
+
+@dataclass(frozen=True, config=STRICT)
+class Base:
+    """How the base stands.
+
+    Attributes:
+        drive: The two driven wheels, braked.
+        caster_front: The two casters in front.
+        caster_back: The two casters behind; each pair stands as the last drive has turned it.
+        pose: x, y [m] and yaw [rad] of the base in the lab.
+        wheels: `contact`: on bushings, by contacts that stick and slip; `anchored`: on bushings whose lower ends are
+            fixed in the floor, a linear base; `rigid`: without bushings, on soft contacts alone.
+    """
+
+    drive: WheelType
+    caster_front: WheelType
+    caster_back: WheelType
+    pose: Point
+    wheels: Literal["contact", "anchored", "rigid"] = "contact"
+
+    @field_validator("wheels")
+    @classmethod
+    def _guided(cls, wheels: str, info: ValidationInfo) -> str:
+        """Anchored wheels are linear, rigid ones have no guides, braked ones do not turn."""
+        types = [(k, info.data.get(k)) for k in ("drive", "caster_front", "caster_back")]
+        if wheels != "contact" and any(t is not None and t.guide_friction > 0.0 for _, t in types):
+            raise ValueError(f"guide_friction needs wheels: contact, found {wheels}; set it to 0 for all three types")
+        if any(t is not None and t.turning_force > 0.0 and (wheels != "contact" or k == "drive") for k, t in types):
+            raise ValueError(f"turning_force is of casters and needs wheels: contact, found {wheels}; set it to 0")
+        return wheels

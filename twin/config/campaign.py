@@ -1,0 +1,115 @@
+"""What a scenario records: trials, their motions and durations; SI units.
+
+What a scenario says about trials in which the base moves: yaw spins in steps, straight drives; SI units.
+
+What a scenario says of another day: the confirmation session; SI units.
+"""
+
+from dataclasses import field
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from twin.config.values import (
+    STRICT,
+    Count,
+    FixedNonNegative,
+    FixedPositive,
+    GivenApproaches,
+    GivenPosture,
+    NonNegative,
+)
+
+TrialName = Literal[
+    "postures", "sweeps", "around_x", "around_y", "around_z", "x_fold", "y_fold",
+    "xyz", "xyz_mirror", "push", "postures_validation",
+]  # fmt: skip
+Form = Literal["kinematic", "wheels"]
+Rests = Annotated[int, Field(ge=4, le=100)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Driving:
+    """Trials in which the base moves, a spin and a drive for each form.
+
+    Attributes:
+        forms: kinematic: the base is carried along its path, no physics; wheels: by its own wheels, on the floor.
+        spin_rests: Rests of a spin, evenly over one turn.
+        drive_rests: Rests of a drive.
+        stride: From rest to rest of a drive [m].
+        yaw_rate: Of a spin [rad/s].
+        speed: Of a drive [m/s].
+        ramp: Duration of the velocity ramps [s]: one period of the base on its wheels, which leaves it still.
+    """
+
+    forms: tuple[Form, ...] = ()
+    spin_rests: Rests = 12
+    drive_rests: Rests = 9
+    stride: Annotated[float, Field(gt=0.0, le=0.5)] = 0.1
+    yaw_rate: Annotated[float, Field(gt=0.0, le=2.0)] = 0.4
+    speed: Annotated[float, Field(gt=0.0, le=1.0)] = 0.1
+    ramp: FixedPositive = 0.6
+
+
+@dataclass(frozen=True, config=STRICT)
+class Campaign:
+    """How much is recorded.
+
+    Attributes:
+        ramp: Duration of the velocity ramp that starts and stops a motion [s].
+        rest: Rest at the start and end of each trial [s].
+        speed: Of moves between postures [rad/s].
+        dwell: Rest in each static posture [s].
+        calibration_postures: Number of.
+        validation_postures: Number of.
+        given_postures: Calibration postures [m, rad] as `tiago-twin design` chooses them, the lift first, instead of
+            `calibration_postures` drawn ones.
+        given_approaches: For each of them the sign of each joint's last motion before it rests, by way of a point
+            0.05 rad (the lift 5 mm) before it; 0: it does not matter. Empty: straight from the last.
+        sweep: Duration of each one-joint sweep [s]; 0: no sweeps.
+        calibration_swing: Duration of each calibration swing [s]; 0: none.
+        validation_swing: Duration of each validation swing [s]; 0: none.
+        pause: Between trials, on every clock [s].
+        payloads: Further masses [kg] with which the first validation swing is repeated.
+        push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
+        confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
+        driving: Trials in which the base moves.
+        carried: Whether every trial is without physics, joints and base where they are told to be.
+        only: Trials to record, `sweeps` for those of one joint; empty: all. A confirmation repeats those of validation.
+    """
+
+    ramp: Annotated[float, Field(gt=0.0, le=3.0)]
+    rest: Annotated[float, Field(ge=1.0, le=10.0)]
+    speed: Annotated[float, Field(gt=0.0, le=1.76)]
+    dwell: Annotated[float, Field(ge=0.8, le=10.0)]
+    calibration_postures: Count
+    validation_postures: Count
+    sweep: FixedNonNegative
+    calibration_swing: FixedNonNegative
+    validation_swing: FixedNonNegative
+    pause: FixedNonNegative
+    payloads: tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...] = ()
+    push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    confirmation: bool = False
+    driving: Driving = field(default_factory=Driving)
+    carried: bool = False
+    only: tuple[TrialName, ...] = ()
+    given_postures: tuple[GivenPosture, ...] = ()
+    given_approaches: GivenApproaches = ()
+
+
+@dataclass(frozen=True, config=STRICT)
+class Session:
+    """What changes from the first session to the confirmation; markers are remounted with their bodies' own widths.
+
+    Attributes:
+        base_translation: Half width of the base's move, per axis [m].
+        base_rotation: Half width of its turn [rad].
+        encoder_zero: Standard deviation of a motor encoder's zero after homing anew [rad]: three steps of the absolute
+            encoder it is homed by.
+    """
+
+    base_translation: NonNegative = 0.08
+    base_rotation: NonNegative = 0.5
+    encoder_zero: NonNegative = 3e-4

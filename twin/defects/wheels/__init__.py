@@ -1,0 +1,1 @@
+"""The wheels under the base: bushings, contacts, rolling."""

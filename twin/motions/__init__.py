@@ -1,0 +1,1 @@
+"""What the joints and the base are commanded to do."""

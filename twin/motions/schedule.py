@@ -1,0 +1,103 @@
+"""The trials of a campaign, in the order they are recorded."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from calibration.recording.schema import Role
+from twin.config.campaign import Campaign
+from twin.motions import driving, postures
+from twin.motions import motion as motions
+from twin.motions.motion import Motion
+from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
+from twin.random_streams import generator
+
+REGISTRATION = "registration"
+_REGISTRATION_POSTURES = 8
+
+
+def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
+    """Calibration first (statics, spins and drives, sweeps, swings), then validation, then confirmation.
+
+    Of them those the campaign asks for.
+    """
+    trials = (
+        *_calibration_postures(nominal, seed, campaign),
+        *driving.trials(campaign),
+        *_sweeps(campaign),
+        *_swings("calibration", campaign.calibration_swing, CALIBRATION_SWINGS, campaign),
+        *_swings("validation", campaign.validation_swing, VALIDATION_SWINGS, campaign),
+        *_loaded(campaign),
+        *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
+        *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
+    )
+    second = _confirmation(campaign, nominal, seed) if campaign.confirmation else ()
+    return (*(m for m in trials if _asked(campaign, _group(m))), *second)
+
+
+def _asked(campaign: Campaign, name: str) -> bool:
+    return not campaign.only or name in campaign.only
+
+
+def _group(motion: Motion) -> str:
+    return "sweeps" if motion.kind == "sweep" else motion.name
+
+
+def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
+    """The second session: a few postures to register the markers anew, then what is asked for of validation."""
+    q = postures.draw(nominal, _REGISTRATION_POSTURES + 1, generator(seed, "postures", REGISTRATION))
+    register = motions.postures(f"{REGISTRATION}_confirmation", "confirmation", q, campaign)
+    swings = _swings("confirmation", campaign.validation_swing, VALIDATION_SWINGS, campaign)
+    confirming = (
+        *(replace(m, id=f"{m.id}_confirmation") for m in swings),
+        *_statics("postures_confirmation", "confirmation", campaign.validation_postures, nominal, seed, campaign),
+    )
+    return (replace(register, name=REGISTRATION), *confirming) if confirming else ()
+
+
+def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
+    """The given postures, from the first of them on, or drawn ones."""
+    if not campaign.given_postures:
+        return _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign)
+    q = np.array([campaign.given_postures[0], *campaign.given_postures])
+    sides = np.array(campaign.given_approaches) if campaign.given_approaches else None
+    return (motions.postures("postures", "calibration", q, campaign, sides),)
+
+
+def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
+    """The first posture is where the trial starts, the n that follow are dwelt in; not drawn unless asked for."""
+    if not _asked(campaign, id.replace("_confirmation", "_validation")):
+        return ()
+    q = postures.draw(nominal, n + 1, generator(seed, "postures", role))
+    return (motions.postures(id, role, q, campaign),)
+
+
+def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:
+    if campaign.sweep == 0.0:
+        return ()
+    return tuple(
+        motions.swing(
+            f"sweep_{j}", "calibration", "sweep", motions.sweep_path(j, campaign.sweep), campaign.sweep, campaign
+        )
+        for j in JOINTS[1:]
+    )
+
+
+def _loaded(campaign: Campaign) -> tuple[Motion, ...]:
+    """The first validation swing with each further payload."""
+    name, path = next(iter(VALIDATION_SWINGS.items()))
+    trials = ((f"{name}_{mass:g}kg".replace(".", "_"), mass) for mass in campaign.payloads)
+    return tuple(
+        replace(
+            motions.swing(id, "validation", "swing", path, campaign.validation_swing, campaign), name=name, payload=m
+        )
+        for id, m in trials
+    )
+
+
+def _swings(role: Role, duration: float, paths: dict[str, Swing], campaign: Campaign) -> tuple[Motion, ...]:
+    if duration == 0.0:
+        return ()
+    asked = {name: path for name, path in paths.items() if _asked(campaign, name)}
+    return tuple(motions.swing(name, role, "swing", path, duration, campaign) for name, path in asked.items())

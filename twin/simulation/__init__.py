@@ -1,0 +1,1 @@
+"""From a specification and defects to states."""

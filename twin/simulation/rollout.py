@@ -1,0 +1,77 @@
+"""Simulation of one trial: set-points in, dense states out, one `mujoco.rollout`, no Python between the steps."""
+
+import logging
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from twin.motions.motion import Motion
+from twin.motions.swings import JOINTS
+from twin.simulation import wrist_sensor
+from twin.simulation.base_joint import anchored, floor_wrench
+from twin.simulation.build import Twin
+from twin.simulation.checks import check
+from twin.simulation.force_plates import PLATE, felt, on_plate
+from twin.simulation.setpoints import Inputs, driven, prepare
+from twin.simulation.states import States
+from twin.transforms import states_with_their_sensors, transform
+
+_log = logging.getLogger(__name__)
+
+
+def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
+    """Simulate a trial from a settled stand.
+
+    Args:
+        twin: The robot.
+        motion: Set-points; the robot rests `SETTLE` seconds in the first of them before time zero.
+        T_lab_base: Where it is put down, upright (4, 4).
+
+    Raises:
+        Diverged: It is not stable.
+        NotStanding: The robot tipped over or left its plate.
+    """
+    inputs = prepare(twin, motion, T_lab_base)
+    model, first = inputs.model, inputs.first
+    mujoco.set_mju_user_warning(_log.debug)  # or it writes MUJOCO_LOG.TXT where the user stands
+    after, sensors = rollout.rollout(model, mujoco.MjData(model), first[None], inputs.control[None])
+    states = states_with_their_sensors(first, after[0])
+    check(inputs, motion, states)
+    skip = inputs.settling
+    return _unpack(inputs, twin.links, states[skip:], sensors[0][skip:])
+
+
+def _unpack(inputs: Inputs, links: tuple[str, ...], states: np.ndarray, sensors: np.ndarray) -> States:
+    model, command, push = inputs.model, inputs.command[inputs.settling :], inputs.push[inputs.settling :]
+    qpos, qvel = states[:, 1 : 1 + model.nq], states[:, 1 + model.nq : 1 + model.nq + model.nv]
+    link = np.stack([qpos[:, model.joint(j).qposadr[0]] for j in JOINTS], axis=1)
+    motor = np.stack([qpos[:, model.joint(driven(j)).qposadr[0]] for j in JOINTS], axis=1)
+    velocity = np.stack([qvel[:, model.joint(driven(j)).dofadr[0]] for j in JOINTS], axis=1)
+    servos = [model.actuator(driven(j)).id for j in JOINTS]
+    kp, kv = model.actuator_gainprm[servos, 0], -model.actuator_biasprm[servos, 2]
+    wrench = _floor_wrench(model, qpos, qvel) if anchored(model) else on_plate(model, sensors, PLATE)
+    each = [on_plate(model, sensors, tile) for tile in felt(model)] or [wrench]
+    return States(
+        t=np.arange(len(states)) * model.opt.timestep,
+        motor=motor,
+        link=link,
+        motor_velocity=velocity,
+        torque=kp * (command - motor) - kv * velocity,
+        command=command,
+        poses={name: _pose(model, sensors, name) for name in links},
+        wrench=wrench,
+        plates=np.stack(each, axis=1),
+        wrist=wrist_sensor.on_wrist(model, sensors, push),
+    )
+
+
+def _pose(model: mujoco.MjModel, sensors: np.ndarray, link: str) -> np.ndarray:
+    kinds = (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMEQUAT)
+    return transform(*(wrist_sensor.sensed(model, sensors, [f"{link}.{k.name}"]) for k in kinds))
+
+
+def _floor_wrench(model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return floor_wrench(model, qpos, qvel, data.site(PLATE).xpos)

@@ -1,0 +1,34 @@
+"""What was true at every step of a simulation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class States:
+    """What was true, at every step of the simulation.
+
+    Attributes:
+        t: (n,) [s], 0 at the first set-point.
+        motor: Motor-side angles (n, 8) [m, rad].
+        link: Link-side angles (n, 8) [m, rad].
+        motor_velocity: (n, 8) [m/s, rad/s].
+        torque: Of the drives (n, 8) [N, N.m].
+        command: Interpolated set-points (n, 8) [m, rad].
+        poses: T_lab_link (n, 4, 4) by link.
+        wrench: Action of the robot on the plate, lab axes, about the plate's centre (n, 6) [N, N.m].
+        plates: Its parts on each plate, about that one's centre (n, n_plates, 6) [N, N.m].
+        wrist: Action of the hand on the wrist's sensor, its axes, about its origin (n, 6) [N, N.m].
+    """
+
+    t: np.ndarray
+    motor: np.ndarray
+    link: np.ndarray
+    motor_velocity: np.ndarray
+    torque: np.ndarray
+    command: np.ndarray
+    poses: dict[str, np.ndarray]
+    wrench: np.ndarray
+    plates: np.ndarray
+    wrist: np.ndarray
