@@ -9,7 +9,7 @@ from scenarios import load
 from scenarios.datasets.run_content import recordings_and_truth
 from scenarios.datasets.run_one import size
 
-SWING = "twin.campaign.record.calibration_swing"
+SWING = "twin.campaign.calibration_swing"
 VARIED = {
     "7 s": (f"{SWING}=7",),
     "17 s": (),
