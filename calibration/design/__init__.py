@@ -1,1 +1,17 @@
 """Which postures and motions to record."""
+
+from calibration.design.next_motions import drive_next, sweeps_next, swings_next
+from calibration.design.next_postures import record_next
+from calibration.design.plan import Plan, Task, compared, nominal_task, plan
+
+__all__ = [
+    "Plan",
+    "Task",
+    "compared",
+    "drive_next",
+    "nominal_task",
+    "plan",
+    "record_next",
+    "sweeps_next",
+    "swings_next",
+]
