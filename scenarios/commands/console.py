@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from scenarios.steps.run import Progress
+from scenarios.steps import Progress
 
 if TYPE_CHECKING:
     from rich.progress import TaskID

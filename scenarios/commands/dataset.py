@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from scenarios.commands.options import FAILED, Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 
 def dataset(  # noqa: PLR0913  an option each
@@ -19,16 +19,16 @@ def dataset(  # noqa: PLR0913  an option each
     overrides: Overrides = None,
 ) -> None:
     """Record N robots of a scenario; the same command goes on where it was stopped."""
+    from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import workers as engine
     from scenarios.datasets.collection import Plan, collect
     from scenarios.datasets.run_content import recordings, recordings_and_truth
-    from scenarios.steps import run
 
     if workers and scheduler:
         raise ScenarioError("--workers and --scheduler: name one of them")
     plan = Plan(
-        run.load(scenario, overriding(overrides, seed)), n, out, recordings if blind else recordings_and_truth, blind
+        steps.load(scenario, overriding(overrides, seed)), n, out, recordings if blind else recordings_and_truth, blind
     )
     with console.progress() as progress:
         rows = collect(

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from scenarios.commands.options import Overrides, ScenarioName, Seed, overriding
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 
 def design(  # noqa: PLR0913  an option each
@@ -24,15 +24,15 @@ def design(  # noqa: PLR0913  an option each
     overrides: Overrides = None,
 ) -> None:
     """Choose the postures that calibrate best, and the side each joint comes from."""
+    from scenarios import steps
     from scenarios.commands import console
-    from scenarios.steps import run
     from scenarios.steps.design import design as designed
 
     for path in (p for p in (out, campaign) if p is not None and p.is_dir()):
         raise ScenarioError(f"{path}: is a folder; name a file")
     with console.progress() as progress:
         progress("design", "", 0.0)
-        found = designed(run.load(scenario, overriding(overrides, seed)), n, criterion, out, campaign)
+        found = designed(steps.load(scenario, overriding(overrides, seed)), n, criterion, out, campaign)
     plan, against = found.plan, found.comparison
     typer.echo(
         f"{n} postures, {plan.design.prospect.B.shape[2]} identifiable combinations; predicted error of the hand at "

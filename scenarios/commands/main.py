@@ -21,7 +21,7 @@ from scenarios.commands import import_export, quicklook, video
 from scenarios.commands import reality as command_reality
 from scenarios.commands import study as command_study
 from scenarios.commands.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 WRONG_INPUT = 2
 TERMINATED = 128 + signal.SIGTERM
@@ -45,8 +45,8 @@ def options(verbose: Annotated[bool, typer.Option("--verbose", help="Say more on
 @app.command("list")
 def list_scenarios() -> None:
     """List the scenarios."""
+    from scenarios import steps
     from scenarios.files import registry
-    from scenarios.steps import run as steps
 
     for name in registry.names():
         typer.echo(f"{name}  {steps.load(name).description}")
@@ -61,8 +61,8 @@ def run(
     overrides: Overrides = None,
 ) -> None:
     """Simulate, calibrate, evaluate and report."""
+    from scenarios import steps
     from scenarios.commands import console
-    from scenarios.steps import run as steps
 
     loaded = steps.load(scenario, overriding(overrides, seed))
     out = out or Path("runs") / loaded.name
@@ -90,8 +90,8 @@ def simulate(
     ] = None,
 ) -> None:
     """Write dataset/ and truth/ of a scenario."""
+    from scenarios import steps
     from scenarios.commands import console
-    from scenarios.steps import run as steps
 
     loaded = steps.load(scenario, overriding(overrides, seed))
     if also is not None:
@@ -116,8 +116,8 @@ def calibrate(
     ] = None,
 ) -> None:
     """Write an estimate from a dataset folder alone."""
+    from scenarios import steps
     from scenarios.commands import console
-    from scenarios.steps import run as steps
 
     chosen = None if stages is None else [stage.strip() for stage in stages.split(",")]
     with console.progress() as progress:
@@ -138,8 +138,8 @@ def evaluate(
     truth: Annotated[Path | None, typer.Option(metavar="TRUTH", help="A truth folder: adds score.json.")] = None,
 ) -> None:
     """Write the held-out error of an estimate."""
+    from scenarios import steps
     from scenarios.commands import console
-    from scenarios.steps import run as steps
 
     with console.progress() as progress:
         steps.evaluate(estimate, dataset, out, truth, progress)
@@ -153,8 +153,8 @@ def evaluate(
 @app.command()
 def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
     """Write report.html from what a run folder holds."""
+    from scenarios import steps
     from scenarios.commands import console
-    from scenarios.steps import run as steps
 
     with console.progress() as progress:
         page = steps.report(run_folder, progress)

@@ -31,12 +31,12 @@ def reality(  # noqa: PLR0913  an option each
     overrides: Overrides = None,
 ) -> None:
     """Compare drawn robots with a real one: swings by the figures of its log, and its wrench replayed."""
+    from scenarios import steps
     from scenarios.files import output_folder
     from scenarios.realism.compare import as_json, compare_replay, compare_swings
     from scenarios.realism.replayed import AS_DRAWN, CAUSES
-    from scenarios.steps import run
 
-    loaded = run.load(scenario, overriding(overrides, seed))
+    loaded = steps.load(scenario, overriding(overrides, seed))
     recordings = () if log is None else _recordings(log)
     swung = [compare_swings(loaded, n)] if swings else []
     conditions = (AS_DRAWN, *CAUSES) if causes else (AS_DRAWN,)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from scenarios.commands.options import FAILED, Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from scenarios.steps.run import Progress
+    from scenarios.steps import Progress
 
 
 def study(  # noqa: PLR0913  an option each
@@ -30,10 +30,10 @@ def study(  # noqa: PLR0913  an option each
     overrides: Overrides = None,
 ) -> None:
     """Calibrate many robots and judge the method: its intervals, or how often it shows a gain."""
+    from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import workers as engine
     from scenarios.datasets.collection import Plan, collect
-    from scenarios.steps import run
     from scenarios.studies import statistics as study
     from scenarios.studies.full_run import judged
     from scenarios.studies.matched_run import matched as without_physics
@@ -46,7 +46,7 @@ def study(  # noqa: PLR0913  an option each
     with console.progress() as progress:
         for k, value in enumerate(values):
             changed = [f"{path}={value}"] if path else []
-            loaded = run.load(scenario, [*overriding(overrides, seed), *changed])
+            loaded = steps.load(scenario, [*overriding(overrides, seed), *changed])
             folder = out / f"level_{k}" if path else out
             at = f"{path}={value} " if path else ""
             who = engine.Workers(workers, scheduler)

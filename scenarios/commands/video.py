@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 
 class Renderer(StrEnum):

@@ -21,10 +21,10 @@ from scenarios.datasets.index import Row, write_index, write_whole
 from scenarios.datasets.run_one import PARTIAL, perform
 from scenarios.datasets.run_spec import Order, Produce, digest_of
 from scenarios.datasets.workers import Done, NoRoom, Task, Workers, compute
-from scenarios.errors import ScenarioError
 from scenarios.files import output_folder as folder
+from scenarios.files.errors import ScenarioError
 from scenarios.files.scenario import Scenario
-from scenarios.steps.run import versions
+from scenarios.steps import versions
 
 COLLECTION = folder.Kind(
     "collection", "collection.json", frozenset({"collection.json", "index.csv", "datasheet.md", "runs", "study.json"})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from scenarios.datasets.index import Row, read_index
 from scenarios.datasets.run_spec import run_name
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
     import xarray

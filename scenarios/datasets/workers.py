@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from scenarios.datasets.index import Row
 from scenarios.datasets.run_one import perform
 from scenarios.datasets.run_spec import Order
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
     from distributed import Client

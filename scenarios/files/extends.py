@@ -6,8 +6,8 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from ruamel.yaml.comments import CommentedMap
 
-from scenarios.errors import ScenarioError
 from scenarios.files import registry, yaml_file
+from scenarios.files.errors import ScenarioError
 from scenarios.files.overrides import Override, place
 
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import difflib
 from pathlib import Path
 
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 HERE = Path(__file__).parents[1]
 

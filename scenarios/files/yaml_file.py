@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq, TaggedScalar
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from scenarios.files.overrides import Override
 from scenarios.files.validation_messages import Source
 

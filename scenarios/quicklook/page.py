@@ -16,8 +16,8 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Plate
 from calibration.recording.trial import Trial
 from calibration.robot.chain import chain_of
-from scenarios.errors import ScenarioError
 from scenarios.files import output_folder
+from scenarios.files.errors import ScenarioError
 from scenarios.plots.style import drawing, figure
 from scenarios.quicklook.plots import Channel, channels, pressed, seen_from_above, sight
 from scenarios.quicklook.summary import Looked, difference, looked_at, pressure_of

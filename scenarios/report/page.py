@@ -11,13 +11,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from scenarios.plots import svg
-from scenarios.report import figures, formatting
-from scenarios.report.ladder import BASES, MEANINGS, headline_model, ladder, predictive
-from scenarios.report.run_results import Results, read
+from scenarios.report.results import figures, formatting
+from scenarios.report.results.ladder import BASES, MEANINGS, headline_model, ladder, predictive
+from scenarios.report.results.parameters import coverage, groups, known, left_out
+from scenarios.report.results.recordings import instruments
+from scenarios.report.results.run_results import Results, read
 from scenarios.report.sections import paper_models, verdict
 from scenarios.report.sections.models import section
-from scenarios.report.sections.parameters import coverage, groups, known, left_out
-from scenarios.report.sections.recordings import instruments
 
 _TEMPLATES = Path(__file__).with_name("templates")
 _NAMES = ("frames", "paper", "wheels", "sway", "joint", "loops", "errors", "traces", "parameters", "z_scores")

@@ -21,7 +21,7 @@ from calibration.evaluation.pose_errors import pose_errors
 from calibration.inference.parameters import Model
 from calibration.mocap.cluster_pose import poses_of
 from calibration.recording.schema import base_body
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
 from twin import truth
 from twin.truth import Parameter, TruthTrial

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from scenarios.errors import ScenarioError
 from scenarios.files import output_folder
+from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
     from calibration.design.exchange import Criterion

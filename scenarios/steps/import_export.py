@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenarios.errors import ScenarioError
 from scenarios.files import output_folder, yaml_file
+from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
     from calibration.formats.mapping.channels import Reader

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
     from twin.rendering.trial_video import ClipOptions
@@ -21,7 +21,7 @@ def film(run_folder: Path | str, trial_id: str, out: Path | str, options: "ClipO
     run_folder, out = Path(run_folder), Path(out)
     role = _role(run_folder, trial_id)
 
-    from scenarios.steps.run import load
+    from scenarios.steps.run_steps import load
     from twin import truth
     from twin.campaign.laboratory import laboratory, second_session
     from twin.rendering.trial_video import clip

@@ -25,8 +25,8 @@ from calibration.robot.chain import chain_of
 from calibration.stages.geometry.gear_deflection import calibrate_gears
 from calibration.stages.geometry.stage import calibrate_geometry
 from calibration.verdict import Verdict
-from scenarios.errors import ScenarioError
 from scenarios.files import yaml_file
+from scenarios.files.errors import ScenarioError
 from scenarios.steps.import_export import import_files
 
 

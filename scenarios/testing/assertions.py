@@ -6,7 +6,7 @@ covers       n_covered >= F^-1(0.001; n_judged, 0.95)       F binomial: 95 % int
 
 from typing import TYPE_CHECKING
 
-from scenarios.steps.run import RunResult
+from scenarios.steps import RunResult
 
 if TYPE_CHECKING:
     from calibration.evaluation.evaluate import Evaluation

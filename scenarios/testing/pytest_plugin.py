@@ -3,7 +3,7 @@
 def test_my_calibration(twin_run, assert_improves, assert_covers):
     run = twin_run("short", seed=3)               # simulated, calibrated, judged: a RunResult
     mine = calibrated(run.folder / "dataset")     # yours: an estimate.json, or a URDF
-    evaluation, score = scenarios.steps.run.evaluate(mine, run.folder / "dataset", "out", run.folder / "truth")
+    evaluation, score = scenarios.steps.evaluate(mine, run.folder / "dataset", "out", run.folder / "truth")
     assert_improves(evaluation, "full", over="registration", by=0.5)
     assert_covers(score, at_least=0.9)
 """
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from scenarios.steps.run import RunResult
+    from scenarios.steps import RunResult
 
 
 @pytest.fixture(scope="session")
@@ -28,7 +28,7 @@ def twin_run(tmp_path_factory: pytest.TempPathFactory) -> "Callable[..., RunResu
     def run(
         scenario: str = "short", seed: int | None = None, settings: Sequence[str] = (), quick: bool = True
     ) -> "RunResult":
-        from scenarios.steps import run as steps
+        from scenarios import steps
 
         changed = (*settings, *([] if seed is None else [f"seed={seed}"]))
         key = (str(scenario), changed, quick)

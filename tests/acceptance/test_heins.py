@@ -7,9 +7,8 @@ import pytest
 
 import twin
 from calibration.stages.frames.base_stage import STANDING
-from scenarios import load, run
+from scenarios import load, run, steps
 from scenarios.commands import console
-from scenarios.steps import run as steps
 from twin.truth import read_parameters
 
 FRAMES = tuple(

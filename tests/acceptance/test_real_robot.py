@@ -5,7 +5,7 @@ import pytest
 
 from calibration.errors import NotEnoughData
 from calibration.evaluation.marker_errors import PointRow
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from scenarios.studies.cross_validation import HeldOut, at_random, by_regions, cross_validated, pooled
 from tests.doubles.real_postures import ROOT, TABLE, TWO_DAYS, one_marker, real_rows
 

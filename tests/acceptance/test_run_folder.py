@@ -18,8 +18,7 @@ from calibration.prediction.predictor import predictor
 from calibration.recording.clock import Clock
 from calibration.recording.schema import base_body
 from calibration.stages.joints.correction import velocities
-from scenarios import load, run
-from scenarios.steps import run as steps
+from scenarios import load, run, steps
 from twin.truth import read_parameters, read_trial
 
 SAME = Clock("one", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)

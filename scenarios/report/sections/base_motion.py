@@ -21,8 +21,8 @@ from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.model import Suspension
 from calibration.stages.suspension.rest_frame import rest_of
 from scenarios.plots import ESTIMATE, OTHER, Line, drawing, figure, measured_beside
-from scenarios.report.formatting import fixed
-from scenarios.report.run_results import Results
+from scenarios.report.results.formatting import fixed
+from scenarios.report.results.run_results import Results
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 UNITS = ("mm", "mm", "mm", "mrad", "mrad", "mrad")

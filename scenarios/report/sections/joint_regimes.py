@@ -6,7 +6,7 @@ The model helps a joint where the rms is cut by a tenth or more, and harms it wh
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenarios.report.result_files import Regime
+from scenarios.report.results.result_files import Regime
 
 REGIMES = {
     "repetition": "The same motions again, settled, by models fitted to other repetitions",

@@ -19,8 +19,8 @@ from calibration.stages.joints.correction import JointModels
 from calibration.stages.joints.model import JointModel
 from calibration.stages.joints.samples import Samples, pooled, samples_of
 from scenarios.plots import BACK, FORTH, Flank, drawing, figure, hysteresis
-from scenarios.report.formatting import fixed
-from scenarios.report.run_results import Results
+from scenarios.report.results.formatting import fixed
+from scenarios.report.results.run_results import Results
 from scenarios.report.sections.payload import PUSH
 
 _MOVING = 0.02  # [rad/s]

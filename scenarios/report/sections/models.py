@@ -17,8 +17,8 @@ from scenarios.plots import (
     joint_chain,
     wheeled_base,
 )
-from scenarios.report.ladder import Step
-from scenarios.report.run_results import Results
+from scenarios.report.results.ladder import Step
+from scenarios.report.results.run_results import Results
 from scenarios.report.sections import base_motion, joint_regimes, joints, paper_models, payload
 from scenarios.report.sections import suspension as stiffness
 

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from calibration.stages.joints.model import JointModel
 from calibration.stages.joints.separable_fit import limit_of
-from scenarios.report import figures, formatting
-from scenarios.report.ladder import Step
-from scenarios.report.run_results import Results
+from scenarios.report.results import figures, formatting
+from scenarios.report.results.ladder import Step
+from scenarios.report.results.run_results import Results
 
 MODELS = ("nominal", "model_1", "model_2", "model_3")
 _SOURCES = ("plate", "dynamics", "fixed")  # of the base's motion, the first that is there

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenarios.report.ladder import Step
-from scenarios.report.result_files import TrialErrors
-from scenarios.report.run_results import Results
+from scenarios.report.results.ladder import Step
+from scenarios.report.results.result_files import TrialErrors
+from scenarios.report.results.run_results import Results
 
 _MODELS = ("nominal", "registration", "model_1", "model_2", "model_3", "full")
 PUSH = "push"

@@ -10,7 +10,7 @@ from calibration.inference.parameters import Model
 from calibration.recording.schema import Description
 from calibration.stages.suspension.checks import STAGE
 from calibration.stages.suspension.wheels import Point, wheel_model
-from scenarios.report.run_results import Results
+from scenarios.report.results.run_results import Results
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 _UNITS = {"K": ("N/m", "N", "N.m/rad"), "C": ("N.s/m", "N.s", "N.m.s/rad")}

@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from scenarios.report.formatting import count, error, significant
-from scenarios.report.ladder import BASES, Step, floor, headline_model, oracle_base, predictive
-from scenarios.report.result_files import Row
-from scenarios.report.run_results import Results
+from scenarios.report.results.formatting import count, error, significant
+from scenarios.report.results.ladder import BASES, Step, floor, headline_model, oracle_base, predictive
+from scenarios.report.results.result_files import Row
+from scenarios.report.results.run_results import Results
 
 CLAIM = (
     "All figures are of a synthetic twin. They are predictive unless a row says oracle, and no bias is removed. The "

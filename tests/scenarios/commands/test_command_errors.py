@@ -10,7 +10,7 @@ import pytest
 
 from calibration.errors import CalibrationError, InputError
 from scenarios.commands import main
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from tests.scenarios.commands.stand_ins import YAML, here
 from twin.errors import TwinError
 

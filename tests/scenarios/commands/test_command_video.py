@@ -5,7 +5,7 @@ import json
 import pytest
 
 from scenarios.commands import main
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from scenarios.steps import video
 from twin.rendering.trial_video import ClipOptions, NothingToShow
 
@@ -60,7 +60,7 @@ def test_a_failed_clip_leaves_the_old_file_and_nothing_else(run_folder, tmp_path
         raise NothingToShow("nothing")
 
     monkeypatch.setattr("twin.rendering.trial_video.clip", fails)
-    monkeypatch.setattr("scenarios.steps.run.load", lambda path: __import__("scenarios").load("humanoids2024"))
+    monkeypatch.setattr("scenarios.steps.run_steps.load", lambda path: __import__("scenarios").load("humanoids2024"))
     monkeypatch.setattr("twin.truth.read_trial", lambda path: None)
     with pytest.raises(NothingToShow):
         video.film(run_folder, "xyz", out, ClipOptions())

@@ -14,7 +14,7 @@ from scenarios import load
 from scenarios.datasets.collection import Plan, collect
 from scenarios.datasets.run_spec import Magnitude
 from scenarios.datasets.workers import NoRoom, Workers
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 
 SIZE = 200_000
 

@@ -21,7 +21,7 @@ from scenarios.datasets.index import read_index
 from scenarios.datasets.run_content import recordings, recordings_and_truth
 from scenarios.datasets.run_spec import Magnitude, seed_of
 from scenarios.datasets.workers import Workers
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from twin.errors import TwinError
 
 SCRIPT = Path(__file__).parent / "collection_script.py"
@@ -298,8 +298,8 @@ def test_a_collection_is_read_lazily_with_numpy_and_xarray(recorded):
 
 
 def test_a_run_is_repeated_from_its_own_scenario(tmp_path, recorded):
+    from scenarios import steps
     from scenarios.files import yaml_file
-    from scenarios.steps import run as steps
 
     run = next(recorded.runs())
     scenario = load(run.folder / "scenario.yaml")

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.errors import ScenarioError
-from scenarios.steps import run
+from scenarios import steps
+from scenarios.files.errors import ScenarioError
 
 
 def written(folder: Path, name: str, extends: str, *values: str) -> Path:
@@ -19,12 +19,12 @@ def written(folder: Path, name: str, extends: str, *values: str) -> Path:
 def refused(path: Path, *overrides: str) -> list[str]:
     """Lines of the refusal, without the folder."""
     with pytest.raises(ScenarioError) as info:
-        run.load(path, overrides)
+        steps.load(path, overrides)
     return str(info.value).replace(f"{path.parent}/", "").splitlines()
 
 
 def test_an_extension_is_the_other_scenario_but_for_its_values():
-    other, mine = run.load("humanoids2024"), run.load("payload")
+    other, mine = steps.load("humanoids2024"), steps.load("payload")
     assert mine.name == "payload" and mine.twin.campaign.push == 20.0
     assert mine.twin.arm == other.twin.arm and mine.seed == other.seed
 
@@ -32,7 +32,7 @@ def test_an_extension_is_the_other_scenario_but_for_its_values():
 def test_values_come_one_file_after_the_other_and_the_command_line_last(tmp_path):
     written(tmp_path, "first", "unmodelled", "twin.arm.arm_6_joint.gap: 0.01", "twin.arm.arm_5_joint.gap: 0.01")
     path = written(tmp_path, "second", "first.yaml", "twin.arm.arm_6_joint.gap: 0.02", "seed: 5")
-    mine, other = run.load(path, ["seed=6"]), run.load("unmodelled")
+    mine, other = steps.load(path, ["seed=6"]), steps.load("unmodelled")
     assert (mine.name, mine.description, mine.seed) == ("second", "Mine, second", 6)
     assert [mine.twin.arm[f"arm_{i}_joint"].gap for i in (5, 6)] == [0.01, 0.02]
     assert mine.twin.departures == other.twin.departures and mine.twin.gear_form == "friction_held"

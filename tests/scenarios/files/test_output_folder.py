@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.errors import ScenarioError
 from scenarios.files import output_folder
+from scenarios.files.errors import ScenarioError
 from scenarios.files.output_folder import RUN, replacing, updating
 
 

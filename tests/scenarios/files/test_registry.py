@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from scenarios.errors import ScenarioError
+from scenarios import steps
 from scenarios.files import registry, yaml_file
-from scenarios.steps import run
+from scenarios.files.errors import ScenarioError
 
 
 def mappings(node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -31,16 +31,16 @@ def raw(name: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", registry.names())
 def test_a_scenario_is_named_after_its_file_and_described_in_a_line(name):
-    scenario = run.load(name)
+    scenario = steps.load(name)
     assert scenario.name == name
     assert 0 < len(scenario.description.splitlines()) == 1
 
 
 @pytest.mark.parametrize("name", registry.names())
 def test_what_a_run_saves_of_a_scenario_is_that_scenario(name, tmp_path: Path):
-    for scenario in (run.load(name), run.load(name).quick()):
-        yaml_file.write(tmp_path / "scenario.yaml", scenario, beside={"versions": run.versions()})
-        assert run.load(tmp_path / "scenario.yaml") == scenario
+    for scenario in (steps.load(name), steps.load(name).quick()):
+        yaml_file.write(tmp_path / "scenario.yaml", scenario, beside={"versions": steps.versions()})
+        assert steps.load(tmp_path / "scenario.yaml") == scenario
 
 
 @pytest.mark.parametrize("name", [n for n in registry.names() if "extends" not in raw(n)])
@@ -48,7 +48,7 @@ def test_an_unknown_field_is_refused_wherever_it_stands(name):
     """Beside the mappings whose keys are names of the user's, where it must be refused as a value."""
     overrides = [".".join((*path, "unheard_of")) + "=1" for path in mappings(raw(name))]
     with pytest.raises(ScenarioError) as info:
-        run.load(name, overrides)
+        steps.load(name, overrides)
     told = {line.split()[1].rstrip(":") for line in str(info.value).splitlines()}
     assert {override.removesuffix("=1") for override in overrides} <= told
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from scenarios.errors import ScenarioError
 from scenarios.files import registry, yaml_file
+from scenarios.files.errors import ScenarioError
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 

@@ -1,4 +1,4 @@
-from scenarios.report.ladder import Step
+from scenarios.report.results.ladder import Step
 from scenarios.report.sections.paper_models import paper_steps, readable
 
 

@@ -12,12 +12,13 @@ from calibration.errors import InputError
 from calibration.evaluation.ladder import ladder
 from calibration.verdict import Verdict
 from scenarios.commands import main
-from scenarios.errors import ScenarioError
-from scenarios.report import figures, write
-from scenarios.report.formatting import cell, count, decimals, error, fixed, readable, significant
-from scenarios.report.ladder import Step, headline_model
-from scenarios.report.ladder import ladder as ordered
-from scenarios.report.run_results import read
+from scenarios.files.errors import ScenarioError
+from scenarios.report import write
+from scenarios.report.results import figures
+from scenarios.report.results.formatting import cell, count, decimals, error, fixed, readable, significant
+from scenarios.report.results.ladder import Step, headline_model
+from scenarios.report.results.ladder import ladder as ordered
+from scenarios.report.results.run_results import read
 from tests.doubles.html_page import Page
 from tests.doubles.run_folder import (
     PIXEL,

@@ -22,9 +22,9 @@ from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Suspension
 from calibration.verdict import Verdict
 from scenarios.report import write
-from scenarios.report.formatting import fixed
-from scenarios.report.result_files import Regime
-from scenarios.report.run_results import read
+from scenarios.report.results.formatting import fixed
+from scenarios.report.results.result_files import Regime
+from scenarios.report.results.run_results import read
 from scenarios.report.sections import base_motion, joint_regimes, suspension
 from scenarios.report.sections import joints as loops
 from scenarios.report.sections import payload as loads

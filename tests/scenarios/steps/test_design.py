@@ -18,8 +18,8 @@ from calibration.errors import InputError
 from calibration.recording.experiment import read_remedies, to_text
 from calibration.stages.geometry.parameters import geometry_parameters
 from scenarios import load
-from scenarios.errors import ScenarioError
 from scenarios.files import yaml_file
+from scenarios.files.errors import ScenarioError
 from scenarios.steps.design import design, recording, recording_too
 from tests.doubles import rigid_robot
 from twin.campaign.dataset_description import declaration

@@ -8,7 +8,7 @@ from scenarios import load
 from scenarios.commands.main import app
 from scenarios.datasets.index import Row
 from scenarios.datasets.run_spec import Magnitude, run_name
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from scenarios.studies import statistics
 from scenarios.studies.matched_run import matched
 

@@ -2,15 +2,15 @@
 
 import pytest
 
-from scenarios.errors import ScenarioError
-from scenarios.steps import run
+from scenarios import steps
+from scenarios.files.errors import ScenarioError
 
 AT_REST = [0.1, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 
 def refused(*overrides: str) -> list[str]:
     with pytest.raises(ScenarioError) as info:
-        run.load("humanoids2024", overrides)
+        steps.load("humanoids2024", overrides)
     return str(info.value).splitlines()
 
 
@@ -20,7 +20,7 @@ def test_postures_beyond_the_joints_limits_are_told_by_joint_value_and_limits():
     assert first == "--set twin.campaign.given_postures.1.0: torso_lift_joint goes from 0.0 to 0.35 (got 0.36)"
     assert second.startswith("--set twin.campaign.given_postures.2.6: arm_6_joint goes from -1.41371669411540")
     at_limits = [0.35, 0.0, *AT_REST[2:]]
-    assert run.load("humanoids2024", [f"twin.campaign.given_postures={[at_limits]}"])
+    assert steps.load("humanoids2024", [f"twin.campaign.given_postures={[at_limits]}"])
 
 
 @pytest.mark.parametrize("name", ["robot_rate", "mocap_rate", "plate_rate"])

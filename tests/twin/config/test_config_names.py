@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mjcf
-from scenarios.errors import ScenarioError
-from scenarios.steps import run
+from scenarios import steps
+from scenarios.files.errors import ScenarioError
 from twin.campaign.robot import cluster
 from twin.config.names import ARM, TORSO, links
 from twin.motions.swings import JOINTS
@@ -26,7 +26,7 @@ def refused(folder: Path, *values: str) -> list[str]:
     text = "name: mine\ndescription: Mine\nextends: humanoids2024\nset:\n" + "".join(f"  {line}\n" for line in values)
     (folder / "mine.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(ScenarioError) as info:
-        run.load(folder / "mine.yaml")
+        steps.load(folder / "mine.yaml")
     return str(info.value).replace(f"{folder}/", "").splitlines()
 
 
@@ -88,7 +88,7 @@ def test_friction_that_nothing_holds_is_refused(tmp_path):
 @pytest.mark.parametrize("markers", [{"m": (0.01, 0.02, 0.1)}, {"m": (0.01, 0.0, 0.1), "n": (0.01, 0.0, 0.1)}])
 def test_a_body_whose_markers_tell_no_rotation_is_mounted(markers):
     """What one marker is off is where its body is; two of one nominal place are off against each other alone."""
-    body = replace(run.load("humanoids2024").twin.instruments.bodies["gripper"], markers=markers, marker=1e-3)
+    body = replace(steps.load("humanoids2024").twin.instruments.bodies["gripper"], markers=markers, marker=1e-3)
     mounted = cluster("gripper", body, 0)
     np.testing.assert_allclose(mounted.shift.sum(axis=0), 0.0, atol=1e-15)
     assert (np.abs(mounted.shift).max() > 1e-4) == (len(markers) > 1)

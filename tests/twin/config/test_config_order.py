@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from scenarios import load
-from scenarios.errors import ScenarioError
 from scenarios.files import yaml_file
+from scenarios.files.errors import ScenarioError
 from twin.campaign.laboratory import laboratory  # noqa: PLC2701
 from twin.campaign.measure import measure
 from twin.campaign.record import _states

@@ -7,8 +7,8 @@ import pytest
 
 import mjcf
 from scenarios import load
-from scenarios.errors import ScenarioError
 from scenarios.files import yaml_file
+from scenarios.files.errors import ScenarioError
 from twin.campaign.dataset_description import declaration
 from twin.campaign.laboratory import laboratory
 from twin.config.distributions import Distribution, Uncertain, drawn

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from scenarios import load
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from twin import truth
 from twin.campaign.laboratory import laboratory
 from twin.motions import motion

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios import load
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from twin.campaign.laboratory import laboratory
 from twin.campaign.measure import measure  # noqa: PLC2701
 from twin.campaign.record import _in_trial, _states

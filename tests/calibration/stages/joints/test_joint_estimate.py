@@ -16,7 +16,7 @@ from calibration.stages.joints.model import JointModel
 from calibration.stages.joints.separable_fit import RHO
 from calibration.stages.joints.stage import fit_joint_models, joints_model
 from scenarios import load as load_scenario
-from scenarios.errors import ScenarioError
+from scenarios.files.errors import ScenarioError
 from tests.doubles import joint_data, rigid_robot
 from tests.doubles.joint_data import ROBOT
 

@@ -13,10 +13,10 @@ from ruamel.yaml.error import YAMLError
 
 import calibration
 from calibration.recording.schema import Description
-from scenarios.errors import ScenarioError
-from scenarios.report.result_files import Derived, Evaluation, ScenarioNote, Score, Truth
-from scenarios.report.sections.recordings import Recorded, recorded
-from scenarios.report.traces import Trace, read_traces
+from scenarios.files.errors import ScenarioError
+from scenarios.report.results.recordings import Recorded, recorded
+from scenarios.report.results.result_files import Derived, Evaluation, ScenarioNote, Score, Truth
+from scenarios.report.results.traces import Trace, read_traces
 
 M = TypeVar("M", bound=BaseModel)
 

@@ -11,9 +11,9 @@ import numpy as np
 from calibration import Estimate
 from calibration.inference.parameters import Model
 from scenarios.plots import Interval
-from scenarios.report.formatting import readable
-from scenarios.report.result_files import Score
-from scenarios.report.run_results import Results
+from scenarios.report.results.formatting import readable
+from scenarios.report.results.result_files import Score
+from scenarios.report.results.run_results import Results
 
 KINDS = {
     "frame": "marker frames",

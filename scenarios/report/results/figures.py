@@ -20,10 +20,10 @@ from scenarios.plots import (
     intervals,
     z_histogram,
 )
-from scenarios.report.ladder import Step, floor, headline_model, oracle_base, predictive
-from scenarios.report.run_results import Results
-from scenarios.report.sections.parameters import Known, groups
-from scenarios.report.traces import Trace
+from scenarios.report.results.ladder import Step, floor, headline_model, oracle_base, predictive
+from scenarios.report.results.parameters import Known, groups
+from scenarios.report.results.run_results import Results
+from scenarios.report.results.traces import Trace
 
 WIDTH = 10.0  # [inch], as wide as the page
 _ORIENTATION = "orientation error [deg]"

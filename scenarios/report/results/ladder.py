@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from scenarios.report.result_files import Row
-from scenarios.report.run_results import Results
+from scenarios.report.results.result_files import Row
+from scenarios.report.results.run_results import Results
 
 MEANINGS = {
     "nominal": "datasheet geometry, marker bodies where the drawing says",

@@ -8,7 +8,7 @@ import numpy as np
 
 from calibration.recording import netcdf
 from calibration.recording.schema import Description, TrialEntry
-from scenarios.report.formatting import fixed, significant
+from scenarios.report.results.formatting import fixed, significant
 
 
 @dataclass(frozen=True)

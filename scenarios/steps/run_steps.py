@@ -14,8 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenarios.errors import ScenarioError
 from scenarios.files import output_folder as folder
+from scenarios.files.errors import ScenarioError
 from scenarios.steps.threads import one_blas_thread
 
 if TYPE_CHECKING:
