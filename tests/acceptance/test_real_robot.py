@@ -14,7 +14,7 @@ GOALS = {"BL": 2.9, "all": 3.6}  # [mm] one and four points, set beforehand for 
 
 
 def parts(kind: str, q: np.ndarray) -> list[np.ndarray]:
-    """What is left out, as in docs/geometry.md."""
+    """What is left out, as in docs/results/geometry.md."""
     n, kinds = (
         len(q),
         {

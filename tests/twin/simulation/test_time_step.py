@@ -56,7 +56,7 @@ def test_halving_the_step_changes_a_trial_by_less_than_a_hundredth():
 @pytest.mark.parametrize("ground", ["contact", "anchored", "turning"])
 @pytest.mark.parametrize("name", ["xyz", "xyz_mirror", "around_z", "x_fold"])
 def test_steps(ground, name):
-    """The table of docs/physics.md."""
+    """The table of docs/results/physics.md."""
     steps = (1e-3, 5e-4, 2.5e-4)
     runs = {h: observed(h, name, ground) for h in (*steps, steps[-1] / 2.0)}
     for h in steps:
