@@ -11,10 +11,8 @@ from scenarios.commands.main import app
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = sorted(
-    path.relative_to(ROOT).as_posix()
-    for path in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("mjcf/*.md")]
-)
+FOUND = (path for pattern in ("*.md", "docs/**/*.md", "mjcf/*.md") for path in ROOT.glob(pattern))
+PAGES = sorted(path.relative_to(ROOT).as_posix() for path in FOUND)
 
 
 def blocks(text: str, language: str) -> list[str]:
