@@ -1,0 +1,72 @@
+"""Runs of the default scenario on many robots, and the figures of their score.json."""
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenarios import load, run
+
+SAMPLED = ("twin.widths.spread=0.5",)
+"""Every gap, friction, stiffness, offset and wheel sampled, not the default robot's."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A row of the ladder: what predicts, where the base's motion is from, which encoder, which trials."""
+
+    model: str
+    base: str = "plate"
+    encoder: str = "motor"
+    trials: str = "dynamic"
+
+
+@dataclass(frozen=True)
+class Series:
+    """The scores of several robots.
+
+    Attributes:
+        seeds: Of the robots.
+        scores: Content of each score.json.
+    """
+
+    seeds: tuple[int, ...]
+    scores: tuple[dict, ...]
+
+    def figures(self, key: Key, name: str = "position_rmse_component_mm") -> np.ndarray:
+        """One figure of a row, by robot."""
+        return np.array([_row(score, key)[name] for score in self.scores])
+
+    def base_r2(self, axis: str, source: str = "plate") -> np.ndarray:
+        """R2 of the base's predicted motion about an axis over the validation swings, by robot."""
+        return np.array(
+            [next(b for b in score["base"] if b["source"] == source)[f"{axis}_r2"] for score in self.scores]
+        )
+
+
+def _row(score: dict, key: Key) -> dict:
+    found = [
+        row
+        for row in score["rows"]
+        if (row["model"], row["base"], row["encoder"], row["trials"]) == (key.model, key.base, key.encoder, key.trials)
+    ]
+    assert found, f"score.json has no row {key}"
+    return found[0]
+
+
+def series(
+    folder: Path, seeds: Iterable[int], overrides: tuple[str, ...] = (), scenario: str = "humanoids2024"
+) -> Series:
+    """Run a scenario on each seed; what was run before in that folder is read."""
+    seeds = tuple(seeds)
+    return Series(seeds, tuple(_scores(folder, seeds, overrides, scenario)))
+
+
+def _scores(folder: Path, seeds: tuple[int, ...], overrides: tuple[str, ...], scenario: str) -> Iterator[dict]:
+    for seed in seeds:
+        out = folder / f"{scenario}_{seed}"
+        if not (out / "score.json").is_file():
+            run(load(scenario, (f"seed={seed}", *overrides)), out=out)
+        yield json.loads((out / "score.json").read_text(encoding="utf-8"))
