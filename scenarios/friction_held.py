@@ -1,0 +1,6 @@
+"""Drive trains of the other form: backlash held by friction, a hysteretic mesh."""
+
+from scenarios import load, run
+
+if __name__ == "__main__":
+    run(load("friction_held"), out="runs/friction_held")
