@@ -1,13 +1,20 @@
-"""What a laboratory would run: recordings and a nominal URDF in, an estimate with its uncertainty out."""
+"""What a laboratory would run: recordings and a nominal URDF in, an estimate with its uncertainty out.
 
-from calibration.errors import CalibrationError
-from calibration.estimate.estimate import Estimate
-from calibration.estimate.files import load_estimate, save_estimate
-from calibration.evaluation.evaluate import Evaluation, evaluate
-from calibration.pipeline import calibrate
-from calibration.prediction.compensator import Compensator
-from calibration.prediction.predictor import Prediction, predictions
-from calibration.recording.dataset import Dataset, load
+Names are imported when they are first used, so that `calibration.recording` alone does not load Pinocchio.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from calibration.errors import CalibrationError
+    from calibration.estimate.estimate import Estimate
+    from calibration.estimate.files import load_estimate, save_estimate
+    from calibration.evaluation.evaluate import Evaluation, evaluate
+    from calibration.pipeline import calibrate
+    from calibration.prediction.compensator import Compensator
+    from calibration.prediction.predictor import Prediction, predictions
+    from calibration.recording.dataset import Dataset, load
 
 __all__ = [
     "CalibrationError",
@@ -23,3 +30,22 @@ __all__ = [
     "predictions",
     "save_estimate",
 ]
+
+_MODULES = {
+    "errors": ("CalibrationError",),
+    "estimate.estimate": ("Estimate",),
+    "estimate.files": ("load_estimate", "save_estimate"),
+    "evaluation.evaluate": ("Evaluation", "evaluate"),
+    "pipeline": ("calibrate",),
+    "prediction.compensator": ("Compensator",),
+    "prediction.predictor": ("Prediction", "predictions"),
+    "recording.dataset": ("Dataset", "load"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, from the module that defines it."""
+    for module, names in _MODULES.items():
+        if name in names:
+            return getattr(import_module(f"calibration.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,10 +7,10 @@ from functools import reduce
 from calibration.errors import NotEnoughData
 from calibration.estimate.estimate import Estimate, with_clocks
 from calibration.inference.parameters import Model
-from calibration.mocap.postures import Postures, mean_postures, read_passing, read_postures
+from calibration.mocap.postures import Postures, mean_postures, passing_postures, static_postures
 from calibration.recording.clock import Clock
 from calibration.recording.dataset import Dataset
-from calibration.recording.experiment import Remedy
+from calibration.recording.experiment import ExperimentPlan
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial
@@ -57,7 +57,7 @@ class Work:
         grown = replace(e, models=(*e.models, with_clocks(model, self.clocks)), verdicts=(*e.verdicts, *said), **parts)  # type: ignore[arg-type]
         return replace(self, estimate=grown)
 
-    def suggesting(self, remedy: Remedy | None, said: Sequence[Verdict]) -> "Work":
+    def suggesting(self, remedy: ExperimentPlan | None, said: Sequence[Verdict]) -> "Work":
         """With something to record next, if there is."""
         work = self.saying(*said)
         remedies = work.estimate.remedies if remedy is None else (*work.estimate.remedies, remedy)
@@ -74,9 +74,9 @@ def with_postures(work: Work, pairs: Sequence[tuple[TrialEntry, Trial]], means: 
     passing = None
     if robot is not None:
         if any(len(trial.dwell_start) for trial in work.trials) or not found:
-            found.append(read_postures(work.description, work.trials, robot))
+            found.append(static_postures(work.description, work.trials, robot))
         swings = [trial for entry, trial in pairs if entry.kind == "swing"]
-        passing = read_passing(work.description, swings, robot, _SPACING) if swings else None
+        passing = passing_postures(work.description, swings, robot, _SPACING) if swings else None
     postures = reduce(Postures.joined, found) if found else None
     return replace(work, postures=postures, passing=passing)
 

@@ -16,6 +16,7 @@ from calibration.design.next_postures import record_next
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
 from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.inference.parameters import Model
+from calibration.mocap.labels import relabelled_trials
 from calibration.options import Options
 from calibration.recording.dataset import Dataset
 from calibration.robot.chain import chain_of
@@ -60,7 +61,7 @@ def calibrate(
     tell = progress or (lambda stage, share: None)
     chain = chain_of(dataset.urdf, dataset.description)
     tell("reading", 0.0)
-    pairs, means = tuple(dataset.trials("calibration")), tuple(m for _, m in dataset.means("calibration"))
+    pairs, means = tuple(relabelled_trials(dataset, "calibration")), tuple(m for _, m in dataset.means("calibration"))
     trials = tuple(trial for _, trial in pairs)
     if not trials and not means:
         raise InputError(
@@ -116,7 +117,7 @@ def _register(work: Work) -> Work:
 
 
 def _locate_base(work: Work) -> Work:
-    moves = [(entry.kind, trial) for entry, trial in work.dataset.trials("calibration", *MOVES)]
+    moves = [(entry.kind, trial) for entry, trial in relabelled_trials(work.dataset, "calibration", *MOVES)]
     if not moves:
         work = work.saying(Verdict("base_frame", "missing", "no trial of kind spin: T_base_B stays as drawn"))
         return work.suggesting(*drive_next(work.chain, work.description, None, None))

@@ -1,1 +1,6 @@
-"""What recordings cannot be: wrong units, joints, plates, currents."""
+"""What makes recordings implausible: units, marker bodies, joint columns, force plates."""
+
+from calibration.checks.joint_columns import wrong_links
+from calibration.checks.recordings import implausible_inputs
+
+__all__ = ["implausible_inputs", "wrong_links"]

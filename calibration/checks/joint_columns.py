@@ -33,7 +33,7 @@ from calibration.mocap.postures import mean_postures
 from calibration.numerics.alignment import hand_eye, registration_start
 from calibration.numerics.lie import inverse
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Description, base_body, hand_body
+from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
 from calibration.verdict import Verdict
@@ -89,7 +89,7 @@ def _shown(description: Description, file: str, trial: Trial | PostureMeans) -> 
         return Shown(file, postures.T_base_hand, none, postures.q, none, postures.components == 6)
     if len(trial.t_robot) < 2 or not len(trial.marker):
         raise NotEnoughData("readings or markers are missing")
-    bodies = base_body(description), hand_body(description)
+    bodies = description.base_body, description.hand_body
     mended = with_right_labels(bodies, trial)[0]
     base, hand = (poses_of(body, mended) for body in bodies)
     return Shown(file, inverse(base.T) @ hand.T, trial.t_mocap, trial.q_motor, trial.t_robot)

@@ -16,7 +16,7 @@ import numpy as np
 
 from calibration.design.collisions import Shapes
 from calibration.errors import NotEnoughData
-from calibration.recording.schema import Body, Description, base_body, hand_body
+from calibration.recording.schema import Body, Description
 from calibration.robot.nominal_frames import METRES_PER_RAD
 
 MARGIN = 0.1  # inside the limits [rad, a tenth of it in m]
@@ -102,7 +102,7 @@ def in_sight(shapes: Shapes, description: Description, q: np.ndarray, cameras: n
         part = q[k : k + _CHUNK]
         T, half = shapes.boxes(part)
         seen = np.ones(len(part), dtype=bool)
-        for body in (b for b in (base_body(description), hand_body(description)) if b.markers):
+        for body in (b for b in (description.base_body, description.hand_body) if b.markers):
             count = (visible(markers_at(shapes, body, part), eyes, T, half).sum(axis=2) >= _FEWEST_CAMERAS).sum(axis=1)
             seen &= count >= min(_FEWEST_MARKERS, len(body.markers))
         found.append(seen)

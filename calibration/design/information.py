@@ -28,7 +28,7 @@ import numpy as np
 from calibration.inference.parameters import ParameterSet
 from calibration.mocap.cluster_pose import body_poses
 from calibration.numerics.lie import adjoint, inverse, moved
-from calibration.recording.schema import Body, Description, base_body, hand_body, is_point, point_of
+from calibration.recording.schema import Body, Description
 from calibration.robot.chain import Chain
 from calibration.robot.gravity import gravity_moments
 from calibration.robot.hand import HandModel, HandPoses
@@ -126,16 +126,16 @@ def _whitened(
     """W (n, d, d), derivatives by parameters and by joints of what a dwell measures: a pose, or lone markers' place."""
     S, J, J_joint = dwell_noise(found.T, description), found.J, found.J_joint
     if S.shape[1] == 3:
-        R, c = found.T[:, :3, :3], point_of(hand_body(description))
+        R, c = found.T[:, :3, :3], description.hand_body.point
         J, J_joint = moved(R, J, c), moved(R, J_joint, c)
     return np.linalg.inv(np.linalg.cholesky(S + (J_joint * play**2) @ np.swapaxes(J_joint, 1, 2))), J, J_joint
 
 
 def dwell_noise(T: np.ndarray, description: Description) -> np.ndarray:
     """Covariance (n, 6, 6) of a dwell's hand poses T (n, 4, 4) by the markers; (n, 3, 3) of a point's place."""
-    hand, Ad = hand_body(description), adjoint(inverse(T))
-    S = Ad @ _cluster(base_body(description), description) @ np.swapaxes(Ad, 1, 2)
-    if not is_point(hand):
+    hand, Ad = description.hand_body, adjoint(inverse(T))
+    S = Ad @ _cluster(description.base_body, description) @ np.swapaxes(Ad, 1, 2)
+    if not hand.is_point:
         return np.asarray(S + _cluster(hand, description))
     R, n = T[:, :3, :3], SAMPLES * len(hand.markers)
     return np.asarray(R @ S[:, :3, :3] @ np.swapaxes(R, 1, 2) + description.sigmas.marker**2 / n * np.eye(3))
@@ -181,7 +181,7 @@ def departing(
     W, *_ = _whitened(found, description, play)
     G = departures.effects(model, told.q, found)
     if W.shape[1] == 3:
-        G = moved(found.T[:, :3, :3], G, point_of(hand_body(description)))
+        G = moved(found.T[:, :3, :3], G, description.hand_body.point)
     return replace(told, H=W @ G, Z=departures.effects(model, at, there)[:, :3])
 
 

@@ -34,8 +34,8 @@ from calibration.design.information import SAMPLES
 from calibration.inference.parameters import Model
 from calibration.mocap.cluster_pose import body_poses
 from calibration.numerics.lie import compose, from_vector, inverse
-from calibration.recording.experiment import Motion, Remedy, Sigma
-from calibration.recording.schema import Description, base_body
+from calibration.recording.experiment import ExperimentPlan, Motion, Sigma
+from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
 from calibration.robot.nominal_frames import AXES, frame_names, nominal_frames
 from calibration.stages.frames.base_rests import Stations, from_planar
@@ -61,7 +61,7 @@ _SECONDS, _HERTZ = 25.0, 0.2  # of a swing
 
 def drive_next(
     chain: Chain, description: Description, stations: Stations | None, model: Model | None
-) -> tuple[Remedy | None, tuple[Verdict, ...]]:
+) -> tuple[ExperimentPlan | None, tuple[Verdict, ...]]:
     """Motions to record after `model` from `stations`, both None where there are none; None where none is missing."""
     kinds = () if stations is None or model is None else stations.kinds
     motions = tuple(m for m in (SPIN, DRIVE) if m.kind not in kinds)
@@ -81,7 +81,7 @@ def drive_next(
     rows = [(a, p) for a, p in zip(AXES, found.parameters, strict=False) if p.status == "estimated"]
     sigma = tuple(Sigma(p.name, p.unit, before[a], p.sigma) for a, p in rows if p.sigma < 0.99 * before[a])
     why = f"{name} is held at its drawing in what only a {' and a '.join(m.kind for m in motions)} tell"
-    remedy = Remedy(STAGE, why, motions=motions, sigma=sigma)
+    remedy = ExperimentPlan(STAGE, why, motions=motions, sigma=sigma)
     told = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in sigma)
     steps = " and ".join(f"a {m.kind} of {m.rests} rests" for m in motions)
     return remedy, (Verdict(STAGE, "warning", f"{why}; {steps} would, in record_next.yaml: {told}"),)
@@ -91,7 +91,7 @@ def _planned(
     description: Description, base: np.ndarray, motions: tuple[Motion, ...], recorded: Stations | None
 ) -> Stations:
     """The recorded stations with those of motions from the first of them on, the markers at T_base_B = base (6,)."""
-    body, n = base_body(description), sum(m.rests for m in motions)
+    body, n = description.base_body, sum(m.rests for m in motions)
     xyz = np.array([m.xyz for m in body.markers])
     S = body_poses(xyz, xyz[None]).covariance * description.sigmas.marker**2 / SAMPLES
     if recorded is not None:
@@ -130,7 +130,7 @@ def _path(motion: Motion) -> np.ndarray:
     return np.column_stack([zero, zero, along] if motion.kind == "spin" else [along, zero, zero])
 
 
-def sweeps_next(models: Sequence[JointModel]) -> tuple[Remedy | None, tuple[Verdict, ...]]:
+def sweeps_next(models: Sequence[JointModel]) -> tuple[ExperimentPlan | None, tuple[Verdict, ...]]:
     """Sweeps for the joint models whose rho is at a limit; None where there is none, or none would help."""
     motions, sigma, beyond = [], [], []
     for model in (m for m in models if m.powers and limit_of(m.rho)):
@@ -150,7 +150,7 @@ def sweeps_next(models: Sequence[JointModel]) -> tuple[Remedy | None, tuple[Verd
     why = f"rho is not identifiable in {', '.join(m.joint for m in motions)}"
     told = ", ".join(f"{s.name} {s.before:.0f} -> {s.after:.2g} {s.unit}" for s in sigma)
     said.append(Verdict(_JOINTS, "warning", f"{why}; sweeps that would tell, in record_next.yaml: {told}"))
-    return Remedy(_JOINTS, why, motions=tuple(motions), sigma=tuple(sigma)), tuple(said)
+    return ExperimentPlan(_JOINTS, why, motions=tuple(motions), sigma=tuple(sigma)), tuple(said)
 
 
 def sweep(model: JointModel) -> Motion:
@@ -178,7 +178,7 @@ def predicted_sigma(model: JointModel, motion: Motion) -> float:
     return float(model.quality.residual * np.sqrt(together * np.linalg.inv(H)[0, 0]) / scale[0])
 
 
-def swings_next(suspension: Suspension) -> tuple[Remedy | None, tuple[Verdict, ...]]:
+def swings_next(suspension: Suspension) -> tuple[ExperimentPlan | None, tuple[Verdict, ...]]:
     """Swings for the elements that scatter between trials; None where there is none, or too many would be needed."""
     held_out = suspension.held_out[0][1]
     n, slips = len(held_out.error), held_out.slips
@@ -215,4 +215,4 @@ def swings_next(suspension: Suspension) -> tuple[Remedy | None, tuple[Verdict, .
         Verdict(_SUSPENSION, "warning", f"{why}; {m} more swings like the {n} recorded would tell, in record_next.yaml")
     )
     motions = (Motion("swing", repeats=m, frequency=_HERTZ, seconds=_SECONDS),)
-    return Remedy(_SUSPENSION, why, motions=motions, sigma=sigma), tuple(said)
+    return ExperimentPlan(_SUSPENSION, why, motions=motions, sigma=sigma), tuple(said)

@@ -30,7 +30,7 @@ from calibration.errors import NotEnoughData
 from calibration.inference.marginal_likelihood import Widths, evidence
 from calibration.inference.parameters import Model, ParameterSet
 from calibration.mocap.postures import Postures
-from calibration.recording.experiment import Remedy, Sigma
+from calibration.recording.experiment import ExperimentPlan, Sigma
 from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel, nominal_hand
@@ -75,7 +75,7 @@ class Known:
 
 def record_next(
     urdf: str, chain: Chain, description: Description, postures: Postures, model: Model, refused: bool
-) -> tuple[Remedy | None, tuple[Verdict, ...]]:
+) -> tuple[ExperimentPlan | None, tuple[Verdict, ...]]:
     """Postures to record after the geometry `model` from `postures`; None where they would tell nothing new."""
     rng = np.random.default_rng(_SEED)
     known = _known(chain, description, postures, model, refused, rng)
@@ -141,7 +141,7 @@ def _as_measured(description: Description, postures: Postures) -> Description:
     return description.model_copy(update={"sigmas": description.sigmas.model_copy(update={"marker": sigma})})
 
 
-def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> Remedy:
+def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> ExperimentPlan:
     """The postures with what they do to the hand, to what was lost, and to what they tell most."""
     hand = [float(found.design.prospect.hand(C).max()) for C in (found.design.prospect.C, found.design.C)]
     whole = found.remedy(STAGE, "").sigma

@@ -17,7 +17,7 @@ from calibration.design.exchange import Criterion, choose
 from calibration.design.information import Departures, Prospect, departing, departures_of, prospect
 from calibration.design.sequence import Sides, Tour, sides, tour
 from calibration.inference.parameters import ParameterSet
-from calibration.recording.experiment import Posture, Remedy, Sigma
+from calibration.recording.experiment import ExperimentPlan, Posture, Sigma
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
@@ -146,12 +146,12 @@ class Plan:
         rows = zip(q[self.tour.order], approach[self.tour.order], strict=True)
         return tuple(Posture(tuple(map(float, a)), tuple(int(s) for s in b)) for a, b in rows)  # type: ignore[misc]
 
-    def remedy(self, stage: str, why: str, names: tuple[str, ...] | None = None) -> Remedy:
+    def remedy(self, stage: str, why: str, names: tuple[str, ...] | None = None) -> ExperimentPlan:
         """The postures with the standard deviations of these parameters (all, where none is named)."""
         p, prospect_ = self.task.parameters, self.design.prospect
         rows = zip(p.names, p.units, prospect_.sigma(prospect_.C), prospect_.sigma(self.design.C), strict=True)
         told = tuple(Sigma(n, u, float(a), float(b)) for n, u, a, b in rows if names is None or n in names)
-        return Remedy(stage, why, self.postures, sigma=told)
+        return ExperimentPlan(stage, why, self.postures, sigma=told)
 
 
 def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> Plan:

@@ -10,7 +10,7 @@ from calibration.errors import NoSuchElement
 from calibration.inference.parameters import Model, Parameter
 from calibration.options import Options
 from calibration.recording.clock import Clock
-from calibration.recording.experiment import Remedy
+from calibration.recording.experiment import ExperimentPlan
 from calibration.recording.schema import Description
 from calibration.verdict import Verdict
 
@@ -60,7 +60,7 @@ class Estimate:
     link_zero: tuple[float, ...] = ()
     options: Options = field(default_factory=Options)
     laboratory: Description | None = None
-    remedies: tuple[Remedy, ...] = ()
+    remedies: tuple[ExperimentPlan, ...] = ()
 
     def model(self, name: str) -> Model:
         """The model of that name.

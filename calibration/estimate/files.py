@@ -35,7 +35,7 @@ from calibration.estimate.json_schema import EstimateFile, to_estimate, to_file
 from calibration.estimate.tables import parameters_text, zeros_text
 from calibration.inference.parameters import Model
 from calibration.recording import netcdf
-from calibration.recording.experiment import read_remedies, to_text
+from calibration.recording.experiment import plans_text, read_plans
 from calibration.robot.chain import Chain, chain_of_frames
 from calibration.stages.geometry.model_of_fit import hand_of
 
@@ -55,7 +55,7 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
     for name in (CALIBRATED, ZEROS, TABLE, NEXT):
         (folder / name).unlink(missing_ok=True)
     if estimate.remedies and estimate.robot is not None:
-        _replace_text(folder / NEXT, to_text(estimate.robot.joints, estimate.remedies))
+        _replace_text(folder / NEXT, plans_text(estimate.robot.joints, estimate.remedies))
     if estimate.calibrated and estimate.urdf is not None and estimate.robot is not None:
         chain = chain_of_frames(
             estimate.urdf, estimate.robot.joints, estimate.robot.base_frame, estimate.robot.tool_frame
@@ -89,7 +89,7 @@ def load_estimate(path: Path | str) -> Estimate:
     nominal = file.parent / NOMINAL
     urdf = _text(nominal) if nominal.is_file() else None
     suggested = file.parent / NEXT
-    remedies = read_remedies(suggested)[1] if suggested.is_file() else ()
+    remedies = read_plans(suggested)[1] if suggested.is_file() else ()
     return replace(to_estimate(found, urdf, _read_covariances(file.parent / COVARIANCES)), remedies=remedies)
 
 

@@ -26,14 +26,15 @@ from calibration.evaluation.ladder import Row, Trace, Trials, ladder, row_entry,
 from calibration.evaluation.marker_errors import PointRow, point_rows
 from calibration.evaluation.pose_errors import PoseErrors, pose_errors
 from calibration.evaluation.protocols import protocol_rows
-from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.cluster_pose import point_of_means, poses_of, poses_of_means
+from calibration.mocap.labels import relabelled_trial, relabelled_trials
 from calibration.numerics.lie import inverse, mean, places, to_vector
 from calibration.prediction.predictor import Prediction, Predictor, predictor
 from calibration.prediction.second_session import registration_trials, reregistered
 from calibration.recording import netcdf
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Body, Description, Role, TrialEntry, base_body, hand_body, is_point, point_of
+from calibration.recording.schema import Body, Description, Role, TrialEntry
 from calibration.recording.trial import REST, Trial
 from calibration.stages.frames.base_rests import MOVES
 from calibration.stages.suspension.checks import moved_by
@@ -49,7 +50,7 @@ def _traces(
     progress: Callable[[str, float], None] | None,
 ) -> list[Trace]:
     """Errors of every row in each of these trials."""
-    body, traces = hand_body(dataset.description), []
+    body, traces = dataset.description.hand_body, []
     for k, entry in enumerate(entries):
         if progress is not None:
             progress(f"evaluating {entry.id}", k / len(entries))
@@ -57,7 +58,7 @@ def _traces(
             means = dataset.read_means(entry)
             traces += [_means_trace(p, _means_errors(p, body, means)) for p in predict.of_means(entry, means)]
             continue
-        trial = dataset.read(entry)
+        trial = relabelled_trial(dataset, entry)
         T_measured = poses_of(body, trial).T
         traces += [_trace(p, trial, pose_errors(p.T_lab_hand, T_measured)) for p in predict(entry, trial)]
     return traces
@@ -69,8 +70,8 @@ def regimes(predict: Predictor, dataset: Dataset, role: Role = "validation") -> 
     if joints is None or predict.robot is None:
         return ()
     terms = joints.models[0].terms
-    again = on_repetitions(joints, (trial for _, trial in dataset.trials("calibration")), terms)
-    return (*again, *on_validation(joints, (trial for _, trial in dataset.trials(role)), predict.robot))
+    again = on_repetitions(joints, (trial for _, trial in relabelled_trials(dataset, "calibration")), terms)
+    return (*again, *on_validation(joints, (trial for _, trial in relabelled_trials(dataset, role)), predict.robot))
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def evaluate(
     if progress is not None:
         progress("joint models", 1.0)
     rows, confirmation = tuple(ladder(traces, "mocap")), tuple(ladder(confirmed, "mocap"))
-    moved = tuple(moved_in_trials(dataset.description, dataset.trials(role)))
+    moved = tuple(moved_in_trials(dataset.description, relabelled_trials(dataset, role)))
     points = point_rows(estimate, dataset, role)
     return Evaluation(rows, tuple(traces), regimes(predict, dataset, role), confirmation, moved, points)
 
@@ -160,9 +161,9 @@ def _trace(p: Prediction, trial: Trial, errors: PoseErrors) -> Trace:
 
 def _means_errors(p: Prediction, body: Body, means: PostureMeans) -> PoseErrors:
     """Errors of the pose, or of the place of the point that is seen of the hand: its rotations are NaN."""
-    if not is_point(body):
-        return pose_errors(p.T_lab_hand, means.poses_of(body).T)
-    e = places(p.T_lab_hand, point_of(body)) - means.point_of(body)[0]
+    if not body.is_point:
+        return pose_errors(p.T_lab_hand, poses_of_means(body, means).T)
+    e = places(p.T_lab_hand, body.point) - point_of_means(body, means)[0]
     return PoseErrors(e, np.full(e.shape, np.nan))
 
 
@@ -208,7 +209,7 @@ def no_better(compared: Iterable[Comparison]) -> Iterator[Verdict]:
 
 
 def _moved(description: Description, trial: Trial) -> str:
-    T, t = poses_of(base_body(description), trial).T, trial.t_mocap
+    T, t = poses_of(description.base_body, trial).T, trial.t_mocap
     seen = np.isfinite(T).all(axis=(1, 2))
     before, after = seen & (t <= t[0] + REST), seen & (t >= t[-1] - REST)
     if not before.any() or not after.any():

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.estimate.estimate import Estimate
+from calibration.mocap.cluster_pose import poses_of_means
 from calibration.numerics.lie import inverse
 from calibration.prediction.compensator import Compensator
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Role, TrialEntry, base_body, hand_body
+from calibration.recording.schema import Role, TrialEntry
 from calibration.robot.hand_uncertainty import Session
 
 ALL = "all"
@@ -53,7 +54,7 @@ def point_rows(estimate: Estimate, dataset: Dataset, role: Role) -> tuple[PointR
 def _of_trial(
     robot: Compensator, model: str, dataset: Dataset, entry: TrialEntry, means: PostureMeans
 ) -> list[PointRow]:
-    hand, T_B_lab = hand_body(dataset.description), inverse(means.poses_of(base_body(dataset.description)).T)
+    hand, T_B_lab = dataset.description.hand_body, inverse(poses_of_means(dataset.description.base_body, means).T)
     seen = [m for m in hand.markers if m.name in means.marker]
     p = means.marker_position[:, [means.marker.index(m.name) for m in seen]]
     p = p @ np.swapaxes(T_B_lab[:, :3, :3], 1, 2) + T_B_lab[:, None, :3, 3]

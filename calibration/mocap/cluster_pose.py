@@ -10,13 +10,14 @@ With noise sigma per axis and marker, the local twist (linear, angular) of the p
 Reference: Arun, Huang, Blostein, IEEE PAMI 1987; Umeyama, IEEE PAMI 1991.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.errors import NotEnoughData, ShapeError
 from calibration.numerics.alignment import nearest_rotations
 from calibration.numerics.lie import compose, skew
+from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body
 from calibration.recording.trial import Trial
 
@@ -69,6 +70,38 @@ def poses_of(body: Body, trial: Trial) -> BodyPoses:
         raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {[m.name for m in markers]} are recorded")
     columns = [recorded[m.name] for m in markers]
     return body_poses(np.array([m.xyz for m in markers]), trial.marker_position[:, columns])
+
+
+def poses_of_means(body: Body, means: PostureMeans) -> BodyPoses:
+    """Poses of a marker body (n, 4, 4); their covariance in [m, rad], already with the markers' own noise.
+
+    Raises:
+        NotEnoughData: Fewer than three of its markers are in the file.
+    """
+    if not body.markers:
+        return still_poses(len(means))
+    names = [m.name for m in body.markers if m.name in means.marker]
+    if len(names) < 3:
+        raise NotEnoughData(f"{means.id}: body {body.name!r} needs 3 markers, {names} are in the file")
+    columns = [means.marker.index(name) for name in names]
+    xyz = np.array([m.xyz for m in body.markers if m.name in names])
+    found = body_poses(xyz, means.marker_position[:, columns])
+    variance = np.nanmean(means.marker_position_std[:, columns] ** 2, axis=(1, 2))
+    return replace(found, covariance=found.covariance * variance[:, None, None])
+
+
+def point_of_means(body: Body, means: PostureMeans) -> tuple[np.ndarray, np.ndarray]:
+    """Mean position (n, 3) [m] of a body's markers, NaN unless all are seen, and its variance per axis (n,) [m2].
+
+    Raises:
+        NotEnoughData: One of them is not in the file.
+    """
+    missing = [m.name for m in body.markers if m.name not in means.marker]
+    if missing:
+        raise NotEnoughData(f"{means.id}: markers {missing} of body {body.name!r} are not in the file")
+    columns = [means.marker.index(m.name) for m in body.markers]
+    squares = means.marker_position_std[:, columns] ** 2
+    return means.marker_position[:, columns].mean(axis=1), squares.mean(axis=(1, 2)) / len(columns)
 
 
 def still_poses(n: int) -> BodyPoses:

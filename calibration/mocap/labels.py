@@ -23,7 +23,7 @@ A body whose labels are exchanged throughout a trial shows no jump.
 
 import logging
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
@@ -31,7 +31,8 @@ import numpy as np
 
 from calibration.mocap.cluster_pose import body_poses
 from calibration.numerics.lie import rotation_vector
-from calibration.recording.schema import Body
+from calibration.recording.dataset import Dataset
+from calibration.recording.schema import Body, Role, TrialEntry
 from calibration.recording.trial import Trial
 
 _LIMIT = 0.1  # of the shortest edge [-]
@@ -74,6 +75,21 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
         told = "%s: labels of body %r exchanged: %d frames set right, %d masked"
         _log.warning(told, trial.id, body.name, len(rows) - n_masked, n_masked)
     return (replace(trial, marker_position=position) if done else trial), tuple(done)
+
+
+def relabelled_trial(dataset: Dataset, entry: TrialEntry) -> Trial:
+    """Read one continuous trial, exchanged marker labels corrected.
+
+    Raises:
+        InputError: As `Dataset.read`.
+    """
+    return with_right_labels(dataset.description.bodies, dataset.read(entry))[0]
+
+
+def relabelled_trials(dataset: Dataset, role: Role, *kinds: str) -> Iterator[tuple[TrialEntry, Trial]]:
+    """Read the continuous trials of a role one after the other, exchanged marker labels corrected."""
+    for entry, trial in dataset.trials(role, *kinds):
+        yield entry, with_right_labels(dataset.description.bodies, trial)[0]
 
 
 def _of_one_shape(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:

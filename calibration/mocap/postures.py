@@ -16,12 +16,12 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import BodyPoses, body_poses, poses_of, still_poses
+from calibration.mocap.cluster_pose import BodyPoses, body_poses, point_of_means, poses_of, poses_of_means, still_poses
 from calibration.numerics.lie import adjoint, compose, inverse, skew, to_vector
 from calibration.numerics.signals import GAP
 from calibration.recording.clock import Clock
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Body, Description, base_body, hand_body, is_point, point_of
+from calibration.recording.schema import Body, Description
 from calibration.recording.trial import Trial
 
 _MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
@@ -90,7 +90,7 @@ def inner_windows(dwells: np.ndarray) -> np.ndarray:
     return np.stack([dwells[:, 0] + margin, dwells[:, 1] - margin], axis=1)
 
 
-def read_postures(description: Description, trials: Iterable[Trial], robot: Clock) -> Postures:
+def static_postures(description: Description, trials: Iterable[Trial], robot: Clock) -> Postures:
     """Postures of all dwells of these trials.
 
     Raises:
@@ -108,19 +108,19 @@ def read_postures(description: Description, trials: Iterable[Trial], robot: Cloc
 
 def mean_postures(description: Description, means: PostureMeans) -> Postures:
     """Postures of a file that only has means, those that show base and hand; their covariance is the file's own."""
-    body = hand_body(description)
-    seen = _points if is_point(body) else _poses
-    T, S, squares = seen(means.poses_of(base_body(description)), means, body)
+    body = description.hand_body
+    seen = _points if body.is_point else _poses
+    T, S, squares = seen(poses_of_means(description.base_body, means), means, body)
     good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(means.q_motor).all(axis=1)
     label = np.array([f"{means.id} {k}" for k in np.flatnonzero(good)], dtype=str)
     misfit = np.sqrt(np.nanmean(squares[good], axis=1)) if squares.shape[1] else np.zeros(int(good.sum()))
-    point = point_of(body) if is_point(body) else np.zeros(3)
+    point = body.point if body.is_point else np.zeros(3)
     return Postures(means.q_motor[good], T[good], S[good], misfit, label, point)
 
 
 def _poses(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """T_base_hand (n, 4, 4), covariance (n, 6, 6) of its local twist, squared distances (n, m) of markers [m2]."""
-    hand = means.poses_of(body)
+    hand = poses_of_means(body, means)
     T = inverse(base.T) @ hand.T
     Ad = adjoint(inverse(T))
     S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
@@ -129,7 +129,7 @@ def _poses(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray
 
 def _points(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same where a point of the hand is seen: its place, and that place's covariance (n, 3, 3), base's axes."""
-    p, variance = means.point_of(body)
+    p, variance = point_of_means(body, means)
     R = np.swapaxes(base.T[:, :3, :3], 1, 2)
     p = (R @ (p - base.T[:, :3, 3])[..., None])[..., 0]
     G = np.concatenate([np.broadcast_to(-np.eye(3), (len(p), 3, 3)), skew(p)], axis=2)
@@ -137,7 +137,7 @@ def _points(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarra
     return compose(np.tile(np.eye(3), (len(p), 1, 1)), p), S, (base.residual**2).sum(axis=2)
 
 
-def read_passing(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
+def passing_postures(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
     """Postures passed through every `spacing` [s] of these trials, one sample each, their first second left out."""
     found = [_passed(description, trial, robot, spacing) for trial in trials]
     motion = np.repeat(np.arange(len(found)), [len(of_trial[1]) for of_trial in found])
@@ -150,7 +150,7 @@ def read_passing(description: Description, trials: Iterable[Trial], robot: Clock
 def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
     rows = passed_rows(trial.t_mocap, spacing)
     passed = replace(trial, t_mocap=trial.t_mocap[rows], marker_position=trial.marker_position[rows])
-    base, hand = (poses_of(body(description), passed) for body in (base_body, hand_body))
+    base, hand = (poses_of(body, passed) for body in (description.base_body, description.hand_body))
     T = inverse(base.T) @ hand.T
     Ad = adjoint(inverse(T))
     S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
@@ -177,7 +177,7 @@ def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray)
 
 def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray | str, ...]]:
     t_robot = robot.to_mocap(trial.t_robot)
-    bodies = (base_body(description), hand_body(description))
+    bodies = (description.base_body, description.hand_body)
     for k, (start, stop) in enumerate(dwell_windows(trial)):
         rows = (t_robot >= start) & (t_robot <= stop)
         seen = np.flatnonzero((trial.t_mocap >= start) & (trial.t_mocap <= stop))

@@ -21,14 +21,15 @@ import numpy as np
 
 from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.estimate.estimate import Estimate
-from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.cluster_pose import poses_of, poses_of_means
+from calibration.mocap.labels import relabelled_trials
 from calibration.mocap.postures import readings_at
 from calibration.numerics.lie import from_vector, mean
 from calibration.prediction.base_pose import base_poses
 from calibration.recording.clock import Clock
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Description, Role, TrialEntry, base_body
+from calibration.recording.schema import Description, Role, TrialEntry
 from calibration.recording.trial import Trial
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
@@ -118,7 +119,7 @@ class Predictor:
 
         A model of the joints' hysteresis needs the motion before a posture, which means do not show: no `model_3`.
         """
-        T_lab_B = means.poses_of(base_body(self.description)).T
+        T_lab_B = poses_of_means(self.description.base_body, means).T
         for name, hand, encoder, _ in self._rows():
             if encoder == "motor" and name in ("nominal", "registration", "model_2", "full"):
                 T = T_lab_B @ hand.poses(means.q_motor)
@@ -143,9 +144,9 @@ class Predictor:
 
     def _measured_base(self, entry: TrialEntry, trial: Trial) -> np.ndarray:
         """T_lab_B (n, 4, 4), seen where the trial starts."""
-        T_lab_B = poses_of(base_body(self.description), trial).T
+        T_lab_B = poses_of(self.description.base_body, trial).T
         if not np.isfinite(_start(T_lab_B, trial)).any():
-            body = base_body(self.description).name
+            body = self.description.base_body.name
             raise NotEnoughData(f"{entry.id}: body {body!r} is not seen in the first second of the trial")
         return T_lab_B
 
@@ -185,7 +186,7 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     if estimate.suspension is not None:
         models["model_1"] = models["nominal"]
     robot = estimate.clock("robot")
-    trials = () if robot is not None else tuple(trial for _, trial in dataset.trials("calibration"))
+    trials = () if robot is not None else tuple(trial for _, trial in relabelled_trials(dataset, "calibration"))
     if trials:
         robot = next((c for c in synchronise(dataset.urdf, description, trials)[0] if c.instrument == "robot"), None)
     joints = None
@@ -198,7 +199,7 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
 def predictions(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[Prediction]:
     """Predicted hand poses of all trials of a role, trial by trial, row by row."""
     predict = predictor(estimate, dataset)
-    for entry, trial in dataset.trials(role):
+    for entry, trial in relabelled_trials(dataset, role):
         yield from predict(entry, trial)
     for entry, means in dataset.means(role):
         yield from predict.of_means(entry, means)

@@ -21,12 +21,13 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.labels import relabelled_trial
 from calibration.mocap.postures import dwell_windows
 from calibration.numerics.lie import inverse, mean
 from calibration.prediction.compensator import Compensator
 from calibration.prediction.predictor import Predictor
 from calibration.recording.dataset import Dataset
-from calibration.recording.schema import Description, TrialEntry, base_body, hand_body
+from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.geometry.registration import fit_frames, frame_weights
@@ -46,7 +47,7 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
     Raises:
         NotEnoughData: No dwell shows base and hand, or they turn about one direction only.
     """
-    trials = [dataset.read(entry) for entry in registration_trials(dataset)]
+    trials = [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)]
     models = dict(predict.models)
     for name in models.keys() - set(_DATASHEET):
         models[name] = fit_frames(models[name], *_postures(predict, name, trials), predict.description)
@@ -55,7 +56,7 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
 
 def registration_postures(predict: Predictor, name: str, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Mean positions (n, n_joints) a row's geometry is asked with, and measured T_B_H (n, 4, 4), a dwell each."""
-    return _postures(predict, name, [dataset.read(entry) for entry in registration_trials(dataset)])
+    return _postures(predict, name, [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)])
 
 
 def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:
@@ -66,7 +67,7 @@ def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[n
 
 def _dwells(predict: Predictor, name: str, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     """Mean positions (n, n_joints) and measured T_B_H (n, 4, 4) of the dwells that show both bodies."""
-    base, hand = base_body(predict.description), hand_body(predict.description)
+    base, hand = predict.description.base_body, predict.description.hand_body
     q = predict.positions(name, "motor", trial)
     T = inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
     known = np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2))

@@ -1,15 +1,13 @@
-"""A dataset folder: dataset.json, nominal.urdf and the trials, opened one by one and never all at once."""
+"""A dataset folder: dataset.json, nominal.urdf and the trials, each read on demand."""
 
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import pinocchio as pin
 from pydantic import ValidationError
 
 from calibration.errors import InputError, NoSuchElement
-from calibration.mocap.labels import with_right_labels
 from calibration.recording.posture_means import PostureMeans, holds_means, read_means
 from calibration.recording.schema import Description, Role, TrialEntry
 from calibration.recording.trial import Trial, read_trial, sha256
@@ -34,14 +32,14 @@ class Dataset:
         return tuple(t for t in self.description.trials if t.role == role and (not kinds or t.kind in kinds))
 
     def read(self, entry: TrialEntry) -> Trial:
-        """Read one continuous trial and check it against dataset.json; exchanged marker labels are set right.
+        """Read one continuous trial as it was recorded and check it against dataset.json.
 
         Raises:
             InputError: The file is damaged, changed since it was listed, names other joints, or holds means only.
         """
         trial = read_trial(self._unchanged(entry), entry.id)
         self._check_joints(entry, trial.joint)
-        return with_right_labels(self.description.bodies, trial)[0]
+        return trial
 
     def read_means(self, entry: TrialEntry) -> PostureMeans:
         """Read one trial that holds posture means, and check it against dataset.json.
@@ -118,6 +116,8 @@ def _read_description(path: Path) -> Description:
 
 
 def _read_urdf(path: Path, description: Description) -> str:
+    import pinocchio as pin  # so that the format alone, as the twin writes it, needs no Pinocchio
+
     text = _read_text(path)
     try:
         model = pin.buildModelFromXML(text)

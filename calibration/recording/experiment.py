@@ -73,7 +73,7 @@ class Sigma:
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Remedy:
+class ExperimentPlan:
     """What to record for one purpose, and what it would tell."""
 
     stage: str
@@ -87,10 +87,10 @@ class _File(BaseModel):
     model_config = ConfigDict(extra="forbid")
     schema_version: Literal[1]
     joints: tuple[str, ...]
-    remedies: tuple[Remedy, ...]
+    remedies: tuple[ExperimentPlan, ...]
 
 
-def to_text(joints: Sequence[str], remedies: Sequence[Remedy]) -> str:
+def plans_text(joints: Sequence[str], remedies: Sequence[ExperimentPlan]) -> str:
     """The file."""
     yaml = YAML(typ="rt", pure=True)
     yaml.width, yaml.default_flow_style = 4096, None
@@ -106,7 +106,7 @@ def _plain(value: Any) -> Any:
     return [_plain(v) for v in value] if isinstance(value, tuple | list) else value
 
 
-def read_remedies(path: Path | str) -> tuple[tuple[str, ...], tuple[Remedy, ...]]:
+def read_plans(path: Path | str) -> tuple[tuple[str, ...], tuple[ExperimentPlan, ...]]:
     """Joints and remedies of a file.
 
     Raises:

@@ -3,19 +3,17 @@
     q_motor (posture, joint) [rad, m]       marker_position, marker_position_std (posture, marker, axis) [m]
 
 The standard deviations are those of the means. What a dwell looked like within itself is lost: drift, correlated noise
-and the base's sway cannot be told from such a file.
+and motion of the base are not identifiable from such a file.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from calibration.errors import InputError, NotEnoughData, ShapeError
-from calibration.mocap.cluster_pose import BodyPoses, body_poses, still_poses
+from calibration.errors import InputError, ShapeError
 from calibration.recording import netcdf
-from calibration.recording.schema import Body
 from calibration.recording.trial import check_shapes, sha256
 
 # name: (dimensions, units, what it is)
@@ -60,36 +58,6 @@ class PostureMeans:
     def __len__(self) -> int:
         return len(self.q_motor)
 
-    def poses_of(self, body: Body) -> BodyPoses:
-        """Poses of a marker body (n, 4, 4); their covariance in [m, rad], already with the markers' own noise.
-
-        Raises:
-            NotEnoughData: Fewer than three of its markers are in the file.
-        """
-        if not body.markers:
-            return still_poses(len(self))
-        names = [m.name for m in body.markers if m.name in self.marker]
-        if len(names) < 3:
-            raise NotEnoughData(f"{self.id}: body {body.name!r} needs 3 markers, {names} are in the file")
-        columns = [self.marker.index(name) for name in names]
-        xyz = np.array([m.xyz for m in body.markers if m.name in names])
-        found = body_poses(xyz, self.marker_position[:, columns])
-        variance = np.nanmean(self.marker_position_std[:, columns] ** 2, axis=(1, 2))
-        return replace(found, covariance=found.covariance * variance[:, None, None])
-
-    def point_of(self, body: Body) -> tuple[np.ndarray, np.ndarray]:
-        """Mean place (n, 3) [m] of a body's markers, NaN unless all are seen, and its variance per axis (n,) [m2].
-
-        Raises:
-            NotEnoughData: One of them is not in the file.
-        """
-        missing = [m.name for m in body.markers if m.name not in self.marker]
-        if missing:
-            raise NotEnoughData(f"{self.id}: markers {missing} of body {body.name!r} are not in the file")
-        columns = [self.marker.index(m.name) for m in body.markers]
-        squares = self.marker_position_std[:, columns] ** 2
-        return self.marker_position[:, columns].mean(axis=1), squares.mean(axis=(1, 2)) / len(columns)
-
 
 def holds_means(path: Path) -> bool:
     """Whether a trial's file holds posture means instead of a continuous recording; False where it cannot be read."""
@@ -125,7 +93,9 @@ def read_means(path: Path, trial_id: str | None = None) -> PostureMeans:
             needed = ("joint", "marker", "marker_body", "q_motor", "marker_position", "marker_position_std")
             missing = [name for name in needed if name not in file.variables]
             if missing:
-                raise InputError(path, f"has no variable {missing}; see the layout in calibration/means.py")
+                raise InputError(
+                    path, f"has no variable {missing}; see the layout in calibration/recording/posture_means.py"
+                )
             fields: dict[str, Any] = {n: netcdf.array(file, n) for n in _LAYOUT if n in file.variables}
             fields.setdefault("approach", np.zeros(fields["q_motor"].shape))
             fields |= {name: netcdf.labels(file, name) for name in ("joint", "marker", "marker_body")}

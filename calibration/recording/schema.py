@@ -1,8 +1,6 @@
 """dataset.json: what a laboratory declares about its robot, its instruments and its trials.
 
 SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and tolerances only.
-
-Which marker bodies are the base and the hand.
 """
 
 from collections.abc import Mapping, Sequence
@@ -61,6 +59,16 @@ class Body(Declaration):
     link: str
     markers: tuple[Marker, ...]
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def is_point(self) -> bool:
+        """Whether its markers determine a position only."""
+        return 0 < len(self.markers) < 3
+
+    @property
+    def point(self) -> np.ndarray:
+        """Mean of its nominal markers, c (3,) [m, body]."""
+        return np.asarray(np.mean([m.xyz for m in self.markers], axis=0))
 
 
 class Wheel(Declaration):
@@ -227,30 +235,19 @@ class Description(Setup):
         """The marker body of that name, or None where the laboratory has none."""
         return next((b for b in self.bodies if b.name == name), None)
 
+    @property
+    def base_body(self) -> Body:
+        """The marker body on the base frame."""
+        return self._body(BASE, self.base_frame)
 
-def base_body(description: Description) -> Body:
-    """The marker body on the base frame."""
-    return _body(description, BASE, description.base_frame)
+    @property
+    def hand_body(self) -> Body:
+        """The marker body at the hand, whose frame is the pose predicted and scored."""
+        return self._body(HAND, self.tool_frame)
 
-
-def hand_body(description: Description) -> Body:
-    """The marker body at the hand, whose frame is the pose predicted and scored."""
-    return _body(description, HAND, description.tool_frame)
-
-
-def _body(description: Description, name: str, link: str) -> Body:
-    found = description.body(name) or next((b for b in description.bodies if b.link == link), None)
-    if found is None:
-        known = [b.name for b in description.bodies]
-        raise NotEnoughData(f"dataset.json has no marker body {name!r} and none on {link!r}; bodies: {known}")
-    return found
-
-
-def is_point(body: Body) -> bool:
-    """Whether its markers tell a place only."""
-    return 0 < len(body.markers) < 3
-
-
-def point_of(body: Body) -> np.ndarray:
-    """c (3,) [m]."""
-    return np.asarray(np.mean([m.xyz for m in body.markers], axis=0))
+    def _body(self, name: str, link: str) -> Body:
+        found = self.body(name) or next((b for b in self.bodies if b.link == link), None)
+        if found is None:
+            known = [b.name for b in self.bodies]
+            raise NotEnoughData(f"dataset.json has no marker body {name!r} and none on {link!r}; bodies: {known}")
+        return found

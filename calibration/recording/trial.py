@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import netCDF4
 import numpy as np
@@ -89,7 +89,7 @@ def check_shapes(
 
 @dataclass(frozen=True)
 class Trial:
-    """One continuous recording, every instrument on its own clock.
+    """One continuous recording, every instrument on its own clock; `variables` are those of its file.
 
     Attributes:
         id: Name of the trial in its dataset.
@@ -115,6 +115,7 @@ class Trial:
             one.
     """
 
+    variables: ClassVar[tuple[Variable, ...]] = VARIABLES
     id: str
     joint: tuple[str, ...]
     t_robot: np.ndarray

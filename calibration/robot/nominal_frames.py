@@ -10,7 +10,7 @@ import numpy as np
 
 from calibration.errors import InputError
 from calibration.numerics.lie import from_vector, inverse, jlog6, local_twist, log6, to_vector
-from calibration.recording.schema import BASE, Body, Description, base_body, hand_body
+from calibration.recording.schema import BASE, Body, Description
 from calibration.robot.chain import Chain
 
 PREFIX = "frame.base.arm"
@@ -65,13 +65,13 @@ def frame_names() -> tuple[str, str]:
 def nominal_frames(chain: Chain, description: Description) -> np.ndarray:
     """T_base_B and T_tool_H with every marker body on its link as drawn, (12,) [m, rad]."""
     T_base_tool = chain.poses(np.zeros((1, len(chain.measured))))[0]
-    T_tool_H = np.linalg.solve(T_base_tool, _drawn(chain, hand_body(description)))
+    T_tool_H = np.linalg.solve(T_base_tool, _drawn(chain, description.hand_body))
     return np.concatenate([to_vector(nominal_base_body(chain, description)), to_vector(T_tool_H)])
 
 
 def nominal_base_body(chain: Chain, description: Description) -> np.ndarray:
     """T_base_B (4, 4) with the base's marker body as drawn; the hand may have none."""
-    return _drawn(chain, base_body(description))
+    return _drawn(chain, description.base_body)
 
 
 def _drawn(chain: Chain, body: Body) -> np.ndarray:

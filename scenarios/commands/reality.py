@@ -51,7 +51,7 @@ def reality(  # noqa: PLR0913  an option each
 
 
 def _recordings(log: Path) -> "tuple[Recorded, ...]":
-    from calibration.recording.dataset import load
+    from calibration.recording import load
     from scenarios.realism.log import recorded
 
     return recorded(load(log))

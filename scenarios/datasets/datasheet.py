@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.recording.trial import VARIABLES
+from calibration.recording import Trial
 from scenarios.datasets.index import Row
 
 _DRAWN = """Every run is one robot of the series: seed `SeedSequence(root, spawn_key=(id,))`, so that a run depends on
@@ -69,6 +69,6 @@ def _variables() -> list[str]:
         "|---|---|---|---|---|---|",
     ]
     lines += [
-        f"| {v.name} | {', '.join(v.dims)} | {v.units} | {v.frame} | {v.clock} | {v.meaning} |" for v in VARIABLES
+        f"| {v.name} | {', '.join(v.dims)} | {v.units} | {v.frame} | {v.clock} | {v.meaning} |" for v in Trial.variables
     ]
     return lines

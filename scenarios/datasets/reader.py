@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray
 
     from calibration import Dataset
-    from calibration.recording.trial import Trial
+    from calibration.recording import Trial
     from twin.truth import TruthTrial
 
 
@@ -39,7 +39,7 @@ class Run:
 
     def trial(self, name: str) -> "Trial":
         """One trial as numpy arrays."""
-        from calibration.recording.trial import read_trial
+        from calibration.recording import read_trial
 
         return read_trial(self._file("dataset", name), name)
 

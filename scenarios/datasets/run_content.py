@@ -11,7 +11,7 @@ from scenarios.datasets.run_spec import Magnitude
 from scenarios.files.scenario import Scenario
 
 if TYPE_CHECKING:
-    from calibration.recording.trial import Trial
+    from calibration.recording import Trial
 
 
 def recordings_and_truth(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:

@@ -11,10 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from calibration.recording.dataset import Dataset, load
-from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Plate
-from calibration.recording.trial import Trial
+from calibration.recording import Dataset, PostureMeans, Trial, load, schema
 from calibration.robot.chain import chain_of
 from scenarios.files import output_folder
 from scenarios.files.errors import ScenarioError
@@ -101,7 +98,7 @@ def _bodies(trial: Trial | PostureMeans) -> list[tuple[str, np.ndarray]]:
     return [(name, np.flatnonzero(np.array(trial.marker_body) == name)) for name in names]
 
 
-def _from_above(plates: Sequence[Plate], trial: Trial | PostureMeans, ax: Axes) -> None:
+def _from_above(plates: Sequence[schema.Plate], trial: Trial | PostureMeans, ax: Axes) -> None:
     ax.set_title("markers from above, plates")
     if not len(trial.marker_position):
         return _nothing("no markers", ax)
@@ -114,7 +111,7 @@ def _from_above(plates: Sequence[Plate], trial: Trial | PostureMeans, ax: Axes) 
     return None
 
 
-def _corners(plate: Plate) -> np.ndarray:
+def _corners(plate: schema.Plate) -> np.ndarray:
     x, y = (0.5 * plate.size[k] * np.array(plate.axes[k])[:2] for k in range(2))
     return np.asarray(np.array([x + y, -x + y, -x - y, x - y]) + np.array(plate.centre)[:2])
 

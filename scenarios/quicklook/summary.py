@@ -6,12 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_shape import per_coordinate, shape_change
+from calibration.mocap import per_coordinate, relabelled_trial, shape_change
 from calibration.numerics.wrench import centre_of_pressure
-from calibration.recording.dataset import Dataset
-from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Body, TrialEntry
-from calibration.recording.trial import Trial
+from calibration.recording import Dataset, PostureMeans, Trial, TrialEntry, schema
 from scenarios.quicklook.plots import holes
 
 _REST = 1.0  # [s] at both ends of a trial
@@ -41,7 +38,7 @@ def looked_at(dataset: Dataset, entry: TrialEntry) -> Looked:
     if dataset.has_means(entry):
         means = dataset.read_means(entry)
         return Looked(entry, means, (f"{len(means)} static postures as means, no times", *_markers(means)))
-    trial = dataset.read(entry)
+    trial = relabelled_trial(dataset, entry)
     return Looked(
         entry,
         trial,
@@ -100,7 +97,7 @@ def _markers(trial: Trial | PostureMeans) -> Iterator[str]:
         yield f"markers: all {len(trial.marker)} seen throughout"
 
 
-def _shapes(trial: Trial, bodies: Sequence[Body]) -> Iterator[str]:
+def _shapes(trial: Trial, bodies: Sequence[schema.Body]) -> Iterator[str]:
     """How well the markers of each body keep their places on it."""
     found = []
     for body in bodies:

@@ -16,16 +16,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import body_poses
-from calibration.mocap.cluster_shape import free, shape_change
+from calibration.mocap import body_poses, free, relabelled_trial, shape_change
 from calibration.numerics.signals import CUTOFF, Signal, low_passed
-from calibration.recording.clock import Clock
-from calibration.recording.dataset import Dataset
-from calibration.recording.schema import Description, base_body
-from calibration.recording.trial import Trial
-from calibration.stages.suspension.base_response import sway_of
-from calibration.stages.suspension.floor_wrench import plate_load
-from calibration.stages.suspension.rest_frame import Rest, rest_of
+from calibration.recording import Clock, Dataset, Description, Trial
+from calibration.stages.suspension import Rest, plate_load, rest_of, sway_of
 
 REST = slice(100, 150)
 """Samples of a trial's rest that displacements are told from: of the log's second second, since its markers step by
@@ -98,7 +92,11 @@ def recorded(dataset: Dataset) -> tuple[Recorded, ...]:
     Raises:
         NotEnoughData: None shows the base's markers and a plate.
     """
-    trials = [dataset.read(e) for e in dataset.description.trials if e.kind != "static" and not dataset.has_means(e)]
+    trials = [
+        relabelled_trial(dataset, e)
+        for e in dataset.description.trials
+        if e.kind != "static" and not dataset.has_means(e)
+    ]
     found = tuple(_trial(dataset.description, trial) for trial in trials if len(trial.t_plate))
     if not found:
         raise NotEnoughData("no trial of the dataset has base markers and a plate; record both while the arm moves")
@@ -109,7 +107,7 @@ def _trial(description: Description, trial: Trial) -> Recorded:
     same = Clock("plate", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
     rest = rest_of(description, trial, np.eye(4))
     sway = sway_of(description, trial, rest, plate_load(trial, same, rest.T_lab_0, _WRENCH))
-    body, forcing = base_body(description), sway.forcing
+    body, forcing = description.base_body, sway.forcing
     shape = shape_change(body, trial)
     change = referred(CubicSpline(shape.t, shape.x)(forcing.t))
     markers = np.array([m.xyz for m in body.markers if m.name in trial.marker])

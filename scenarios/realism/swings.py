@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calibration.numerics.signals import RATE, Signal, low_passed, play
-from calibration.recording.trial import Trial
+from calibration.recording import Trial
 from scenarios.realism.arm_as_logged import AS_LOGGED
 from twin.campaign.laboratory import EPOCH, laboratory
 from twin.campaign.measure import measure

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calibration import Dataset, Estimate
+from calibration.mocap import relabelled_trial
 from calibration.prediction.base_pose import base_poses
-from calibration.stages.suspension.base_response import laboratory
-from calibration.stages.suspension.model import Source, Suspension
+from calibration.stages.suspension import Source, Suspension, laboratory
 from twin import truth
 
 
@@ -53,7 +53,7 @@ def _angles(
         description = dataset.description.loaded(entry)
         lab = laboratory(dataset.urdf, description, estimate.clock("robot"), estimate.clock("plate"))
         true = truth.read_trial(truth_folder / entry.file).base_pose
-        found = base_poses(suspension, lab, dataset.read(entry), source)
+        found = base_poses(suspension, lab, relabelled_trial(dataset, entry), source)
         yield _turned(true), _turned(found)
 
 

@@ -19,15 +19,14 @@ from calibration import Dataset, Estimate, Evaluation, predictions
 from calibration.evaluation.ladder import Row, Trace, ladder, row_entry, scored_errors
 from calibration.evaluation.pose_errors import pose_errors
 from calibration.inference.parameters import Model
-from calibration.mocap.cluster_pose import poses_of
-from calibration.recording.schema import base_body
+from calibration.mocap import poses_of, relabelled_trial
 from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
 from twin import truth
 from twin.truth import Parameter, TruthTrial
 
 if TYPE_CHECKING:
-    from calibration.recording.trial import Trial
+    from calibration.recording import Trial
 
 Status = Literal["estimated", "combined", "not_identifiable", "not_estimated"]
 SPAN_95 = 1.959963984540054
@@ -183,7 +182,10 @@ def _nees(errors: np.ndarray, covariance: np.ndarray) -> tuple[float, int]:
 
 def _traces(estimate: Estimate, dataset: Dataset, truth_folder: Path) -> Iterator[Trace]:
     """Errors of every prediction, and of the floor, against the true hand pose."""
-    recorded = {e.id: (e, dataset.read(e), _read_trial(truth_folder / e.file)) for e in dataset.entries("validation")}
+    recorded = {
+        e.id: (e, relabelled_trial(dataset, e), _read_trial(truth_folder / e.file))
+        for e in dataset.entries("validation")
+    }
     for p in predictions(estimate, dataset):
         entry, trial, true = recorded[p.trial_id]
         errors = pose_errors(p.T_lab_hand, true.hand_pose)
@@ -209,7 +211,7 @@ def _true_base_body(truth_folder: Path) -> np.ndarray:
 def _floor(dataset: Dataset, trial: "Trial", true: TruthTrial, T_base_body: np.ndarray) -> np.ndarray:
     """T_lab_B measured, T_B_hand true (n, 4, 4)."""
     T_B_hand = np.linalg.solve(true.base_pose @ T_base_body, true.hand_pose)
-    return poses_of(base_body(dataset.description), trial).T @ T_B_hand
+    return poses_of(dataset.description.base_body, trial).T @ T_B_hand
 
 
 def _skill(row: Row, rows: tuple[Row, ...]) -> float | None:

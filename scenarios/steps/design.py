@@ -36,7 +36,7 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
     """
     import mjcf
     from calibration.design.plan import compared, nominal_task, plan
-    from calibration.recording.experiment import to_text
+    from calibration.recording import plans_text
     from scenarios.files import yaml_file
     from twin.campaign.dataset_description import declaration
     from twin.random_streams import generator
@@ -51,7 +51,7 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
         f"{usual:.2f} mm with as many random ones"
     )
     with output_folder.updating(out.parent, [out.name]) as new:
-        text = to_text(description.joint_names, [found.remedy("geometry", why)])
+        text = plans_text(description.joint_names, [found.remedy("geometry", why)])
         (new / out.name).write_text(text, encoding="utf-8", newline="\n")
     if campaign is not None:
         with output_folder.updating(campaign.parent, [campaign.name]) as new:
@@ -80,12 +80,12 @@ def recording_too(scenario: "Scenario", file: Path) -> "Scenario":
         ScenarioError: It is of another robot, or asks for no posture.
     """
     import mjcf
-    from calibration.recording.experiment import read_remedies
+    from calibration.recording import read_plans
     from twin.motions.motion import RATE
     from twin.motions.schedule import schedule
     from twin.motions.swings import JOINTS
 
-    joints, remedies = read_remedies(file)
+    joints, remedies = read_plans(file)
     asked = [p for r in remedies for p in r.postures]
     if joints != JOINTS:
         raise ScenarioError(f"{file}: joints are {list(joints)}; the twin has {list(JOINTS)}")

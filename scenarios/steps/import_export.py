@@ -37,7 +37,7 @@ def import_files(
     from calibration.formats.importer import import_files as write
     from calibration.formats.importer import refuse_foreign
     from calibration.formats.mapping.mapping import Mapping, MappingFile
-    from calibration.recording.dataset import load
+    from calibration.recording import load
 
     refuse_foreign(kind, files)
     described = yaml_file.read(mapping, Mapping)
@@ -58,7 +58,7 @@ def export_files(kind: str, dataset: Path, out: Path, ros: int = 1) -> tuple[str
         InputError: The dataset cannot be read, or the format cannot hold it.
     """
     from calibration.formats.exporter import export_trials
-    from calibration.recording.dataset import load
+    from calibration.recording import load
 
     source = load(dataset)
     with output_folder.replacing(out, _exported(kind, [t.id for t in source.description.trials])) as new:

@@ -18,9 +18,9 @@ from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.estimate.estimate import Estimate
 from calibration.evaluation.marker_errors import PointRow, point_rows
 from calibration.formats.mapping.mapping import Mapping
-from calibration.mocap.postures import Postures, mean_postures
+from calibration.mocap import Postures, mean_postures
 from calibration.pipeline import calibrate
-from calibration.recording.dataset import Dataset, load
+from calibration.recording import Dataset, load
 from calibration.robot.chain import chain_of
 from calibration.stages.geometry.gear_deflection import calibrate_gears
 from calibration.stages.geometry.stage import calibrate_geometry

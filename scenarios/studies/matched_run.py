@@ -11,10 +11,9 @@ import numpy as np
 from scipy import stats
 
 from calibration.errors import NotCalibrated
-from calibration.mocap.cluster_pose import body_poses
-from calibration.mocap.postures import Postures
+from calibration.mocap import Postures, body_poses
 from calibration.numerics.lie import adjoint, exp6, inverse
-from calibration.recording.schema import Description, base_body, hand_body
+from calibration.recording import Description
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
 from calibration.stages.geometry.model_of_fit import hand_of
@@ -72,7 +71,8 @@ def _measured(
     description: Description, readings: np.ndarray, T: np.ndarray, samples: float, rng: np.random.Generator
 ) -> Postures:
     """Means over `samples` of what the markers show of the hand at T (n, 4, 4) in the base body."""
-    base, hand = (_unit_covariance(np.array([m.xyz for m in b(description).markers])) for b in (base_body, hand_body))
+    bodies = (description.base_body, description.hand_body)
+    base, hand = (_unit_covariance(np.array([m.xyz for m in body.markers])) for body in bodies)
     Ad = adjoint(inverse(T))
     S = (hand + Ad @ base @ np.swapaxes(Ad, 1, 2)) * description.sigmas.marker**2 / samples
     noise = (np.linalg.cholesky(S) @ rng.normal(size=(len(T), 6, 1)))[..., 0]

@@ -16,7 +16,6 @@ from calibration.mocap.postures import readings_at
 from calibration.numerics.lie import from_vector, inverse, mean, to_vector
 from calibration.prediction.predictor import predictor
 from calibration.recording.clock import Clock
-from calibration.recording.schema import base_body
 from calibration.stages.joints.correction import velocities
 from scenarios import load, run, steps
 from twin.truth import read_parameters, read_trial
@@ -184,7 +183,7 @@ def swing(result, compensator):
         if p.encoder == "motor"
     }
     real = {(p.model, p.base): p.T_lab_hand[ok] for p in predict(entry, trial) if p.encoder == "motor"}
-    T_lab_B = poses_of(base_body(dataset.description), same).T
+    T_lab_B = poses_of(dataset.description.base_body, same).T
     start = mean(T_lab_B[t <= t[0] + 1.0]) @ inverse(from_vector(compensator.hand.base))
     true = read_trial(result.folder / "truth" / entry.file).hand_pose[ok]
     return t, q, w, start, rows, real, true

@@ -13,7 +13,6 @@ from calibration import load as opened
 from calibration.mocap.postures import dwell_windows, mean_poses, readings_at
 from calibration.prediction.predictor import predictor
 from calibration.prediction.second_session import registered_anew, registration_postures
-from calibration.recording.schema import base_body, hand_body
 from calibration.robot.hand_uncertainty import Session
 from scenarios import load
 from twin.campaign.record import record
@@ -25,7 +24,7 @@ REMOUNTED = Session(base=(3e-3, 6e-3), hand=(3e-3, 14e-3))  # put on twice, 2 mm
 
 def seen(dataset: Dataset, clock) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Readings (n_joints,) and places (m, 3) of the hand's markers in the base's body, a dwell each."""
-    base, hand = base_body(dataset.description), hand_body(dataset.description)
+    base, hand = dataset.description.base_body, dataset.description.hand_body
     for _, trial in ((e, t) for e, t in dataset.trials("confirmation", "static") if e.motion != "registration"):
         q = readings_at(trial, clock, trial.t_mocap, trial.q_motor)
         columns = [trial.marker.index(m.name) for m in hand.markers]
@@ -39,7 +38,7 @@ def seen(dataset: Dataset, clock) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def inside(robot: Compensator, dataset: Dataset, clock, session: Session | None) -> float:
     """Share of markers within the radius that holds 95 %."""
     q, p = (np.array(x) for x in zip(*seen(dataset, clock), strict=True))
-    xyz = np.array([m.xyz for m in hand_body(dataset.description).markers])
+    xyz = np.array([m.xyz for m in dataset.description.hand_body.markers])
     found = robot.points(xyz, q, session)
     return float((np.linalg.norm(found.positions - p, axis=2) <= found.radius_95).mean())
 

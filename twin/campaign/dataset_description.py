@@ -5,19 +5,7 @@ from typing import cast
 import numpy as np
 
 import mjcf
-from calibration.recording.schema import (
-    Body,
-    Description,
-    Joint,
-    Marker,
-    Payload,
-    Plate,
-    Sigmas,
-    Tolerances,
-    TrialEntry,
-    Vector3,
-    Wheel,
-)
+from calibration.recording import Description, TrialEntry, schema
 from twin.campaign.robot import BASE, TOOL, TORSO
 from twin.config.instruments import Instruments
 from twin.config.twin import TwinConfig
@@ -28,8 +16,8 @@ from twin.simulation.wrist_sensor import WRIST_SENSOR
 def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:
     """The description of a recorded campaign; nothing drawn enters it."""
     i, d = config.instruments, config.datasheet
-    joints = [Joint(name=TORSO, encoders=("motor",), rate=i.robot_rate)]
-    joints += [Joint(name=n, encoders=("motor", "link"), rate=i.robot_rate) for n in config.arm]
+    joints = [schema.Joint(name=TORSO, encoders=("motor",), rate=i.robot_rate)]
+    joints += [schema.Joint(name=n, encoders=("motor", "link"), rate=i.robot_rate) for n in config.arm]
     finest = max(j.quantum for j in config.arm.values())
     return Description(
         robot="tiago",
@@ -37,17 +25,17 @@ def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Descripti
         tool_frame=TOOL,
         joints=tuple(joints),
         bodies=tuple(
-            Body(name=n, link=b.link, markers=tuple(Marker(name=m, xyz=p) for m, p in b.markers.items()))
+            schema.Body(name=n, link=b.link, markers=tuple(schema.Marker(name=m, xyz=p) for m, p in b.markers.items()))
             for n, b in i.bodies.items()
         ),
-        wheels=tuple(Wheel(name=w.name, type=w.type, centre=w.centre, contact=w.contact) for w in mjcf.wheels()),
+        wheels=tuple(schema.Wheel(name=w.name, type=w.type, centre=w.centre, contact=w.contact) for w in mjcf.wheels()),
         plates=_plates(i),
         payload=_payload(config),
         wrist_link=None if i.wrist is None else WRIST_SENSOR,
-        sigmas=Sigmas(
+        sigmas=schema.Sigmas(
             marker=i.marker_noise, encoder=finest, plate_force=i.plate_force_noise, plate_moment=i.plate_moment_noise
         ),
-        tolerances=Tolerances(
+        tolerances=schema.Tolerances(
             joint_translation=d.joint_translation,
             joint_rotation=d.joint_rotation,
             encoder_offset=d.encoder_offset,
@@ -61,21 +49,24 @@ def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Descripti
     )
 
 
-def _plates(instruments: Instruments) -> tuple[Plate, ...]:
+def _plates(instruments: Instruments) -> tuple[schema.Plate, ...]:
     spec = mjcf.spec()
     T = T_lab_plate(spec.body(PLATE), instruments.plate_place)
-    axes = cast(tuple[Vector3, Vector3, Vector3], tuple(map(_vector, T[:3, :3].T)))
+    axes = cast(tuple[schema.Vector3, schema.Vector3, schema.Vector3], tuple(map(_vector, T[:3, :3].T)))
     cut = Tiles(instruments.plate_grid).cut(*(2.0 * spec.geom(PLATE).size[:2]).tolist())
     return tuple(
-        Plate(name=t.name, centre=_vector(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size) for t in cut
+        schema.Plate(name=t.name, centre=_vector(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size)
+        for t in cut
     )
 
 
-def _vector(v: np.ndarray) -> Vector3:
+def _vector(v: np.ndarray) -> schema.Vector3:
     x, y, z = (float(c) for c in v)
     return x, y, z
 
 
-def _payload(config: TwinConfig) -> Payload | None:
+def _payload(config: TwinConfig) -> schema.Payload | None:
     p = config.payload
-    return Payload(link=TOOL, mass=p.mass, com=p.com, tolerance=config.datasheet.payload_mass) if p.mass else None
+    return (
+        schema.Payload(link=TOOL, mass=p.mass, com=p.com, tolerance=config.datasheet.payload_mass) if p.mass else None
+    )

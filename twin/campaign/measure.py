@@ -12,7 +12,7 @@ from dataclasses import asdict, replace
 import mujoco
 import numpy as np
 
-from calibration.recording.trial import Trial
+from calibration.recording import Trial
 from twin.campaign.laboratory import EPOCH, Laboratory
 from twin.campaign.robot import BASE
 from twin.config.twin import TwinConfig

@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import mjcf
-from calibration.recording.schema import TrialEntry
-from calibration.recording.trial import Trial, write_trial
+from calibration.recording import Trial, TrialEntry, write_trial
 from twin import truth
 from twin.base_tests.gravity_stiffness import gravity_stiffness
 from twin.base_tests.slip_load import slip_loads

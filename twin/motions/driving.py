@@ -3,7 +3,7 @@
 import numpy as np
 
 import mjcf
-from calibration.recording.schema import Kind
+from calibration.recording import schema
 from twin.config.campaign import Campaign, Form
 from twin.defects.wheels.rolling_wheel import DRIVES
 from twin.motions.motion import RATE, BasePath, Motion, path_time
@@ -31,7 +31,9 @@ def trials(campaign: Campaign) -> tuple[Motion, ...]:
     return tuple(found)
 
 
-def _stepped(kind: Kind, form: Form, rests: int, step: np.ndarray, duration: float, campaign: Campaign) -> Motion:
+def _stepped(
+    kind: schema.Kind, form: Form, rests: int, step: np.ndarray, duration: float, campaign: Campaign
+) -> Motion:
     """Rests with equal steps (3,) between them, each of `duration` [s] and one ramp."""
     ramp, dwell = campaign.driving.ramp, campaign.dwell
     move = float(np.ceil(RATE * (max(duration, ramp) + ramp)) / RATE)

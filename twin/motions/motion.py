@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from calibration.recording.schema import Kind, Role
+from calibration.recording import schema
 from twin.config.campaign import Campaign, Form
 from twin.motions.swings import FORWARD, JOINTS, TAU, Swing, in_step
 from twin.transforms import exp6
@@ -112,8 +112,8 @@ class Motion:
     """
 
     id: str
-    role: Role
-    kind: Kind
+    role: schema.Role
+    kind: schema.Kind
     name: str
     command: np.ndarray
     dwells: np.ndarray
@@ -128,14 +128,14 @@ class Motion:
         return (len(self.command) - 1) / RATE
 
 
-def swing(id: str, role: Role, kind: Kind, path: Swing, duration: float, campaign: Campaign) -> Motion:
+def swing(id: str, role: schema.Role, kind: schema.Kind, path: Swing, duration: float, campaign: Campaign) -> Motion:
     """A swing between two rests."""
     t = _times(duration + 2.0 * campaign.rest)
     s = path_time(t - campaign.rest, duration, campaign.ramp)
     return Motion(id, role, kind, id, path.at(s), *_no_dwells())
 
 
-def pushed(id: str, role: Role, force: float, campaign: Campaign) -> Motion:
+def pushed(id: str, role: schema.Role, force: float, campaign: Campaign) -> Motion:
     """The hand held out in front, pushed sideways, towards the robot and down: two seconds each, with pauses."""
     t = _times(2.0 * campaign.rest + 3 * 4.0)
     push = np.zeros((len(t), 3))
@@ -146,7 +146,9 @@ def pushed(id: str, role: Role, force: float, campaign: Campaign) -> Motion:
     return Motion(id, role, "swing", id, still, *_no_dwells(), push=push)
 
 
-def postures(id: str, role: Role, through: np.ndarray, campaign: Campaign, sides: np.ndarray | None = None) -> Motion:
+def postures(
+    id: str, role: schema.Role, through: np.ndarray, campaign: Campaign, sides: np.ndarray | None = None
+) -> Motion:
     """Rests in postures (n, 8), the first of them at the start, with straight moves in joint space between.
 
     Where `sides` (n - 1, 8) of -1, 0, 1 are given, each posture is reached by way of a point BEYOND * side before it.

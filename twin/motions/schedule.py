@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from calibration.recording.schema import Role
+from calibration.recording import schema
 from twin.config.campaign import Campaign
 from twin.motions import driving, postures
 from twin.motions import motion as motions
@@ -65,7 +65,9 @@ def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign
     return (motions.postures("postures", "calibration", q, campaign, sides),)
 
 
-def _statics(id: str, role: Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
+def _statics(
+    id: str, role: schema.Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign
+) -> tuple[Motion, ...]:
     """The first posture is where the trial starts, the n that follow are dwelt in; not drawn unless asked for."""
     if not _asked(campaign, id.replace("_confirmation", "_validation")):
         return ()
@@ -96,7 +98,7 @@ def _loaded(campaign: Campaign) -> tuple[Motion, ...]:
     )
 
 
-def _swings(role: Role, duration: float, paths: dict[str, Swing], campaign: Campaign) -> tuple[Motion, ...]:
+def _swings(role: schema.Role, duration: float, paths: dict[str, Swing], campaign: Campaign) -> tuple[Motion, ...]:
     if duration == 0.0:
         return ()
     asked = {name: path for name, path in paths.items() if _asked(campaign, name)}

@@ -9,7 +9,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from calibration.recording.trial import Trial
+from calibration.recording import Trial
 from twin.motions.motion import RATE, Motion
 from twin.motions.swings import JOINTS
 from twin.simulation.build import Twin

@@ -25,7 +25,7 @@ from calibration.mocap.cluster_pose import body_poses
 from calibration.mocap.cluster_shape import cluster, misfit, of_one_shape
 from calibration.numerics.alignment import hand_eye, registration_start
 from calibration.numerics.lie import compose, inverse, to_vector
-from calibration.recording.schema import BASE, HAND, Body, Marker, is_point
+from calibration.recording.schema import BASE, HAND, Body, Marker
 from calibration.robot.chain import Chain
 
 _REST = 1.0  # [s]
@@ -88,7 +88,7 @@ def _fitted(
     base, hand = bodies[BASE], bodies[HAND]
     readings = [in_order(r, chain.measured) for r in postures]
     A = np.concatenate([inverse(chain.poses(q, base.link)) @ chain.poses(q, hand.link) for q in readings])
-    placed = _pointed if is_point(hand) else _posed
+    placed = _pointed if hand.is_point else _posed
     found = dict(zip((BASE, HAND), placed(mapping, bodies, A, postures), strict=True))
     fitted = [b.name for b in mapping.content.bodies if b.fitted and b.name in found]
     return {n: bodies[n].model_copy(update={"placement": tuple(map(float, found[n]))}) for n in fitted}

@@ -1,1 +1,5 @@
-"""Stage clocks: the instruments' clocks on that of the motion capture."""
+"""Clocks of robot and force plate relative to the motion capture."""
+
+from calibration.stages.clocks.stage import synchronise
+
+__all__ = ["synchronise"]

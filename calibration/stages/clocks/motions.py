@@ -17,7 +17,7 @@ from calibration.numerics.lie import inverse
 from calibration.numerics.signals import Signal, body_rates, even, low_passed, play
 from calibration.numerics.time_delay import Pair, coarse_lag
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description, base_body, hand_body
+from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
 from calibration.stages.clocks.plate_moments import Carrier, JointMotion, model_moments, plate_moments
@@ -39,7 +39,7 @@ class Motion:
 
 def robot_motions(description: Description, chain: Chain, trials: Sequence[Trial]) -> Iterator[Motion]:
     """Angular velocity of the hand in the base, of every trial that shows one."""
-    base, hand = base_body(description), hand_body(description)
+    base, hand = description.base_body, description.hand_body
     for trial in trials:
         try:
             T_base_hand = inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T

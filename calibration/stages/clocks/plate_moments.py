@@ -27,7 +27,7 @@ from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import from_vector, inverse, mean, to_vector
 from calibration.numerics.signals import RATE, Signal, even, low_passed
 from calibration.numerics.time_delay import Pair, coarse_lag
-from calibration.recording.schema import Body, Description, base_body, hand_body
+from calibration.recording.schema import Body, Description
 from calibration.recording.trial import Trial
 
 _CUTOFF = 4.0  # [Hz]
@@ -65,7 +65,7 @@ class Carrier:
 
 def carriers(model: pin.Model, description: Description, trials: Sequence[Trial]) -> tuple[Carrier, ...]:
     """The base body and every other one but the hand that all trials show, each with the masses up to the next."""
-    base, hand = base_body(description), hand_body(description)
+    base, hand = description.base_body, description.hand_body
     others = [b for b in description.bodies if b.name not in (base.name, hand.name)]
     owner: dict[int, Body] = {1: base}  # of two bodies on one link the first carries it
     for body in (b for b in others if all(_is_seen(b, trial) for trial in trials)):

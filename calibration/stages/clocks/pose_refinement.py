@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.postures import Postures, read_passing, read_postures
+from calibration.mocap.postures import Postures, passing_postures, static_postures
 from calibration.numerics.lie import inverse, rotation_vector
 from calibration.numerics.time_delay import Lag
 from calibration.recording.clock import Clock
@@ -80,9 +80,9 @@ def provisional(chain: Chain, description: Description, trials: Sequence[Trial],
 def _postures(description: Description, trials: Sequence[Trial], robot: Clock) -> Postures:
     """Static postures, if any, and those passed through, evenly spaced over all trials."""
     seconds = sum(float(trial.t_mocap[-1] - trial.t_mocap[0]) for trial in trials)
-    passed = read_passing(description, trials, robot, max(_SPACING, seconds / _PASSED))
+    passed = passing_postures(description, trials, robot, max(_SPACING, seconds / _PASSED))
     try:
-        return read_postures(description, trials, robot).joined(passed)
+        return static_postures(description, trials, robot).joined(passed)
     except NotEnoughData:
         return passed
 

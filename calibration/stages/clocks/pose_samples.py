@@ -15,7 +15,7 @@ from calibration.mocap.cluster_pose import BodyPoses, poses_of
 from calibration.numerics.lie import adjoint, inverse
 from calibration.numerics.signals import RATE, Signal, even, low_passed, play
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description, base_body, hand_body
+from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 
 HALF_WIDTHS = (1e-4, 4e-4)  # [rad, m]
@@ -52,7 +52,7 @@ def read_samples(description: Description, trial: Trial, clock: Clock, calm: boo
     Raises:
         NotEnoughData: Base and hand are hardly in view, or nothing is calm.
     """
-    base, hand = poses_of(base_body(description), trial), poses_of(hand_body(description), trial)
+    base, hand = poses_of(description.base_body, trial), poses_of(description.hand_body, trial)
     s, T = clock.from_mocap(trial.t_mocap), inverse(base.T) @ hand.T
     slow = low_passed(even(trial.t_robot, trial.q_motor), _CUTOFF)
     rates = np.gradient(slow.x, 1.0 / RATE, axis=0)

@@ -21,7 +21,7 @@ import pinocchio as pin
 from calibration.errors import NotEnoughData
 from calibration.mocap.postures import BLOCKS, dwell_windows, inflation, mean_poses
 from calibration.numerics.lie import adjoint, compose, from_vector, inverse, local_twist, rotation_vector, to_vector
-from calibration.recording.schema import Description, Kind, base_body
+from calibration.recording.schema import Description, Kind
 from calibration.recording.trial import Trial
 
 _STANDS = [2, 3, 4]  # of a frame's vector
@@ -124,7 +124,7 @@ def read_stations(description: Description, trials: Sequence[tuple[Kind, Trial]]
     Raises:
         NotEnoughData: A trial has fewer than two.
     """
-    body, found = base_body(description), []
+    body, found = description.base_body, []
     for index, (_, trial) in enumerate(trials):
         mine = []
         for start, stop in dwell_windows(trial):

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.mocap.postures import Postures, read_passing
+from calibration.mocap.postures import Postures, passing_postures
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description, base_body, hand_body
+from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.geometry.hand_residual import linearised
@@ -41,7 +41,7 @@ def nearest_hand(
     seen = [trial for trial in trials if _is_seen(description, trial)]
     if not seen:
         return {joint: found[0] for joint, found in options.items() if found}
-    raw = read_passing(description, seen, robot, _SPACING)
+    raw = passing_postures(description, seen, robot, _SPACING)
     at = linearised(hand, hand.theta, raw)
     size = np.sqrt((at.r.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
     W = np.repeat(1.0 / np.maximum(size, np.finfo(float).tiny), 3)
@@ -87,10 +87,10 @@ def _predicted(
                 if s.trial_id == trial.id:
                     q[:, trial.joint.index(joint)] -= np.interp(trial.t_robot, s.t, d)
         less.append(replace(trial, q_motor=q))
-    return raw.q - read_passing(description, less, robot, _SPACING).q
+    return raw.q - passing_postures(description, less, robot, _SPACING).q
 
 
 def _is_seen(description: Description, trial: Trial) -> bool:
     """Whether the trial records three markers of the base and of the hand."""
-    bodies = (base_body(description), hand_body(description))
+    bodies = (description.base_body, description.hand_body)
     return all(sum(m.name in trial.marker for m in body.markers) >= 3 for body in bodies)

@@ -1,1 +1,24 @@
-"""Stage suspension: base motion under a wrench."""
+"""Motion of the base on its wheels under the wrench of the moving arm."""
+
+from calibration.stages.suspension.base_response import laboratory, sway_of
+from calibration.stages.suspension.checks import STAGE
+from calibration.stages.suspension.floor_wrench import plate_load
+from calibration.stages.suspension.model import Source, Suspension
+from calibration.stages.suspension.rest_frame import Rest, rest_of
+from calibration.stages.suspension.stage import Form, fit_suspension
+from calibration.stages.suspension.wheels import Point, wheel_model
+
+__all__ = [
+    "Form",
+    "Point",
+    "Rest",
+    "STAGE",
+    "Source",
+    "Suspension",
+    "fit_suspension",
+    "laboratory",
+    "plate_load",
+    "rest_of",
+    "sway_of",
+    "wheel_model",
+]

@@ -27,7 +27,7 @@ from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import skew
 from calibration.numerics.signals import CUTOFF, RATE, even, low_passed
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description, base_body
+from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.chain import chain_of
 from calibration.robot.floating_base import floating_model
@@ -101,7 +101,7 @@ def sway_of(description: Description, trial: Trial, rest: Rest, load: Load, cuto
         NotEnoughData: Markers or wrench are missing.
     """
     forcing = forcing_of(load, float(trial.t_mocap[0]))
-    found = low_passed(even(trial.t_mocap, rest.displacement(poses_of(base_body(description), trial).T)), cutoff)
+    found = low_passed(even(trial.t_mocap, rest.displacement(poses_of(description.base_body, trial).T)), cutoff)
     keep = (found.t >= forcing.t[0]) & (found.t <= forcing.t[-1])
     if keep.sum() < 2.0 * RATE:
         raise NotEnoughData(f"{trial.id}: base markers and wrench overlap for less than two seconds")

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from calibration.errors import NotEnoughData
 from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import compose, from_vector, inverse, mean, to_vector
-from calibration.recording.schema import Description, base_body
+from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 
 
@@ -49,7 +49,7 @@ def rest_of(description: Description, trial: Trial, T_base_B: np.ndarray) -> Res
     Raises:
         NotEnoughData: They are not seen there.
     """
-    body = base_body(description)
+    body = description.base_body
     early = trial.t_mocap <= trial.t_mocap[0] + REST
     T_lab_B = poses_of(body, trial).T[early]
     if not np.isfinite(T_lab_B).any():

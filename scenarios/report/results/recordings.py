@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.recording import netcdf
-from calibration.recording.schema import Description, TrialEntry
+from calibration.recording import Description, TrialEntry, netcdf
 from scenarios.report.results.formatting import fixed, significant
 
 

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 import calibration
-from calibration.recording.schema import Description
+from calibration.recording import Description
 from scenarios.files.errors import ScenarioError
 from scenarios.report.results.recordings import Recorded, recorded
 from scenarios.report.results.result_files import Derived, Evaluation, ScenarioNote, Score, Truth

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from calibration.recording import netcdf
-from calibration.recording.netcdf import Group
 
 
 @dataclass(frozen=True)
@@ -51,14 +50,14 @@ def read_traces(path: Path) -> tuple[Trace, ...]:
         return tuple(_trace(names, group) for names, group in _leaves(file, ()))
 
 
-def _leaves(group: Group, names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Group]]:
+def _leaves(group: netcdf.Group, names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], netcdf.Group]]:
     if "position_error" in group.variables:
         yield names, group
     for name, child in group.groups.items():
         yield from _leaves(child, (*names, name))
 
 
-def _trace(names: tuple[str, ...], group: Group) -> Trace:
+def _trace(names: tuple[str, ...], group: netcdf.Group) -> Trace:
     model, base, encoder, trial = names
 
     def mm(name: str) -> np.ndarray:

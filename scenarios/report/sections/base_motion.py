@@ -10,16 +10,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap import poses_of, relabelled_trial
 from calibration.numerics.lie import from_vector
 from calibration.numerics.signals import CUTOFF, even, low_passed
 from calibration.prediction.base_pose import base_poses
 from calibration.prediction.predictor import REFERENCE, Predictor, predictor
-from calibration.recording.schema import TrialEntry, base_body
-from calibration.recording.trial import Trial
-from calibration.stages.suspension.base_response import laboratory
-from calibration.stages.suspension.model import Suspension
-from calibration.stages.suspension.rest_frame import rest_of
+from calibration.recording import Trial, TrialEntry
+from calibration.stages.suspension import Suspension, laboratory, rest_of
 from scenarios.plots import ESTIMATE, OTHER, Line, drawing, figure, measured_beside
 from scenarios.report.results.formatting import fixed
 from scenarios.report.results.run_results import Results
@@ -129,7 +126,7 @@ def sway(results: Results) -> tuple[Sway | None, str]:
     if entry is None:
         return None, "no held-out trial moves"
     try:
-        return _of_trial(predictor(estimate, dataset), estimate.suspension, entry, dataset.read(entry)), ""
+        return _of_trial(predictor(estimate, dataset), estimate.suspension, entry, relabelled_trial(dataset, entry)), ""
     except NotEnoughData as error:
         return None, str(error)
 
@@ -138,7 +135,7 @@ def _of_trial(prepared: Predictor, suspension: Suspension, entry: TrialEntry, tr
     description, base = prepared.description.loaded(entry), from_vector(prepared.models["model_1"].base)
     lab = laboratory(prepared.urdf, description, prepared.robot, prepared.plate, base)
     rest = rest_of(description, trial, base)
-    smooth = low_passed(even(trial.t_mocap, rest.displacement(poses_of(base_body(description), trial).T)), CUTOFF)
+    smooth = low_passed(even(trial.t_mocap, rest.displacement(poses_of(description.base_body, trial).T)), CUTOFF)
     measured = np.where(smooth.valid[:, None], _UNIT * smooth.x, np.nan)
     alone = Sway(entry.id, smooth.t - trial.t_mocap[0], measured, ())
     predicted = []

@@ -14,10 +14,8 @@ from matplotlib.figure import Figure
 
 from calibration.errors import NotEnoughData
 from calibration.prediction.predictor import predictor
-from calibration.recording.trial import Trial
-from calibration.stages.joints.correction import JointModels
-from calibration.stages.joints.model import JointModel
-from calibration.stages.joints.samples import Samples, pooled, samples_of
+from calibration.recording import Trial
+from calibration.stages.joints import JointModel, JointModels, Samples, pooled, samples_of
 from scenarios.plots import BACK, FORTH, Flank, drawing, figure, hysteresis
 from scenarios.report.results.formatting import fixed
 from scenarios.report.results.run_results import Results

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.stages.joints.model import JointModel
-from calibration.stages.joints.separable_fit import limit_of
+from calibration.stages.joints import JointModel, limit_of
 from scenarios.report.results import figures, formatting
 from scenarios.report.results.ladder import Step
 from scenarios.report.results.run_results import Results

@@ -7,9 +7,8 @@ from typing import Literal
 import numpy as np
 
 from calibration.inference.parameters import Model
-from calibration.recording.schema import Description
-from calibration.stages.suspension.checks import STAGE
-from calibration.stages.suspension.wheels import Point, wheel_model
+from calibration.recording import Description
+from calibration.stages.suspension import STAGE, Point, wheel_model
 from scenarios.report.results.run_results import Results
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -13,7 +13,7 @@ from calibration.design.next_postures import N, believed_play, record_next
 from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.inference.parameters import Parameter
 from calibration.numerics.lie import exp6
-from calibration.recording.experiment import read_remedies
+from calibration.recording.experiment import read_plans
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.stages.frames.base_stage import locate_base
@@ -170,7 +170,7 @@ def test_the_estimate_keeps_them_as_a_file(chain, suggested, tmp_path):
     remedies = (suggested[0], drive_next(chain, DESCRIBED, None, None)[0])
     estimate = Estimate("not_calibrated", (), (), (), "", mjcf.urdf(), names, remedies=remedies)
     save_estimate(estimate, tmp_path)
-    assert read_remedies(tmp_path / "record_next.yaml") == (chain.measured, remedies)
+    assert read_plans(tmp_path / "record_next.yaml") == (chain.measured, remedies)
     assert load_estimate(tmp_path).remedies == remedies
     save_estimate(replace(estimate, remedies=()), tmp_path)
     assert not (tmp_path / "record_next.yaml").exists()

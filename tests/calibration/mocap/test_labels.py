@@ -5,7 +5,7 @@ import pytest
 
 from calibration import load
 from calibration.mocap.cluster_pose import poses_of
-from calibration.mocap.labels import with_right_labels
+from calibration.mocap.labels import relabelled_trials, with_right_labels
 from calibration.mocap.postures import readings_at
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Body, Marker
@@ -96,10 +96,12 @@ def test_exchanged_labels_of_three_markers_in_sight_are_set_right_by_where_they_
     assert [(d.n_mended, d.n_masked) for d in done] == [(30, 0)]
 
 
-def test_a_dataset_gives_trials_with_their_labels_right(truth, trial, tmp_path):
+def test_trials_of_a_dataset_have_their_labels_corrected(truth, trial, tmp_path):
     wrong = swapped(trial, np.arange(100, 130), 4, 5)
     dataset = load(rigid_robot.write(tmp_path / "d", [("swing", "calibration", "swing", wrong)]))
-    ((_, found),) = dataset.trials("calibration")
+    ((_, raw),) = dataset.trials("calibration")
+    np.testing.assert_allclose(raw.marker_position, wrong.marker_position, atol=1e-6)
+    ((_, found),) = relabelled_trials(dataset, "calibration")
     np.testing.assert_allclose(found.marker_position, trial.marker_position, atol=1e-6)
     body = dataset.description.body("gripper")
     assert np.abs(poses_of(body, found).residual).max() < 1e-3

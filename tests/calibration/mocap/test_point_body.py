@@ -6,7 +6,7 @@ import pytest
 import mjcf
 from calibration.mocap.postures import mean_postures
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Description, hand_body, is_point, point_of
+from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.stages.geometry.hand_residual import linearised
@@ -15,7 +15,7 @@ from tests.doubles import rigid_robot
 
 RNG = np.random.default_rng(0)
 WHOLE = rigid_robot.described()
-FEW = hand_body(WHOLE).model_copy(update={"markers": hand_body(WHOLE).markers[:2]})
+FEW = WHOLE.hand_body.model_copy(update={"markers": WHOLE.hand_body.markers[:2]})
 DESCRIBED: Description = WHOLE.model_copy(
     update={"bodies": tuple(FEW if b.name == FEW.name else b for b in WHOLE.bodies)}
 )
@@ -40,9 +40,9 @@ def postures():
 
 
 def test_two_drawn_markers_are_their_mean(postures):
-    assert is_point(FEW) and postures.components == 3
+    assert FEW.is_point and postures.components == 3
     np.testing.assert_allclose(postures.point, np.mean([m.xyz for m in FEW.markers], axis=0))
-    assert np.linalg.norm(point_of(FEW)) > 0.01
+    assert np.linalg.norm(FEW.point) > 0.01
     at = linearised(HAND, PARAMETERS.nominal, postures)
     np.testing.assert_allclose(at.r, 0.0, atol=1e-12)
     assert np.linalg.eigvalsh(postures.covariance).min() > 0.99e-8 / 2.0

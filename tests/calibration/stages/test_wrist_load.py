@@ -11,7 +11,7 @@ from scipy.stats import binom
 
 import mjcf
 from calibration.errors import NotEnoughData, ShapeError
-from calibration.mocap.postures import read_postures
+from calibration.mocap.postures import static_postures
 from calibration.recording.clock import shared_clock
 from calibration.recording.schema import Payload
 from calibration.robot.chain import chain_of
@@ -120,7 +120,7 @@ def test_a_load_nobody_declared_is_told_with_what_to_declare(undeclared, verdict
         [trial],
         shared_clock("robot"),
         hand,
-        read_postures(description, [trial], shared_clock("robot")),
+        static_postures(description, [trial], shared_clock("robot")),
     )
     assert said.verdict == verdict and words in said.message and "25 postures" in said.message
 
@@ -136,7 +136,7 @@ def test_a_wrist_without_a_link_or_a_static_posture_is_said_not_to_be_used():
             [t],
             shared_clock("robot"),
             hand,
-            read_postures(description, [trial], shared_clock("robot")),
+            static_postures(description, [trial], shared_clock("robot")),
         )
         assert said.verdict == "missing" and words in said.message
     silent = replace(trial, wrist_wrench=np.full((len(trial.t_robot), 6), np.nan))
@@ -147,7 +147,7 @@ def test_a_wrist_without_a_link_or_a_static_posture_is_said_not_to_be_used():
             [silent],
             shared_clock("robot"),
             hand,
-            read_postures(description, [trial], shared_clock("robot")),
+            static_postures(description, [trial], shared_clock("robot")),
         )
         == ()
     )

@@ -15,7 +15,7 @@ from calibration.design.information import prospect
 from calibration.design.plan import compared, nominal_task, plan
 from calibration.design.sequence import clear, sides
 from calibration.errors import InputError
-from calibration.recording.experiment import read_remedies, to_text
+from calibration.recording.experiment import plans_text, read_plans
 from calibration.stages.geometry.parameters import geometry_parameters
 from scenarios import load
 from scenarios.files import yaml_file
@@ -166,8 +166,8 @@ def test_a_box_hides_what_is_behind_it_and_nothing_else():
 
 def test_the_file_reads_back(found, tmp_path):
     remedy = found.remedy("geometry", "why: a test")
-    (tmp_path / "d.yaml").write_text(to_text(DESCRIBED.joint_names, [remedy]))
-    joints, remedies = read_remedies(tmp_path / "d.yaml")
+    (tmp_path / "d.yaml").write_text(plans_text(DESCRIBED.joint_names, [remedy]))
+    joints, remedies = read_plans(tmp_path / "d.yaml")
     assert joints == DESCRIBED.joint_names and remedies == (remedy,)
     assert remedy.sigma[0].name == "frame.base.base.x" and all(s.after <= s.before for s in remedy.sigma)
 
@@ -183,7 +183,7 @@ def test_the_file_reads_back(found, tmp_path):
 def test_a_file_that_is_none_is_told(tmp_path, text):
     (tmp_path / "d.yaml").write_text(text)
     with pytest.raises(InputError):
-        read_remedies(tmp_path / "d.yaml")
+        read_plans(tmp_path / "d.yaml")
 
 
 def test_a_robot_without_wheels_or_shapes_is_designed_for_too():
@@ -199,7 +199,7 @@ def test_a_robot_without_wheels_or_shapes_is_designed_for_too():
 def test_the_command_writes_postures_and_a_scenario_that_records_them(tmp_path):
     out, campaign = tmp_path / "postures.yaml", tmp_path / "designed.yaml"
     found = design(load("humanoids2024"), 5, "D", out, campaign)
-    (remedy,) = read_remedies(out)[1]
+    (remedy,) = read_plans(out)[1]
     assert remedy.postures == found.plan.postures and len(remedy.postures) == 5
     assert [p.q for p in remedy.postures] == list(load(campaign).twin.campaign.given_postures)
 
@@ -228,7 +228,7 @@ def test_approaches_that_are_not_one_a_posture_are_refused():
 
 def test_what_an_estimate_asks_for_is_recorded_after_the_scenario_s_own_postures(found, tmp_path):
     remedy = replace(found.remedy("geometry", "too few"), postures=found.postures[:8])
-    (tmp_path / "record_next.yaml").write_text(to_text(DESCRIBED.joint_names, [remedy]))
+    (tmp_path / "record_next.yaml").write_text(plans_text(DESCRIBED.joint_names, [remedy]))
     plain = load("humanoids2024", ["twin.campaign.calibration_postures=5"])
     both = recording_too(plain, tmp_path / "record_next.yaml").twin.campaign
     alone = schedule(plain.twin.campaign, mjcf.spec().compile(), plain.seed)[0]
@@ -236,9 +236,9 @@ def test_what_an_estimate_asks_for_is_recorded_after_the_scenario_s_own_postures
     np.testing.assert_allclose(both.given_postures, [*rests, *(p.q for p in remedy.postures)], atol=1e-12)
     assert both.given_approaches == ((0,) * 8,) * 5 + tuple(p.approach for p in remedy.postures)
     beyond = replace(remedy.postures[0], q=np.r_[0.1, 9.0, np.zeros(6)])
-    (tmp_path / "beyond.yaml").write_text(to_text(DESCRIBED.joint_names, [replace(remedy, postures=(beyond,))]))
+    (tmp_path / "beyond.yaml").write_text(plans_text(DESCRIBED.joint_names, [replace(remedy, postures=(beyond,))]))
     with pytest.raises(ScenarioError, match=r"beyond.yaml: arm_1_joint goes from 0.0 to 2.7\d* \(got 9.0\)"):
         recording_too(plain, tmp_path / "beyond.yaml")
-    (tmp_path / "other.yaml").write_text(to_text(("a",), []))
+    (tmp_path / "other.yaml").write_text(plans_text(("a",), []))
     with pytest.raises(ScenarioError, match="joints are"):
         recording_too(plain, tmp_path / "other.yaml")

@@ -9,7 +9,6 @@ from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import to_vector
 from calibration.prediction.base_pose import base_poses
 from calibration.recording.clock import Clock
-from calibration.recording.schema import base_body
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.modal_response import modes_of
 from calibration.stages.suspension.printed_fit import matrices
@@ -87,7 +86,7 @@ def test_springs_come_back_from_recordings(fitted):
 def test_the_base_is_predicted_from_the_wrench_and_the_first_second(fitted, recorded):
     trial, x = recorded["d"]
     lab = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
-    body = base_body(DESCRIPTION)
+    body = DESCRIPTION.base_body
     blind = trial.marker_position.copy()
     blind[trial.t_mocap > 1.0] = np.nan
     T = base_poses(fitted[0], lab, replace(trial, marker_position=blind), "plate")
