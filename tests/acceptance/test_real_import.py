@@ -1,4 +1,4 @@
-"""Public recordings of a real robot beside the checkout: one documented command each, then calibrate."""
+"""Public recordings of a real robot, under tests/data: one documented command each, then calibrate."""
 
 import json
 from pathlib import Path
@@ -11,12 +11,10 @@ from calibration.errors import InputError
 from scenarios.steps import import_export
 from tests.doubles.real_postures import KINDS, ROOT, TWO_DAYS, one_marker, real_rows, spoilt_rows, written
 
-REAL = ROOT.parent / "shared/data/real"
+REAL = ROOT / "tests/data"
 
 
 def imported(tmp_path, file: str, mapping: str) -> tuple[Path, tuple[str, ...]]:
-    if not (REAL / file).is_file():
-        pytest.skip(f"{file} is not beside the checkout")
     notes = import_export.import_files("csv", [REAL / file], ROOT / "docs/mappings" / mapping, tmp_path / "dataset")
     return tmp_path / "dataset", notes
 

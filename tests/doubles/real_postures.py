@@ -1,20 +1,17 @@
-"""Static postures of a real robot beside the checkout, their mappings, and postures spoilt on purpose."""
+"""Static postures of a real robot, their mappings, and postures spoilt on purpose."""
 
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 ROOT = Path(__file__).parents[2]
-TABLE = ROOT.parent / "shared/data/real/qualisys_2021-11-30_postures.csv"
+TABLE = ROOT / "tests/data/qualisys_2021-11-30_postures.csv"
 TWO_DAYS = ROOT / "docs/mappings/qualisys_two_days.yaml"
 KINDS = (0.02, 0.05, 0.3, "labels")
 
 
 def real_rows() -> tuple[str, np.ndarray]:
-    """Head and numbers of the table; the test is skipped where it is not there."""
-    if not TABLE.is_file():
-        pytest.skip(f"{TABLE.name} is not beside the checkout")
+    """Head and numbers of the table."""
     return TABLE.read_text().splitlines()[0], np.loadtxt(TABLE, delimiter=",", skiprows=1)
 
 

@@ -26,7 +26,7 @@ from scenarios.steps import import_export
 from twin.motions.swings import JOINTS
 
 ROOT = Path(__file__).parents[3]
-LOG_FILE = ROOT.parent / "shared/data/real/vicon_forceplate_2023-09-20.csv"
+LOG_FILE = ROOT / "tests/data/vicon_forceplate_2023-09-20.csv"
 T = np.arange(0.0, 30.0, 0.01)
 START = 23.416  # [s] of the log, where the fitted swings are at rest
 
@@ -34,8 +34,6 @@ START = 23.416  # [s] of the log, where the fitted swings are at rest
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
     """The public log as a dataset."""
-    if not LOG_FILE.is_file():
-        pytest.skip(f"{LOG_FILE.name} is not beside the checkout")
     folder = tmp_path_factory.mktemp("log") / "dataset"
     import_export.import_files("csv", [LOG_FILE], ROOT / "docs/mappings/vicon_forceplate.yaml", folder)
     return folder
@@ -134,8 +132,6 @@ def test_the_log_s_markers_do_not_keep_their_shape(log):
 
 def test_markers_err_upwards_as_they_do_sideways():
     """Three markers cannot say how far they shift across their plane; the shoulder's four can: as far as within it."""
-    if not LOG_FILE.is_file():
-        pytest.skip(f"{LOG_FILE.name} is not beside the checkout")
     columns = [f"shoulder{k}_{a}" for k in (1, 2, 3, 4) for a in "xyz"]
     read = np.genfromtxt(LOG_FILE, delimiter=",", names=True, dtype=None, encoding=None, usecols=["time_utc", *columns])
     p = low_passed(even(_seconds(read["time_utc"]), np.stack([read[c] for c in columns], axis=1)), 5.0)
@@ -176,8 +172,6 @@ def test_the_floor_feels_the_hand_s_inertia(log):
 
 def test_the_swings_turn_the_hand_as_the_log_did():
     """The angle from where it was at rest, which needs no place of the markers on the gripper; up to 0.8 rad."""
-    if not LOG_FILE.is_file():
-        pytest.skip(f"{LOG_FILE.name} is not beside the checkout")
     columns = [f"gripper{k}_{a}" for k in (1, 2, 3) for a in "xyz"]
     markers = np.genfromtxt(
         LOG_FILE, delimiter=",", names=True, dtype=None, encoding=None, usecols=["time_utc", *columns]
