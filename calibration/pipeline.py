@@ -15,6 +15,7 @@ from calibration.design.next_motions import drive_next, sweeps_next, swings_next
 from calibration.design.next_postures import record_next
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
 from calibration.estimate.estimate import Estimate, RobotNames
+from calibration.estimate.rows import MAIN
 from calibration.inference.parameters import Model
 from calibration.mocap.labels import relabelled_trials
 from calibration.options import Options
@@ -37,7 +38,6 @@ from calibration.verdict import Verdict
 Progress = Callable[[str, float], None]
 STAGES = ("clocks", "registration", "base_frame", "arm_tool", "suspension", "geometry", "joints")
 _FRAMES = ("base_frame", "arm_tool")  # run where there is a spin; alone where the arm only ever posed
-MAIN = ("full", "model_2", "arm_tool", "registration")  # rows an estimate can stand for, the best first
 _NEEDS = {"joints": "geometry", "arm_tool": "base_frame"}
 _NO_CLOCKS = (Verdict("clocks", "missing", "posture means only: there is no time, and no clock to tell"),)
 

@@ -1,1 +1,6 @@
 """An estimate and its files."""
+
+from calibration.estimate.estimate import Estimate, RobotNames
+from calibration.estimate.files import calibrated_urdf, load_estimate, save_estimate
+
+__all__ = ["Estimate", "RobotNames", "calibrated_urdf", "load_estimate", "save_estimate"]

@@ -1,1 +1,22 @@
 """Held-out errors of predictions."""
+
+from calibration.evaluation.comparison import compare
+from calibration.evaluation.evaluate import Evaluation, evaluate
+from calibration.evaluation.ladder import Row, TrialErrors, Trials, ladder, row_entry, scored_errors
+from calibration.evaluation.marker_errors import PointRow, point_rows
+from calibration.evaluation.pose_errors import pose_errors
+
+__all__ = [
+    "Evaluation",
+    "PointRow",
+    "Row",
+    "TrialErrors",
+    "Trials",
+    "compare",
+    "evaluate",
+    "ladder",
+    "point_rows",
+    "pose_errors",
+    "row_entry",
+    "scored_errors",
+]

@@ -16,25 +16,15 @@ larger and happen to point against b, the right motion of the base makes the han
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from calibration.evaluation.ladder import Trace
+from calibration.estimate.rows import LADDER, NOMINAL, row_of
+from calibration.evaluation.ladder import TrialErrors
 
 _BLOCK = 2.0  # [s]
 _DRAWS = 2000
-_BASE = "model_1"  # the row that moves the base and nothing else
 _SEED = 20241122  # of the bootstrap alone: the same traces give the same interval
-_PAIRS = (
-    (("nominal", "fixed"), ("model_1", "plate")),
-    (("nominal", "fixed"), ("model_1", "dynamics")),
-    (("registration", "plate"), ("model_2", "plate")),
-    (("registration", "dynamics"), ("model_2", "dynamics")),
-    (("model_2", "plate"), ("model_3", "plate")),
-    (("model_2", "dynamics"), ("model_3", "dynamics")),
-)
 Key = tuple[str, str]
 
 
@@ -63,16 +53,25 @@ class Comparison:
     reason: str = ""
 
 
-def comparisons(traces: Sequence["Trace"]) -> Iterator[Comparison]:
+def comparisons(traces: Sequence[TrialErrors]) -> Iterator[Comparison]:
     """The pairs that the ladder is built on, as far as they are there."""
     present = {(t.model, t.base) for t in traces if t.encoder == "motor"}
-    for a, b in _PAIRS:
+    for a, b, moves_base_only in _pairs():
         if a in present and b in present:
             found = compare(traces, a, b)
-            yield replace(found, reason=base_reason(_base_errors(traces, b), found.finding)) if b[0] == _BASE else found
+            reason = base_reason(_base_errors(traces, b), found.finding) if moves_base_only else ""
+            yield replace(found, reason=reason)
 
 
-def compare(traces: Sequence["Trace"], a: Key, b: Key) -> Comparison:
+def _pairs() -> Iterator[tuple[Key, Key, bool]]:
+    """Each row with the one it builds on, by source of the base's motion; whether nothing but the base differs."""
+    for row in (r for r in LADDER if r.builds_on is not None):
+        before = row_of(str(row.builds_on))
+        for base in (b for b in ("plate", "dynamics") if b in row.bases):
+            yield (before.name, base if base in before.bases else "fixed"), (row.name, base), row.needs_suspension
+
+
+def compare(traces: Sequence[TrialErrors], a: Key, b: Key) -> Comparison:
     """One pair."""
     sums = np.concatenate(list(_blocks(traces, a, b)))  # squared error of a, of b, number of components
     rows = np.random.default_rng(_SEED).integers(len(sums), size=(_DRAWS, len(sums)))
@@ -82,9 +81,9 @@ def compare(traces: Sequence["Trace"], a: Key, b: Key) -> Comparison:
     return Comparison(a, b, whole, float(low), float(high), len(sums), finding)
 
 
-def _base_errors(traces: Sequence["Trace"], b: Key) -> dict[str, np.ndarray]:
+def _base_errors(traces: Sequence[TrialErrors], b: Key) -> dict[str, np.ndarray]:
     """Errors (n, 3) [m] of the nominal hand by where the base's motion came from, where all three are known."""
-    rows = {"fixed": ("nominal", "fixed"), "measured": ("nominal", "measured"), "predicted": b}
+    rows = {"fixed": (NOMINAL, "fixed"), "measured": (NOMINAL, "measured"), "predicted": b}
     kept = {key: [t for t in traces if (t.model, t.base, t.encoder) == (*key, "motor")] for key in rows.values()}
     e = {
         name: np.concatenate([t.scored.position for t in kept[key] if t.kind != "static"])
@@ -102,7 +101,7 @@ def _difference(sums: np.ndarray) -> np.ndarray:
     return np.asarray(1e3 * (np.sqrt(sums[:, 1] / sums[:, 2]) - np.sqrt(sums[:, 0] / sums[:, 2])))
 
 
-def _blocks(traces: Sequence["Trace"], a: Key, b: Key) -> Iterator[np.ndarray]:
+def _blocks(traces: Sequence[TrialErrors], a: Key, b: Key) -> Iterator[np.ndarray]:
     for trial in dict.fromkeys(t.trial_id for t in traces if t.kind != "static"):
         pair = [
             next(t for t in traces if (t.trial_id, t.model, t.base, t.encoder) == (trial, *key, "motor"))

@@ -21,8 +21,8 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.estimate.estimate import Estimate
 from calibration.evaluation.comparison import Comparison, comparisons
-from calibration.evaluation.joint_regimes import Explained, on_repetitions, on_validation
-from calibration.evaluation.ladder import Row, Trace, Trials, ladder, row_entry, scored_errors, trial_entry
+from calibration.evaluation.joint_regimes import RegimeQuality, on_repetitions, on_validation
+from calibration.evaluation.ladder import Row, TrialErrors, Trials, ladder, row_entry, scored_errors, trial_entry
 from calibration.evaluation.marker_errors import PointRow, point_rows
 from calibration.evaluation.pose_errors import PoseErrors, pose_errors
 from calibration.evaluation.protocols import protocol_rows
@@ -48,7 +48,7 @@ def _traces(
     dataset: Dataset,
     entries: tuple[TrialEntry, ...],
     progress: Callable[[str, float], None] | None,
-) -> list[Trace]:
+) -> list[TrialErrors]:
     """Errors of every row in each of these trials."""
     body, traces = dataset.description.hand_body, []
     for k, entry in enumerate(entries):
@@ -64,7 +64,7 @@ def _traces(
     return traces
 
 
-def regimes(predict: Predictor, dataset: Dataset, role: Role = "validation") -> tuple[Explained, ...]:
+def regimes(predict: Predictor, dataset: Dataset, role: Role = "validation") -> tuple[RegimeQuality, ...]:
     """What the joint models explain, on repetitions of calibration motions and on the trials of a role."""
     joints = predict.joints
     if joints is None or predict.robot is None:
@@ -84,8 +84,8 @@ class Evaluation:
     """
 
     rows: tuple[Row, ...]
-    traces: tuple[Trace, ...]
-    regimes: tuple[Explained, ...] = ()
+    traces: tuple[TrialErrors, ...]
+    regimes: tuple[RegimeQuality, ...] = ()
     confirmation: tuple[Row, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
     points: tuple[PointRow, ...] = ()
@@ -142,7 +142,7 @@ def evaluate(
     predict = predictor(estimate, dataset)
     traces = _traces(predict, dataset, entries, progress)
     registering = registration_trials(dataset) if role == "validation" else ()
-    confirmed: list[Trace] = []
+    confirmed: list[TrialErrors] = []
     if registering:
         later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
         confirmed = _traces(reregistered(predict, dataset), dataset, later, progress)
@@ -154,9 +154,9 @@ def evaluate(
     return Evaluation(rows, tuple(traces), regimes(predict, dataset, role), confirmation, moved, points)
 
 
-def _trace(p: Prediction, trial: Trial, errors: PoseErrors) -> Trace:
+def _trace(p: Prediction, trial: Trial, errors: PoseErrors) -> TrialErrors:
     scored = scored_errors(p.t, errors, trial, p.kind == "static")
-    return Trace(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
+    return TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
 
 
 def _means_errors(p: Prediction, body: Body, means: PostureMeans) -> PoseErrors:
@@ -167,11 +167,11 @@ def _means_errors(p: Prediction, body: Body, means: PostureMeans) -> PoseErrors:
     return PoseErrors(e, np.full(e.shape, np.nan))
 
 
-def _means_trace(p: Prediction, errors: PoseErrors) -> Trace:
-    return Trace(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, errors)
+def _means_trace(p: Prediction, errors: PoseErrors) -> TrialErrors:
+    return TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, errors)
 
 
-def _write_traces(path: Path, traces: tuple[Trace, ...]) -> None:
+def _write_traces(path: Path, traces: tuple[TrialErrors, ...]) -> None:
     """One group a row and trial: model/base/encoder/trial."""
     part = path.with_name(path.name + ".part")
     with netcdf.created(part) as file:

@@ -36,7 +36,7 @@ _OVER_NOISE = 10.0  # discrepancy over the noise of a reading [-]
 
 
 @dataclass(frozen=True)
-class Explained:
+class RegimeQuality:
     """What the model of one joint explains in one regime.
 
     Attributes:
@@ -79,7 +79,7 @@ class Explained:
         return 1.0 - self.after / max(self.before, np.finfo(float).tiny)
 
 
-def on_repetitions(models: JointModels, trials: Iterable[Trial], terms: Terms) -> tuple[Explained, ...]:
+def on_repetitions(models: JointModels, trials: Iterable[Trial], terms: Terms) -> tuple[RegimeQuality, ...]:
     """What the model explains of motions it has seen, in repetitions it has not: moving calibration trials."""
     moving = (trial for trial in trials if not len(trial.dwell_start))
     of_trials = [samples_of(models.inputs.of_trial(trial.id), trial, models.zero) for trial in moving]
@@ -94,7 +94,7 @@ def on_repetitions(models: JointModels, trials: Iterable[Trial], terms: Terms) -
     )
 
 
-def on_validation(models: JointModels, trials: Iterable[Trial], robot: Clock) -> tuple[Explained, ...]:
+def on_validation(models: JointModels, trials: Iterable[Trial], robot: Clock) -> tuple[RegimeQuality, ...]:
     """What the models explain of validation trials: while moving (`unseen_motion`), and of their dwells (`static`)."""
     moving: list[Trial] = []
     still: list[Trial] = []
@@ -105,7 +105,7 @@ def on_validation(models: JointModels, trials: Iterable[Trial], robot: Clock) ->
 
 def _on_repetitions(
     joint: str, zero: float, samples: Sequence[Samples], terms: Terms, noise: float
-) -> Iterator[Explained]:
+) -> Iterator[RegimeQuality]:
     excited = [s for s in samples if _visits_both_flanks(s)]
     halves = [half for s in excited for half in _halves(s)]
     if not halves or np.sqrt((pooled(halves).y ** 2).mean()) < _OVER_NOISE * noise:
@@ -114,13 +114,13 @@ def _on_repetitions(
     whole = pooled(halves)
     moves = np.abs(whole.velocity) > _MOVING
     e = (whole.y - np.concatenate(best.left_out))[moves]
-    yield _explained(joint, "repetition", best.degree, whole.y[moves], e, np.zeros(len(e)))
+    yield _quality(joint, "repetition", best.degree, whole.y[moves], e, np.zeros(len(e)))
     model = fit_joint(joint, halves, zero, terms, best)
     if model.degree is None:
         return
     ends = pooled([_ends(s) for s in excited])
     e = ends.y - model.discrepancy(ends.theta, ends.tau, ends.velocity)
-    yield _explained(joint, "start_stop", model.degree, ends.y, e, model.is_outside(ends.theta, ends.tau))
+    yield _quality(joint, "start_stop", model.degree, ends.y, e, model.is_outside(ends.theta, ends.tau))
 
 
 def _visits_both_flanks(samples: Samples) -> bool:
@@ -149,13 +149,13 @@ def _ends(samples: Samples) -> Samples:
     return samples.part(near & ~_settled(samples))
 
 
-def _on_others(models: JointModels, regime: Regime, trials: Sequence[Trial], robot: Clock) -> Iterator[Explained]:
+def _on_others(models: JointModels, regime: Regime, trials: Sequence[Trial], robot: Clock) -> Iterator[RegimeQuality]:
     for model in models.models:
         j = models.inputs.measured.index(model.joint)
         found = [rows for trial in trials if len(rows := _errors(models, j, regime, trial, robot))]
         if found:
             y, e, outside = np.concatenate(found).T
-            yield _explained(model.joint, regime, model.degree, y, e, outside)
+            yield _quality(model.joint, regime, model.degree, y, e, outside)
 
 
 def _errors(models: JointModels, j: int, regime: Regime, trial: Trial, robot: Clock) -> np.ndarray:
@@ -172,9 +172,11 @@ def _errors(models: JointModels, j: int, regime: Regime, trial: Trial, robot: Cl
     return rows[np.isfinite(rows).all(axis=1)] - np.array([1.0, 1.0, 0.0]) * models.zero[j]
 
 
-def _explained(
+def _quality(
     joint: str, regime: Regime, degree: int | None, y: np.ndarray, e: np.ndarray, outside: np.ndarray
-) -> Explained:
+) -> RegimeQuality:
     before, after = (float(np.sqrt((x**2).mean())) for x in (y, e))
     total = max(float(((y - y.mean()) ** 2).sum()), np.finfo(float).tiny)
-    return Explained(joint, regime, degree, len(y), before, after, 1.0 - float(e @ e) / total, float(outside.mean()))
+    return RegimeQuality(
+        joint, regime, degree, len(y), before, after, 1.0 - float(e @ e) / total, float(outside.mean())
+    )

@@ -15,7 +15,7 @@ Trials = Literal["dynamic", "static", "all"]
 
 
 @dataclass(frozen=True)
-class Trace:
+class TrialErrors:
     """Errors of one row in one trial.
 
     Attributes:
@@ -59,10 +59,10 @@ def scored_errors(t: np.ndarray, errors: PoseErrors, trial: Trial, static: bool)
     return PoseErrors(errors.position[after], errors.rotation[after])
 
 
-def ladder(traces: list[Trace], against: str) -> Iterator[Row]:
+def ladder(traces: list[TrialErrors], against: str) -> Iterator[Row]:
     """Rows of dynamic, static and all trials, in the traces' order of models."""
     keys = dict.fromkeys((t.model, t.base, t.encoder) for t in traces)
-    groups: tuple[tuple[Trials, Callable[[Trace], bool]], ...] = (
+    groups: tuple[tuple[Trials, Callable[[TrialErrors], bool]], ...] = (
         ("dynamic", lambda t: t.kind != "static"),
         ("static", lambda t: t.kind == "static"),
         ("all", lambda t: True),
@@ -86,7 +86,7 @@ def row_entry(row: Row) -> dict[str, Any]:
     return names | {"against": row.against} | figures
 
 
-def trial_entry(trace: Trace) -> dict[str, Any]:
+def trial_entry(trace: TrialErrors) -> dict[str, Any]:
     """One row in one trial: where a row is good and where it is not."""
     m = row_metrics(trace.scored)
     return {

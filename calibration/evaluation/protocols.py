@@ -11,23 +11,16 @@ Source: facts read in the public evaluation code of Nguyen et al. 2024, which ma
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from calibration.estimate.rows import LADDER
+from calibration.evaluation.ladder import Row, TrialErrors
 from calibration.evaluation.pose_errors import PoseErrors
 
-if TYPE_CHECKING:
-    from calibration.evaluation.ladder import Row, Trace
-
 _WINDOW = 5.0  # [s]
-_PUBLIC = (
-    ("nominal", "fixed", "motor", False),
-    ("model_1", "measured", "motor", False),
-    ("model_2", "measured", "motor", True),
-    ("model_3", "measured", "link", True),
-)
-_OURS = ("plate", "dynamics", "fixed")  # sources of the base's motion, the first that is there
+_PAPER = tuple((row, row.published) for row in LADDER if row.published is not None)
 
 
 @dataclass(frozen=True)
@@ -55,14 +48,15 @@ class ProtocolRow:
     orientation_rmse_component_deg: float
 
 
-def protocol_rows(traces: Sequence["Trace"], rows: Sequence["Row"]) -> tuple[ProtocolRow, ...]:
+def protocol_rows(traces: Sequence[TrialErrors], rows: Sequence[Row]) -> tuple[ProtocolRow, ...]:
     """The paper's models under both protocols, as far as they are there."""
     return (*_public(traces), *_ours(rows))
 
 
-def _public(traces: Sequence["Trace"]) -> Iterator[ProtocolRow]:
-    for model, base, encoder, removed in _PUBLIC:
-        mine = (t for t in traces if (t.model, t.base, t.encoder) == (model, base, encoder) and t.kind != "static")
+def _public(traces: Sequence[TrialErrors]) -> Iterator[ProtocolRow]:
+    for row, p in _PAPER:
+        key = (row.name, p.base, p.encoder)
+        mine = (t for t in traces if (t.model, t.base, t.encoder) == key and t.kind != "static")
         trace = next(mine, None)
         if trace is None:
             continue
@@ -71,19 +65,25 @@ def _public(traces: Sequence["Trace"]) -> Iterator[ProtocolRow]:
         e = PoseErrors(trace.errors.position[inside], trace.errors.rotation[inside]).complete
         if len(e):
             x, phi = e.position, e.rotation
-            if removed:
+            if p.constants_removed:
                 x, phi = x - x.mean(axis=0), phi - phi.mean(axis=0)
             mm, deg = 1e3 * float(np.sqrt((x**2).mean())), float(np.degrees(np.sqrt((phi**2).mean())))
-            yield ProtocolRow("public", model, base, encoder, removed, len(e), mm, deg)
+            yield ProtocolRow("public", *key, p.constants_removed, len(e), mm, deg)
 
 
-def _ours(rows: Sequence["Row"]) -> Iterator[ProtocolRow]:
-    for model, *_ in _PUBLIC:
-        bases = ("fixed",) if model == "nominal" else _OURS
-        mine = {r.base: r for r in rows if (r.model, r.trials, r.encoder) == (model, "dynamic", "motor")}
-        base = next((b for b in bases if b in mine), None)
+def _ours(rows: Sequence[Row]) -> Iterator[ProtocolRow]:
+    for row, _ in _PAPER:
+        mine = {r.base: r for r in rows if (r.model, r.trials, r.encoder) == (row.name, "dynamic", "motor")}
+        base = row.predictive_base(mine.keys())
         if base is not None:
             m = mine[base].metrics
             yield ProtocolRow(
-                "ours", model, base, "motor", False, m.n, m.position_rmse_component_mm, m.orientation_rmse_component_deg
+                "ours",
+                row.name,
+                base,
+                "motor",
+                False,
+                m.n,
+                m.position_rmse_component_mm,
+                m.orientation_rmse_component_deg,
             )

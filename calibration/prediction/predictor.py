@@ -15,12 +15,12 @@ Of a trial nothing else is read: encoders, plate, base markers of its first seco
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.estimate.estimate import Estimate
+from calibration.estimate.rows import LADDER, Base, Encoder, LadderRow, row_of
 from calibration.mocap.cluster_pose import poses_of, poses_of_means
 from calibration.mocap.labels import relabelled_trials
 from calibration.mocap.postures import readings_at
@@ -42,18 +42,6 @@ from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.model import Suspension
 
 REFERENCE = 1.0  # [s] of rest at the start of every trial
-Base = Literal["fixed", "plate", "dynamics", "measured"]
-Encoder = Literal["motor", "link"]
-_EVERY: tuple[Base, ...] = ("fixed", "plate", "dynamics", "measured")
-_ROWS: tuple[tuple[str, tuple[Base, ...], tuple[Encoder, ...]], ...] = (
-    ("nominal", ("fixed", "measured"), ("motor",)),
-    ("model_1", ("plate", "dynamics", "measured"), ("motor",)),
-    ("registration", _EVERY, ("motor",)),
-    ("arm_tool", _EVERY, ("motor",)),
-    ("model_2", _EVERY, ("motor",)),
-    ("model_3", _EVERY, ("motor", "link")),
-    ("full", _EVERY, ("motor",)),
-)
 
 
 @dataclass(frozen=True)
@@ -104,32 +92,32 @@ class Predictor:
     def __call__(self, entry: TrialEntry, trial: Trial) -> Iterator[Prediction]:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
         measured = self._measured_base(entry, trial)
-        for name, hand, encoder, bases in self._rows():
-            q = self.positions(name, encoder, trial)
+        for row, hand, encoder in self._rows():
+            q = self.positions(row.name, encoder, trial)
             known = np.isfinite(q).all(axis=1)
             T_B_H = np.full((len(q), 4, 4), np.nan)
             T_B_H[known] = hand.poses(q[known])
-            for base in bases:
+            for base in row.bases:
                 T_lab_B = self._base(base, hand, entry, trial, measured)
                 if T_lab_B is not None:
-                    yield Prediction(name, base, encoder, entry.id, entry.kind, trial.t_mocap, T_lab_B @ T_B_H)
+                    yield Prediction(row.name, base, encoder, entry.id, entry.kind, trial.t_mocap, T_lab_B @ T_B_H)
 
     def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
         """Predictions of posture means, one a posture in `t`: the base measured or its markers' own frame, motor side.
 
-        A model of the joints' hysteresis needs the motion before a posture, which means do not show: no `model_3`.
+        A model of the joints' hysteresis needs the motion before a posture, which means do not show.
         """
         T_lab_B = poses_of_means(self.description.base_body, means).T
-        for name, hand, encoder, _ in self._rows():
-            if encoder == "motor" and name in ("nominal", "registration", "model_2", "full"):
+        for row, hand, encoder in self._rows():
+            if encoder == "motor" and row.means:
                 T = T_lab_B @ hand.poses(means.q_motor)
-                yield Prediction(name, "measured", "motor", entry.id, entry.kind, np.arange(float(len(means))), T)
+                yield Prediction(row.name, "measured", "motor", entry.id, entry.kind, np.arange(float(len(means))), T)
 
-    def _rows(self) -> Iterator[tuple[str, HandModel, Encoder, tuple[Base, ...]]]:
-        for name, bases, encoders in _ROWS:
-            if name in self.models:
-                for encoder in encoders:
-                    yield name, self.models[name], encoder, bases
+    def _rows(self) -> Iterator[tuple[LadderRow, HandModel, Encoder]]:
+        for row in LADDER:
+            if row.name in self.models:
+                for encoder in row.encoders:
+                    yield row, self.models[row.name], encoder
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is asked with, at the motion capture's times."""
@@ -137,7 +125,7 @@ class Predictor:
             raise NotEnoughData(f"{trial.id}: no joint readings on a known clock, so no hand pose can be predicted")
         if encoder == "link" and self.joints is not None:
             return readings_at(trial, self.robot, trial.t_mocap, aligned_link_readings(trial, self.joints.zero))
-        if name == "model_3" and self.joints is not None:
+        if row_of(name).joints and self.joints is not None:
             corrected = correct(self.joints.of_trial(trial.id), trial.t_robot, trial.q_motor).q
             return readings_at(trial, self.robot, trial.t_mocap, corrected)
         return readings_at(trial, self.robot, trial.t_mocap, trial.q_motor)
@@ -181,17 +169,21 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     drawn = chain_of(dataset.urdf, description)
     frames = nominal_frames(drawn, description)
     chain = drawn if estimate.urdf in (None, dataset.urdf) else chain_of(str(estimate.urdf), description)
-    models = {m.name: hand_of(m, chain, frames) for m in estimate.models}
-    models["nominal"] = nominal_hand(drawn, frames)
-    if estimate.suspension is not None:
-        models["model_1"] = models["nominal"]
+    estimated = {m.name: hand_of(m, chain, frames) for m in estimate.models}
+    nominal, models = nominal_hand(drawn, frames), {}
+    for row in LADDER:
+        hand = nominal if row.geometry is None else estimated.get(row.geometry)
+        present = estimate.suspension is not None or not row.needs_suspension
+        if hand is not None and present and (estimate.joint_models or not row.joints):
+            models[row.name] = hand
     robot = estimate.clock("robot")
     trials = () if robot is not None else tuple(trial for _, trial in relabelled_trials(dataset, "calibration"))
     if trials:
         robot = next((c for c in synchronise(dataset.urdf, description, trials)[0] if c.instrument == "robot"), None)
     joints = None
-    if estimate.joint_models and "model_3" in models:
-        inputs = input_model(dataset.urdf, description, models["model_3"])
+    corrected = next((models[row.name] for row in LADDER if row.joints and row.name in models), None)
+    if corrected is not None:
+        inputs = input_model(dataset.urdf, description, corrected)
         joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
     return Predictor(models, dataset.urdf, description, robot, estimate.clock("plate"), estimate.suspension, joints)
 

@@ -2,8 +2,8 @@
 
     minimise over T_base_B, T_tool_H     sum_i |log6(T_measured_i^-1 T_B_H(q_i))|^2 / tolerance^2        12 parameters
 
-Asked of the dwells of the session's registration trials, which are not scored. Rows of the datasheet, `nominal` and
-`model_1`, are not registered. Encoders that were homed anew are not asked for: their error is part of the prediction's.
+Asked of the dwells of the session's registration trials, which are not scored. Rows of the datasheet are not
+registered. Encoders that were homed anew are not asked for: their error is part of the prediction's.
 
 A calibrated robot whose markers were put on anew: both frames fitted to a few postures, and what that is worth.
 
@@ -20,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from calibration.estimate.rows import row_of
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.labels import relabelled_trial
 from calibration.mocap.postures import dwell_windows
@@ -32,8 +33,7 @@ from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.geometry.registration import fit_frames, frame_weights
 
-REGISTRATION = "registration"
-_DATASHEET = ("nominal", "model_1")
+REGISTRATION = "registration"  # motion of the postures a session is registered with
 
 
 def registration_trials(dataset: Dataset) -> tuple[TrialEntry, ...]:
@@ -49,7 +49,7 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
     """
     trials = [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)]
     models = dict(predict.models)
-    for name in models.keys() - set(_DATASHEET):
+    for name in (n for n in models if row_of(n).registered):
         models[name] = fit_frames(models[name], *_postures(predict, name, trials), predict.description)
     return replace(predict, models=models)
 

@@ -10,6 +10,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
+from calibration.prediction import NOMINAL
 from scenarios.plots import svg
 from scenarios.report.results import figures, formatting
 from scenarios.report.results.ladder import BASES, MEANINGS, headline_model, ladder, predictive
@@ -63,7 +64,7 @@ def context(results: Results) -> tuple[dict[str, Any], dict[str, Drawing]]:
     ladders = {trials: steps for trials, steps in ladders.items() if steps} or {"all": ladder(results, "all")}
     steps = next(iter(ladders.values()))
     model, found = headline_model(results, steps), known(results)
-    before, after = predictive(steps, "nominal"), predictive(steps, model)
+    before, after = predictive(steps, NOMINAL), predictive(steps, model)
     has_truth = results.score is not None
     models = section(results, steps)
     made = {

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from calibration import Dataset, Estimate, Evaluation, predictions
-from calibration.evaluation.ladder import Row, Trace, ladder, row_entry, scored_errors
-from calibration.evaluation.pose_errors import pose_errors
+from calibration.evaluation import Row, TrialErrors, ladder, pose_errors, row_entry, scored_errors
 from calibration.inference.parameters import Model
 from calibration.mocap import poses_of, relabelled_trial
+from calibration.prediction import BASELINE
 from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
 from twin import truth
@@ -180,7 +180,7 @@ def _nees(errors: np.ndarray, covariance: np.ndarray) -> tuple[float, int]:
     return float((projected**2 / values[kept]).sum()), int(kept.sum())
 
 
-def _traces(estimate: Estimate, dataset: Dataset, truth_folder: Path) -> Iterator[Trace]:
+def _traces(estimate: Estimate, dataset: Dataset, truth_folder: Path) -> Iterator[TrialErrors]:
     """Errors of every prediction, and of the floor, against the true hand pose."""
     recorded = {
         e.id: (e, relabelled_trial(dataset, e), _read_trial(truth_folder / e.file))
@@ -190,12 +190,12 @@ def _traces(estimate: Estimate, dataset: Dataset, truth_folder: Path) -> Iterato
         entry, trial, true = recorded[p.trial_id]
         errors = pose_errors(p.T_lab_hand, true.hand_pose)
         scored = scored_errors(p.t, errors, trial, entry.kind == "static")
-        yield Trace(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
+        yield TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
     T_base_body = _true_base_body(truth_folder)
     for entry, trial, true in recorded.values():
         errors = pose_errors(_floor(dataset, trial, true, T_base_body), true.hand_pose)
         scored = scored_errors(trial.t_mocap, errors, trial, entry.kind == "static")
-        yield Trace("floor", "measured", "link", entry.id, entry.kind, trial.t_mocap, errors, scored)
+        yield TrialErrors("floor", "measured", "link", entry.id, entry.kind, trial.t_mocap, errors, scored)
 
 
 def _read_trial(path: Path) -> TruthTrial:
@@ -220,7 +220,7 @@ def _skill(row: Row, rows: tuple[Row, ...]) -> float | None:
     floor = next(
         (r.metrics.position_rmse_component_mm for r in rows if (r.model, r.trials) == ("floor", row.trials)), None
     )
-    start = like.get("registration")
+    start = like.get(BASELINE)
     if floor is None or start is None or start == floor:
         return None
     return (start - row.metrics.position_rmse_component_mm) / (start - floor)

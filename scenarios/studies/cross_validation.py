@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from calibration.errors import NotCalibrated, NotEnoughData
-from calibration.estimate.estimate import Estimate
-from calibration.evaluation.marker_errors import PointRow, point_rows
+from calibration.estimate import Estimate
+from calibration.evaluation import PointRow, point_rows
 from calibration.formats.mapping.mapping import Mapping
 from calibration.mocap import Postures, mean_postures
 from calibration.pipeline import calibrate

@@ -3,10 +3,11 @@
 import shutil
 from pathlib import Path
 
+from calibration.prediction import BASELINE
 from scenarios.datasets.run_spec import Magnitude
 from scenarios.files.scenario import Scenario
 
-BETTER = ("registration", "model_2")
+BETTER = (BASELINE, "model_2")
 """Rows whose order a study of power detects."""
 
 
@@ -18,7 +19,7 @@ def judged(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     """
     import calibration
     import twin
-    from calibration.evaluation.comparison import compare
+    from calibration.evaluation import compare
     from scenarios.score.score import score
 
     work = out / "work"

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from scenarios.steps import RunResult
 
 if TYPE_CHECKING:
-    from calibration.evaluation.evaluate import Evaluation
-    from calibration.evaluation.ladder import Trials
+    from calibration.evaluation import Evaluation, Trials
     from scenarios.score.score import Score
 
 _RARE = 0.001  # how often intervals that are right fail the test

@@ -6,7 +6,7 @@ import json
 import numpy as np
 
 from calibration import Estimate, Evaluation, save_estimate
-from calibration.evaluation.ladder import Trace, ladder
+from calibration.evaluation.ladder import TrialErrors, ladder
 from calibration.evaluation.pose_errors import PoseErrors
 from calibration.inference.parameters import Combination, Model, Parameter
 from calibration.recording.clock import Clock
@@ -44,7 +44,7 @@ def traces(models=MODELS, bases=("measured", "fixed")):
         for base in bases:
             for trial, kind, n in (("xyz", "swing", 300), ("others", "static", 9)):
                 found = errors(scale if base == "fixed" else 0.7 * scale, n, len(model))
-                yield Trace(model, base, "motor", trial, kind, 0.01 * np.arange(n), found, found)
+                yield TrialErrors(model, base, "motor", trial, kind, 0.01 * np.arange(n), found, found)
 
 
 def write_evaluation(run, **options):

@@ -6,6 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from calibration.prediction import BASELINE
+from calibration.prediction import NOMINAL as NOMINAL_ROW
 from scenarios.plots import (
     ESTIMATE,
     NOMINAL,
@@ -71,7 +73,7 @@ def _floors(steps: Sequence[Step]) -> tuple[float | None, ...]:
 
 def _paint(step: Step) -> tuple[str, bool]:
     """Colour of a row, and whether its box is hollow: an oracle's is."""
-    colour = {"nominal": NOMINAL, "registration": OTHER}.get(step.model, ESTIMATE)
+    colour = {NOMINAL_ROW: NOMINAL, BASELINE: OTHER}.get(step.model, ESTIMATE)
     return colour, step.kind != "predictive"
 
 
@@ -96,7 +98,7 @@ def traces(results: Results, steps: Sequence[Step]) -> Figure | None:
     """Errors over time in one trial: x, y, z and orientation, of the nominal robot and of the main model."""
     trial, model = traced_trial(results, steps), headline_model(results, steps)
     wanted = [
-        (predictive(steps, "nominal"), NOMINAL, 0.9),
+        (predictive(steps, NOMINAL_ROW), NOMINAL, 0.9),
         (oracle_base(steps, model), ORACLE, 0.9),
         (predictive(steps, model), ESTIMATE, 1.1),
     ]

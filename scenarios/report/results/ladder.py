@@ -3,18 +3,13 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from calibration.prediction import BASELINE, LADDER, NOMINAL
 from scenarios.report.results.result_files import Row
 from scenarios.report.results.run_results import Results
 
-MEANINGS = {
-    "nominal": "datasheet geometry, marker bodies where the drawing says",
-    "model_1": "nominal and the published suspension",
-    "model_2": "registration and geometric calibration",
-    "model_3": "model_2 and the published sigmoid-polynomial joint model",
-    "registration": "datasheet geometry, marker bodies fitted: the honest baseline",
-    "arm_tool": "base frame from spins and drives, then arm base and tool; the arm itself as its factory left it",
-    "full": "geometry with gears that give and play that gravity holds, from static postures",
-    "floor": "the true parameters and states through the same measurements: what no model can undercut",
+FLOOR = "floor"
+MEANINGS = {row.name: row.meaning for row in LADDER} | {
+    FLOOR: "the true parameters and states through the same measurements: what no model can undercut"
 }
 BASES = {
     "fixed": "base assumed still",
@@ -49,8 +44,8 @@ class Step:
     @property
     def kind(self) -> str:
         """`predictive`, what it was given beyond that, or `floor`."""
-        if self.model == "floor":
-            return "floor"
+        if self.model == FLOOR:
+            return FLOOR
         given = {"base": self.base == "measured", "encoder": self.encoder == "link"}
         oracles = [name for name, is_given in given.items() if is_given]
         return f"oracle: {' and '.join(oracles)}" if oracles else "predictive"
@@ -76,7 +71,7 @@ def ladder(results: Results, trials: str) -> tuple[Step, ...]:
 
 def _position(key: tuple[str, str, str, str]) -> tuple[int, int, int]:
     model, base, encoder, _ = key
-    place = len(_MODELS) if model == "floor" else _index(_MODELS[:-1], model)
+    place = len(_MODELS) if model == FLOOR else _index(_MODELS[:-1], model)
     return place, _index(_BASES, base), _index(_ENCODERS, encoder)
 
 
@@ -99,7 +94,7 @@ def oracle_base(steps: Iterable[Step], model: str) -> Step | None:
 
 def floor(steps: Iterable[Step]) -> Row | None:
     """What no model can undercut."""
-    return next((s.main for s in steps if s.model == "floor"), None)
+    return next((s.main for s in steps if s.model == FLOOR), None)
 
 
 def _first(steps: Iterable[Step], model: str, bases: Sequence[str]) -> Step | None:
@@ -110,5 +105,5 @@ def _first(steps: Iterable[Step], model: str, bases: Sequence[str]) -> Step | No
 def headline_model(results: Results, steps: Sequence[Step]) -> str:
     """The model the report is about: the estimate's main one, else the last estimated one of the ladder."""
     main = results.estimate.main if results.estimate else ""
-    known = [s.model for s in steps if s.model not in ("nominal", "registration", "floor")]
+    known = [s.model for s in steps if s.model not in (NOMINAL, BASELINE, FLOOR)]
     return main if main in known else (known[-1] if known else steps[-1].model)

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from calibration.prediction import LADDER
 from calibration.stages.joints import JointModel, limit_of
 from scenarios.report.results import figures, formatting
 from scenarios.report.results.ladder import Step
 from scenarios.report.results.run_results import Results
 
-MODELS = ("nominal", "model_1", "model_2", "model_3")
-_SOURCES = ("plate", "dynamics", "fixed")  # of the base's motion, the first that is there
+MODELS = tuple(row for row in LADDER if row.published is not None)
 _MEDIANS = ((12.7, 8.4, 4.6, 2.8), (5.1, 2.9, 2.6, 1.3), (18.4, 14.3, 6.8, 5.4))  # |x|, |y|, |z| of the models [mm]
 _ORIENTATION = {0: 8.57, 3: 2.71}  # RMSE of nominal and model_3 [deg]
 _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -48,9 +48,9 @@ def paper_steps(steps: Sequence[Step]) -> tuple[Step, ...]:
     """One predictive row a model: motor encoders, the best source of the base's motion there is."""
     found = []
     for model in MODELS:
-        mine = {s.base: s for s in steps if (s.model, s.encoder) == (model, "motor")}
-        sources = ("fixed",) if model == "nominal" else _SOURCES
-        found += [next(mine[b] for b in sources if b in mine)] if any(b in mine for b in sources) else []
+        mine = {s.base: s for s in steps if (s.model, s.encoder) == (model.name, "motor")}
+        base = model.predictive_base(mine)
+        found += [] if base is None else [mine[base]]
     return tuple(found)
 
 

@@ -7,7 +7,6 @@ from scenarios.report.results.ladder import Step
 from scenarios.report.results.result_files import TrialErrors
 from scenarios.report.results.run_results import Results
 
-_MODELS = ("nominal", "registration", "model_1", "model_2", "model_3", "full")
 PUSH = "push"
 
 
@@ -45,6 +44,6 @@ def loaded_trials(results: Results) -> tuple[LoadedTrial, ...]:
 def load_rows(results: Results, steps: Sequence[Step], trials: Sequence[LoadedTrial]) -> tuple[LoadRow, ...]:
     """Predictive rows of the ladder, in its order."""
     errors = {(e.model, e.base, e.encoder, e.trial): e for e in results.evaluation.trials}
-    rows = [s for s in steps if s.encoder == "motor" and s.base != "measured" and s.model in _MODELS]
+    rows = [s for s in steps if s.encoder == "motor" and s.base != "measured"]
     found = (LoadRow(s.label, tuple(errors.get((s.model, s.base, s.encoder, t.trial)) for t in trials)) for s in rows)
     return tuple(row for row in found if any(row.errors))

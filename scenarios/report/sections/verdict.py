@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from calibration.prediction import BASELINE, NOMINAL
 from scenarios.report.results.formatting import count, error, significant
 from scenarios.report.results.ladder import BASES, Step, floor, headline_model, oracle_base, predictive
 from scenarios.report.results.result_files import Row
@@ -58,7 +59,7 @@ def changes(before: Row, after: Row) -> tuple[Change, ...]:
 def sentences(results: Results, steps: Sequence[Step]) -> Iterator[str]:
     """The verdict: what calibration brought, what is left, and against what it holds."""
     model = headline_model(results, steps)
-    nominal, best = predictive(steps, "nominal"), predictive(steps, model)
+    nominal, best = predictive(steps, NOMINAL), predictive(steps, model)
     if best is None or best.mocap is None:
         yield "No row predicts from motor encoders alone; see the ladder."
         return
@@ -75,8 +76,8 @@ def sentences(results: Results, steps: Sequence[Step]) -> Iterator[str]:
 
 
 def _compared(steps: Sequence[Step], model: str, best: Row) -> Iterator[str]:
-    baseline, oracle = predictive(steps, "registration"), oracle_base(steps, model)
-    if baseline is not None and baseline.mocap is not None and model != "registration":
+    baseline, oracle = predictive(steps, BASELINE), oracle_base(steps, model)
+    if baseline is not None and baseline.mocap is not None and model != BASELINE:
         verb = "leaves" if _better(best, baseline.mocap) else "does as well:"
         yield f"Fitting the marker frames alone (registration) {verb} {_figures(baseline.mocap)}."
     if oracle is not None and oracle.mocap is not None:
@@ -107,7 +108,7 @@ def notices(results: Results, steps: Sequence[Step], covered: tuple[int, int]) -
 
 
 def _no_gain(steps: Sequence[Step], model: str) -> Iterator[Notice]:
-    best, baseline = predictive(steps, model), predictive(steps, "registration")
+    best, baseline = predictive(steps, model), predictive(steps, BASELINE)
     if best is None or baseline is None or best is baseline or model == "arm_tool":
         return  # arm_tool and registration place the same hand; they differ in what they call its frames
     if best.mocap is not None and baseline.mocap is not None and not _better(best.mocap, baseline.mocap):

@@ -3,14 +3,14 @@ import pytest
 
 from calibration.evaluation.comparison import compare, comparisons
 from calibration.evaluation.evaluate import no_better
-from calibration.evaluation.ladder import Trace
+from calibration.evaluation.ladder import TrialErrors
 from calibration.evaluation.pose_errors import PoseErrors
 
 
 def trace(model, base, error):
     t = np.arange(len(error)) * 0.01
     errors = PoseErrors(error, np.zeros_like(error))
-    return Trace(model, base, "motor", "xyz", "swing", t, errors, errors)
+    return TrialErrors(model, base, "motor", "xyz", "swing", t, errors, errors)
 
 
 @pytest.fixture

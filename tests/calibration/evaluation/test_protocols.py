@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from calibration.evaluation.ladder import Trace
+from calibration.evaluation.ladder import TrialErrors
 from calibration.evaluation.pose_errors import PoseErrors
 from calibration.evaluation.protocols import protocol_rows
 
@@ -10,7 +10,7 @@ def trace(model, base, encoder, offset, scale=1e-3):
     t = np.arange(0.0, 20.0, 0.01)
     wave = np.sin(2 * np.pi * t / 5.0)[:, None] * np.ones(3)
     errors = PoseErrors(offset + scale * wave, 0.01 * wave)
-    return Trace(model, base, encoder, "xyz", "swing", t, errors, errors)
+    return TrialErrors(model, base, encoder, "xyz", "swing", t, errors, errors)
 
 
 def test_the_public_protocol_removes_constants_of_models_2_and_3_only():

@@ -110,7 +110,7 @@ def test_the_verdict_comes_first_with_the_figures_of_the_rows(whole):
 
 def test_the_ladder_has_every_row_in_order_with_its_kind(whole):
     steps = ordered(read(whole), "dynamic")
-    models = ["nominal", "nominal", "model_2", "model_2", "registration", "registration", "gauss", "gauss", "floor"]
+    models = ["nominal", "nominal", "registration", "registration", "model_2", "model_2", "gauss", "gauss", "floor"]
     assert [s.model for s in steps] == models
     assert [s.base for s in steps][:4] == ["fixed", "measured", "fixed", "measured"]
     assert [s.kind for s in steps][:2] == ["predictive", "oracle: base"]

@@ -12,7 +12,7 @@ import pytest
 import mjcf
 from calibration import Estimate, Evaluation, save_estimate
 from calibration.evaluation.joint_regimes import Regime as CalibratedRegime
-from calibration.evaluation.ladder import Trace, ladder
+from calibration.evaluation.ladder import TrialErrors, ladder
 from calibration.evaluation.pose_errors import PoseErrors
 from calibration.inference.parameters import Combination, Model, Parameter
 from calibration.recording.clock import Clock
@@ -111,7 +111,8 @@ def whole(tmp_path_factory, recording):
     write_dataset(run / "dataset", [("xyz", "validation", "swing", recording[0])])
     save_estimate(known_estimate(), run / "estimate")
     rows = [
-        Trace("model_2", b, "motor", "xyz", "swing", np.arange(50.0), *2 * [small_errors()]) for b in ("fixed", "plate")
+        TrialErrors("model_2", b, "motor", "xyz", "swing", np.arange(50.0), *2 * [small_errors()])
+        for b in ("fixed", "plate")
     ]
     Evaluation(tuple(ladder(rows, "mocap")), tuple(rows)).save(run)
     change(run, regimes=REGIMES)
