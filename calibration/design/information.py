@@ -30,7 +30,6 @@ from calibration.mocap.cluster_pose import body_poses
 from calibration.numerics.lie import adjoint, inverse, moved
 from calibration.recording.schema import Body, Description
 from calibration.robot.chain import Chain
-from calibration.robot.gravity import gravity_moments
 from calibration.robot.hand import HandModel, HandPoses
 
 _CLIFF = 1e-6  # singular values below this share of the largest are zero [-]
@@ -169,7 +168,7 @@ class Departures:
         """Local twists of the hand (n, 6, k) at readings q (n, n_measured), for each z = 1; `found` at q."""
         chain, (n, k) = model.chain, (len(q), len(self.bending))
         turns = found.J[:, :, 12 : 12 + 6 * k].reshape(n, 6, k, 6)[:, :, :, 3:]
-        return np.asarray(np.einsum("ndkj,nkj->ndk", turns, self.bending[:, None] * moments(chain, q)))
+        return np.asarray(np.einsum("ndkj,nkj->ndk", turns, self.bending[:, None] * chain.gravity_moments(q)))
 
 
 def departing(
@@ -187,10 +186,5 @@ def departing(
 
 def departures_of(chain: Chain, q: np.ndarray) -> Departures:
     """Those of a robot whose moments are as at postures q (n, n_measured)."""
-    largest = np.linalg.norm(moments(chain, q), axis=2).max(axis=0)
+    largest = np.linalg.norm(chain.gravity_moments(q), axis=2).max(axis=0)
     return Departures(np.where(largest > _LEAST, _BENDING / np.maximum(largest, _LEAST), 0.0))
-
-
-def moments(chain: Chain, q: np.ndarray) -> np.ndarray:
-    """Gravity moments (n, k, 3) across each joint's axis, in its own frame [N.m], at q (n, n_measured)."""
-    return gravity_moments(chain.drawn, chain.loads, q[:, chain.columns])

@@ -21,7 +21,7 @@ from calibration.recording.experiment import ExperimentPlan, Posture, Sigma
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
-from calibration.stages.geometry.parameters import held_parameters, play_floor, play_start
+from calibration.stages.geometry.parameters import backlash_parameters, play_floor, play_start
 
 _ANYWHERE = 200  # postures from which largest torques are told
 _RANDOM = 100  # sets of random postures the design is compared with
@@ -99,7 +99,7 @@ def nominal_task(urdf: str, description: Description, rng: np.random.Generator, 
     play = np.maximum(play_start(chain, description), play_floor(chain, description))
     room = room_of(shapes_of(urdf, chain, description), description, rng)
     anywhere = room.sample(_ANYWHERE, rng)
-    parameters = held_parameters(chain, description, chain.gravity_torques(anywhere))
+    parameters = backlash_parameters(chain, description, chain.gravity_torques(anywhere))
     departures = departures_of(chain, anywhere)
     hand = nominal_hand(chain, parameters.nominal[:12])
     return Task(room, hand, parameters, play, departures=departures, work=work)

@@ -1,9 +1,9 @@
 """The main model as two small texts other programs read.
 
     master_calibration.yaml   - joint: NAME            angle = reading - offset            [rad; m where a joint slides]
-                                offset: o              ... - compliance * torque - held * tanh(torque / 0.3 N.m)
+                                offset: o              ... - compliance * torque - gap / 2 * tanh(torque / 0.3 N.m)
                                 compliance: c          [rad/(N.m), m/N], left out where it is 0
-                                held: h                [rad; m], left out where it is 0
+                                gap: g                 [rad; m], left out where it is 0
     parameters.csv            name,value,sigma,unit,status,nominal,model, a line each, every model of the estimate
 
 PAL's list of joints and offsets. Reading: what the motor-side encoder reports, in the URDF's sense of the joint;
@@ -34,7 +34,7 @@ _ELASTIC = """\
 #     angle = reading - offset - compliance * torque      compliance [rad/(N.m)], torque: what holds the joint at rest
 """
 _PLAY = """\
-#             - held * tanh(torque / 0.3 N.m)             held [rad], half the play that gravity holds on one flank
+#             - gap / 2 * tanh(torque / 0.3 N.m)          gap [rad], backlash that gravity preloads to one side
 """
 
 
@@ -46,13 +46,13 @@ class Zero:
         joint: Its name.
         offset: Reading at angle 0 [rad, m].
         compliance: Of its gear [rad/(N.m), m/N].
-        held: Half of its play that gravity holds on one flank [rad, m].
+        gap: Width of its backlash, which gravity preloads to one side [rad, m].
     """
 
     joint: str
     offset: float
     compliance: float = 0.0
-    held: float = 0.0
+    gap: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,11 +70,11 @@ class Row:
 
 def zeros_text(hand: HandModel) -> str:
     """master_calibration.yaml of a calibrated robot."""
-    plays = bool(hand.held.any())
+    plays = bool(hand.gap.any())
     lines = [_HEADER + (_ELASTIC if plays or hand.compliance.any() else "") + (_PLAY if plays else "")]
-    for name, *values in zip(hand.chain.joints, hand.offset, hand.compliance, hand.held, strict=True):
+    for name, *values in zip(hand.chain.joints, hand.offset, hand.compliance, hand.gap, strict=True):
         lines.append(f"- joint: {name}\n  offset: {float(values[0])!r}\n")
-        lines += [f"  {key}: {float(x)!r}\n" for key, x in zip(("compliance", "held"), values[1:], strict=True) if x]
+        lines += [f"  {key}: {float(x)!r}\n" for key, x in zip(("compliance", "gap"), values[1:], strict=True) if x]
     return "".join(lines)
 
 

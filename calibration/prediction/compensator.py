@@ -98,7 +98,9 @@ class Compensator:
         if estimate.urdf is None or estimate.robot is None:
             raise NotCalibrated(["it does not say which robot it is about"])
         robot, laboratory = estimate.robot, estimate.laboratory
-        chain = chain_of_frames(estimate.urdf, robot.joints, robot.base_frame, robot.tool_frame)
+        frames = robot.base_frame, robot.tool_frame
+        described = () if laboratory is None else (laboratory.payload, laboratory.gravity)
+        chain = chain_of_frames(estimate.urdf, robot.joints, *frames, *described).carrying(payload)
         model = estimate.model(estimate.main)
         hand = hand_of(model, chain, np.zeros(12))
         play = model.play if len(model.play) else np.zeros(len(chain.joints))

@@ -96,7 +96,7 @@ class Predictor:
             q = self.positions(row.name, encoder, trial)
             known = np.isfinite(q).all(axis=1)
             T_B_H = np.full((len(q), 4, 4), np.nan)
-            T_B_H[known] = hand.poses(q[known])
+            T_B_H[known] = hand.carrying(entry.payload).poses(q[known])
             for base in row.bases:
                 T_lab_B = self._base(base, hand, entry, trial, measured)
                 if T_lab_B is not None:

@@ -15,8 +15,8 @@ import pinocchio as pin
 
 from calibration.errors import InputError, NoSuchElement, ShapeError
 from calibration.numerics.lie import exp6, jexp6
-from calibration.recording.schema import Description
-from calibration.robot.gravity import Loads, gravity_torques, loads_of
+from calibration.recording.schema import Description, Payload
+from calibration.robot.gravity import Loads, gravity_moments, gravity_torques, loads_of
 from calibration.robot.kinematics import Path, path_of
 
 
@@ -47,7 +47,7 @@ class Chain:
         tool_frame: Name of the frame whose pose is meant.
         xi: (k, 6) placement twists [m, rad].
         drawn: The nominal path from base to tool.
-        loads: What its joints carry.
+        loads: Bodies moved by the measured joints, and the payload.
     """
 
     nominal: pin.Model
@@ -118,8 +118,15 @@ class Chain:
 
     def gravity_torques(self, q: np.ndarray) -> np.ndarray:
         """Torques (n, k) [N.m, N] that hold the chain's joints at q (n, n_measured), nominal geometry and masses."""
-        self._check(q)
-        return gravity_torques(self.drawn, self.loads, q[:, self.columns])
+        return gravity_torques(self.loads, q)[:, self.columns]
+
+    def gravity_moments(self, q: np.ndarray) -> np.ndarray:
+        """Moments (n, k, 3) [N.m] of gravity across the axes of the chain's joints, see `gravity`."""
+        return gravity_moments(self.loads, q)[:, self.columns]
+
+    def carrying(self, mass: float | None) -> "Chain":
+        """The chain with another mass [kg] of its payload; itself where None."""
+        return self if mass is None else replace(self, loads=self.loads.carrying(mass))
 
     def configurations(self, q: np.ndarray) -> np.ndarray:
         """Readings q (n, n_measured) in the model's own order and format, (n, nq)."""
@@ -170,12 +177,20 @@ def reduced_model(urdf: str, measured: tuple[str, ...], root: pin.JointModel | N
 
 
 def chain_of(urdf: str, description: Description) -> Chain:
-    """The nominal chain of a dataset."""
-    return chain_of_frames(urdf, description.joint_names, description.base_frame, description.tool_frame)
+    """The nominal chain of a dataset, with its declared payload and gravity."""
+    frames = description.base_frame, description.tool_frame
+    return chain_of_frames(urdf, description.joint_names, *frames, description.payload, description.gravity)
 
 
-def chain_of_frames(urdf: str, measured: tuple[str, ...], base_frame: str, tool_frame: str) -> Chain:
-    """The nominal chain of the measured joints between two frames.
+def chain_of_frames(
+    urdf: str,
+    measured: tuple[str, ...],
+    base_frame: str,
+    tool_frame: str,
+    payload: Payload | None = None,
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+) -> Chain:
+    """The nominal chain of the measured joints between two frames; gravity [m/s2] in the robot's root frame.
 
     Raises:
         NoSuchElement: A joint or frame is not in the URDF.
@@ -204,5 +219,5 @@ def chain_of_frames(urdf: str, measured: tuple[str, ...], base_frame: str, tool_
         tool.name,
         np.zeros((len(joints), 6)),
         drawn,
-        loads_of(model, joints, base.name),
+        loads_of(model, measured, payload, gravity),
     )

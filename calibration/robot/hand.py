@@ -1,15 +1,15 @@
 """Pose of the hand body in the base body, as a function of the readings and of all parameters.
 
-    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset - compliance tau - held tanh(tau / tau_0), xi)  T_tool_H
+    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset - compliance tau - gap/2 tanh(tau / tau_0), xi)  T_tool_H
 
-tau(q) is the nominal gravity torque at the readings: what the motors must give at rest, [N.m, N]. A gear gives in
-proportion; one with play, 2 `held` wide, lies on the flank that gravity chooses, near its middle where that is weak.
+tau(q) is the nominal gravity torque at the readings: what the motors must exert at rest, [N.m, N]. Compliance is
+linear in it; backlash of width `gap` is preloaded by gravity to one side, smoothed by tanh where gravity is weak.
 Derivatives are local twists of the hand:
 
     d/d(T_tool_H)   L(T_tool_H)                        d/d(xi)      Ad(T_H_tool) J_placement
     d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint
 
-by compliance as by offset times tau, by held times tanh(tau / tau_0),
+by compliance as by offset times tau, by gap as by offset times tanh(tau / tau_0) / 2,
 with L = diag(R', Jr(phi)) from (dp, dphi) to the local twist of a frame given as translation and rotation vector.
 """
 
@@ -22,7 +22,7 @@ from calibration.numerics.lie import adjoint, from_vector, inverse, local_twist
 from calibration.robot.chain import Chain
 from calibration.robot.kinematics import Path
 
-_HOLDS = 0.3  # tau_0 [N.m, N]
+_PRELOADS = 0.3  # tau_0 [N.m, N]
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class HandModel:
         base: (6,) translation and rotation vector of T_base_B [m, rad].
         hand: (6,) of T_tool_H [m, rad].
         compliance: (k,) of each gear under its gravity torque [rad/(N.m), m/N].
-        held: (k,) half of the play that gravity holds on one flank [rad, m].
+        gap: (k,) width of each joint's backlash [rad, m].
     """
 
     chain: Chain
@@ -58,26 +58,30 @@ class HandModel:
     base: np.ndarray
     hand: np.ndarray
     compliance: np.ndarray
-    held: np.ndarray
+    gap: np.ndarray
 
     def with_theta(self, theta: np.ndarray) -> "HandModel":
         """The model with the first of theta changed: 12 frames, 12 + 7 k with placements and offsets, and so on."""
         k, theta = len(self.offset), np.append(theta, self.theta[len(theta) :])
         chain = self.chain.with_placements(theta[12 : 12 + 6 * k].reshape(k, 6))
-        offset, compliance, held = theta[12 + 6 * k :].reshape(3, k)
-        return HandModel(chain, offset, theta[:6], theta[6:12], compliance, held)
+        offset, compliance, gap = theta[12 + 6 * k :].reshape(3, k)
+        return HandModel(chain, offset, theta[:6], theta[6:12], compliance, gap)
 
     @property
     def theta(self) -> np.ndarray:
         """All parameters, (12 + 9 k,)."""
-        return np.concatenate([self.base, self.hand, self.chain.xi.ravel(), self.offset, self.compliance, self.held])
+        return np.concatenate([self.base, self.hand, self.chain.xi.ravel(), self.offset, self.compliance, self.gap])
+
+    def carrying(self, mass: float | None) -> "HandModel":
+        """The model with another mass [kg] of its payload; itself where None."""
+        return self if mass is None else replace(self, chain=self.chain.carrying(mass))
 
     def angles(self, q: np.ndarray) -> np.ndarray:
         """Joint positions (n, n_measured) behind readings q."""
         out = np.array(q, dtype=float)
         out[:, self.chain.columns] -= self.offset
-        if self.compliance.any() or self.held.any():
-            out[:, self.chain.columns] -= self._given(self.chain.gravity_torques(q))
+        if self.compliance.any() or self.gap.any():
+            out[:, self.chain.columns] -= self._deflection(self.chain.gravity_torques(q))
         return out
 
     def in_base_frame(self, q: np.ndarray) -> np.ndarray:
@@ -105,9 +109,9 @@ class HandModel:
         k = len(self.offset)
         p = 12 + 9 * k if n_parameters is None else n_parameters
         if tau is None:
-            yields = self.compliance.any() or self.held.any() or p > 12 + 7 * k
+            yields = self.compliance.any() or self.gap.any() or p > 12 + 7 * k
             tau = self.chain.gravity_torques(q) if yields else np.zeros((len(q), k))
-        placed = self._path.placed(q[:, self.chain.columns] - self.offset - self._given(tau))
+        placed = self._path.placed(q[:, self.chain.columns] - self.offset - self._deflection(tau))
         twists = self.chain.twists.copy()
         twists[0, :, :6] = -local_twist(self.base)
         found, J = placed.end_twists(twists), np.empty((len(q), 6, p))
@@ -119,12 +123,12 @@ class HandModel:
         if p > 12 + 7 * k:
             J[:, :, 12 + 7 * k : 12 + 8 * k] = -tau[:, None, :] * J_joint
         if p > 12 + 8 * k:
-            J[:, :, 12 + 8 * k :] = -held_share(tau)[:, None, :] * J_joint
+            J[:, :, 12 + 8 * k :] = -preload_side(tau)[:, None, :] * J_joint
         return HandPoses(placed.T, J, J_joint)
 
-    def _given(self, tau: np.ndarray) -> np.ndarray:
-        """How far readings (n, k) are off by what gears give and play lets under gravity torques tau (n, k)."""
-        return self.compliance * tau + self.held * held_share(tau)
+    def _deflection(self, tau: np.ndarray) -> np.ndarray:
+        """Reading minus angle (n, k) [rad, m] by compliance and backlash under gravity torques tau (n, k)."""
+        return self.compliance * tau + self.gap * preload_side(tau)
 
     @cached_property
     def _path(self) -> Path:
@@ -140,6 +144,6 @@ def nominal_hand(chain: Chain, frames: np.ndarray) -> HandModel:
     return HandModel(chain, np.zeros(k), frames[:6], frames[6:], np.zeros(k), np.zeros(k))
 
 
-def held_share(tau: np.ndarray) -> np.ndarray:
-    """tanh(tau / tau_0) of gravity torques [N.m, N]: on which flank they hold a gear's play, -1 to 1."""
-    return np.asarray(np.tanh(tau / _HOLDS))
+def preload_side(tau: np.ndarray) -> np.ndarray:
+    """tanh(tau / tau_0) / 2: where in its backlash gravity torques tau [N.m, N] preload a gear, -1/2 to 1/2 [-]."""
+    return np.asarray(0.5 * np.tanh(tau / _PRELOADS))

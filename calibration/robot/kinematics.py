@@ -95,11 +95,11 @@ class Path:
             if self.prismatic[i]:
                 p = p + (R.reshape(-1, 3) @ self.axis[i]).reshape(n, 3) * q[:, i : i + 1]
             else:
-                R = _turned(R, self.axis[i], q[:, i])
+                R = turned(R, self.axis[i], q[:, i])
         return Placed(compose(R, p), frames, origins)
 
 
-def _turned(R: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def turned(R: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """R (n, 3, 3) turned about its own `axis` (3,) by `angle` (n,): R (I + sin [a]x + (1 - cos) [a]x^2)."""
     W = skew(axis)
     rows = R.reshape(-1, 3)

@@ -1,6 +1,6 @@
-"""Row `full` of static postures: the geometry of `model_2`, gears that give under gravity, play that gravity holds.
+"""Row `full` of static postures: the geometry of `model_2`, compliance and preloaded backlash of the gears.
 
-    reading = angle + offset + compliance * gravity torque + held * tanh(gravity torque / tau_0)
+    reading = angle + offset + compliance * gravity torque + gap / 2 * tanh(gravity torque / tau_0)
 
 The hand has random errors of its own besides those of the readings, widths of priors follow the data, and which gears
 give and play is averaged over. Play is asked for unless the postures speak strongly against it. On real postures this,
@@ -23,11 +23,11 @@ from calibration.inference.parameters import Model, ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
-from calibration.robot.hand import held_share
+from calibration.robot.hand import preload_side
 from calibration.stages.geometry.guards import unusable_fit
 from calibration.stages.geometry.hand_residual import Errors
 from calibration.stages.geometry.model_of_fit import model_of
-from calibration.stages.geometry.parameters import COMPLIANCES, gear_parameters, held_parameters, play_start
+from calibration.stages.geometry.parameters import COMPLIANCES, backlash_parameters, gear_parameters, play_start
 from calibration.stages.geometry.stage import STAGE, fit_robustly, left_out
 from calibration.verdict import Verdict
 
@@ -44,8 +44,8 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
     found = fit_robustly(chain, parameters, postures, errors)
     known = identifiability(found.fit.J_white, parameters)
     refused = [Verdict(STAGE, "refused", m) for m in unusable_fit(chain, parameters, found, known, len(postures))]
-    if not refused and _speaks_for_play(found, tau, play) > -_STRONG:
-        more = held_parameters(chain, description, tau)
+    if not refused and _evidence_for_backlash(found, tau, 2.0 * play) > -_STRONG:
+        more = backlash_parameters(chain, description, tau)
         again = fit_robustly(chain, more, postures, errors)
         if again.fit.converged:
             parameters, found = more, again
@@ -55,19 +55,19 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
     return model, (*left_out(postures, found), *_told(model))
 
 
-def _speaks_for_play(found: RobustFit, tau: np.ndarray, width: np.ndarray) -> float:
-    """Log Bayes factor of held play, `width` (k,) believed, at gravity torques tau (n, k) of the postures."""
-    J = -held_share(tau[found.kept])[:, None, :] * found.fit.at.J_joint
+def _evidence_for_backlash(found: RobustFit, tau: np.ndarray, width: np.ndarray) -> float:
+    """Log Bayes factor of preloaded backlash with prior widths (k,), at gravity torques tau (n, k) of the postures."""
+    J = -preload_side(tau[found.kept])[:, None, :] * found.fit.at.J_joint
     return log_bayes_factor(found.fit, J, width)
 
 
 def _told(model: Model) -> Iterator[Verdict]:
     """What of the gears stands out."""
-    for ending, what, unit in (
-        (".compliance", "gears that give under load", "mrad/(N.m)"),
-        (".held", "play that gravity holds, half", "mrad"),
+    for kind, ending, what, unit in (
+        ("gear.", ".compliance", "gears compliant under gravity", "mrad/(N.m)"),
+        ("backlash.", ".gap", "backlash preloaded by gravity", "mrad"),
     ):
-        mine = [p for p in model.parameters if p.name.startswith("gear.") and p.name.endswith(ending)]
+        mine = [p for p in model.parameters if p.name.startswith(kind) and p.name.endswith(ending)]
         told = ", ".join(f"{p.name} {1e3 * p.value:+.1f} {unit}" for p in mine if abs(p.value) > 2.0 * p.sigma)
         if mine:
             yield Verdict(STAGE, "ok", f"{what}: {told or 'none'}")

@@ -4,7 +4,7 @@
     geometry.<joint>      exp6 twist on the right of the joint placement [m, rad]
     encoder.<joint>.motor.offset      reading = angle + offset [rad, m]
     gear.<joint>.compliance           reading = angle + offset + compliance * gravity torque [rad/(N.m), m/N]
-    gear.<joint>.held                 reading = angle + ... + held * tanh(gravity torque / tau_0) [rad, m], see `hand`
+    backlash.<joint>.gap              reading = angle + ... + gap / 2 * tanh(gravity torque / tau_0) [rad, m]
 
 A joint's offset and the twist along its axis move the hand alike: the data speak of their combination, their
 tolerances divide it.
@@ -17,8 +17,8 @@ from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
 from calibration.robot.nominal_frames import AXES, METRES_PER_RAD, frame_names, nominal_frames
 
-TRANSLATIONS, ROTATIONS, ZEROS, COMPLIANCES, HELD = range(5)  # groups of parameters whose tolerances share a factor
-DEFLECTION = 3e-2  # of a gear at its own largest gravity torque, play that gravity holds on one flank included [rad]
+TRANSLATIONS, ROTATIONS, ZEROS, COMPLIANCES, BACKLASH = range(5)  # groups of parameters whose tolerances share a factor
+DEFLECTION = 3e-2  # of a gear at its own largest gravity torque, preloaded backlash included [rad]
 _TORQUE = 0.5  # [N.m, N] a joint that gravity loads less has no own range of torque
 
 
@@ -29,7 +29,7 @@ def parameter_names(chain: Chain) -> tuple[str, ...]:
         *(f"geometry.{joint}.{axis}" for joint in chain.joints for axis in AXES),
         *(f"encoder.{joint}.motor.offset" for joint in chain.joints),
         *(f"gear.{joint}.compliance" for joint in chain.joints),
-        *(f"gear.{joint}.held" for joint in chain.joints),
+        *(f"backlash.{joint}.gap" for joint in chain.joints),
     )
 
 
@@ -79,15 +79,15 @@ def gear_parameters(chain: Chain, description: Description, tau: np.ndarray) -> 
     )
 
 
-def held_parameters(chain: Chain, description: Description, tau: np.ndarray) -> ParameterSet:
-    """Those of the gears, and the play that gravity holds, as wide as the datasheet's."""
+def backlash_parameters(chain: Chain, description: Description, tau: np.ndarray) -> ParameterSet:
+    """Those of the gears and each joint's backlash, half of it as wide as the datasheet's play."""
     gears, k = gear_parameters(chain, description, tau), len(chain.joints)
     return ParameterSet(
         parameter_names(chain),
         gears.units + tuple("m" if chain.is_prismatic(j) else "rad" for j in chain.joints),
         np.append(gears.nominal, np.zeros(k)),
-        np.append(gears.tolerance, play_start(chain, description)),
-        np.append(gears.groups, np.full(k, HELD)),
+        np.append(gears.tolerance, 2.0 * play_start(chain, description)),
+        np.append(gears.groups, np.full(k, BACKLASH)),
     )
 
 

@@ -5,7 +5,7 @@ prismatic joints has 4 R + 2 P + 6 identifiable combinations: 36 for a torso and
 still. What the data do not separate stays at what the tolerances make most likely. Postures that contradict all others
 are left out and named.
 
-What gears give under load, and the play that gravity holds, is asked for in row `full`, see `gears`.
+Compliance and preloaded backlash of the gears are those of row `full`, see `gear_deflection`.
 """
 
 from collections.abc import Iterator

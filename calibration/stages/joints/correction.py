@@ -17,13 +17,12 @@ what departs from that mean.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
 from calibration.errors import NoSuchElement, ShapeError
 from calibration.numerics.signals import RATE, even, low_passed
 from calibration.recording.schema import Description
-from calibration.robot.floating_base import floating_model
-from calibration.robot.gravity import floating_gravity_torques
+from calibration.robot.chain import chain_of
+from calibration.robot.gravity import Loads, gravity_torques
 from calibration.robot.hand import HandModel
 from calibration.stages.joints.model import JointModel
 
@@ -50,25 +49,21 @@ class InputModel:
     """The nominal robot that turns readings into inputs.
 
     Attributes:
-        model: Floating model with the declared payload.
+        loads: Bodies moved by the measured joints, with the declared payload.
         measured: The joints of the columns of q.
         offset: (n_measured,) zeros of the motor-side readings [rad, m].
-        urdf: Text the model was built from.
         description: Of the dataset.
     """
 
-    model: pin.Model
+    loads: Loads
     measured: tuple[str, ...]
     offset: np.ndarray
-    urdf: str
     description: Description
 
     def of_trial(self, trial_id: str) -> "InputModel":
         """The robot with the payload of one trial of the dataset; of another trial, the campaign's."""
         entry = next((t for t in self.description.trials if t.id == trial_id), None)
-        if entry is None or self.description.loaded(entry) is self.description:
-            return self
-        return replace(self, model=floating_model(self.urdf, self.description.loaded(entry)))
+        return self if entry is None else replace(self, loads=self.loads.carrying(entry.payload))
 
     def inputs(self, t: np.ndarray, q_motor: np.ndarray, velocity: np.ndarray | None = None) -> JointInputs:
         """Inputs at readings q_motor (n, n_measured) taken at t (n,) [s], every clock will do.
@@ -85,14 +80,14 @@ class InputModel:
             raise ShapeError("q_motor", q_motor.shape, (len(t), len(self.measured)))
         theta = q_motor - self.offset
         v = velocities(t, q_motor) if velocity is None else velocity
-        return JointInputs(theta, floating_gravity_torques(self.model, self.measured, theta), v)
+        return JointInputs(theta, gravity_torques(self.loads, theta), v)
 
 
 def input_model(urdf: str, description: Description, hand: HandModel) -> InputModel:
     """The input model of a dataset, with the zeros of a calibrated hand model."""
     measured, offset = hand.chain.measured, np.zeros(len(hand.chain.measured))
     offset[hand.chain.columns] = hand.offset
-    return InputModel(floating_model(urdf, description), measured, offset, urdf, description)
+    return InputModel(chain_of(urdf, description).loads, measured, offset, description)
 
 
 def velocities(t: np.ndarray, q: np.ndarray) -> np.ndarray:

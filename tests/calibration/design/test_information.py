@@ -8,7 +8,7 @@ import pytest
 
 import mjcf
 from calibration.design.exchange import _RULES, _Steps
-from calibration.design.information import departing, departures_of, moments, prospect
+from calibration.design.information import departing, departures_of, prospect
 from calibration.numerics.lie import log6
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
@@ -26,7 +26,7 @@ DEPARTURES = departures_of(CHAIN, Q)
 
 
 def test_moments_are_those_of_inverse_dynamics_across_the_axis():
-    model, found = CHAIN.nominal, moments(CHAIN, Q[:5])
+    model, found = CHAIN.nominal, CHAIN.carrying(0.0).gravity_moments(Q[:5])
     data = model.createData()
     for q, of_posture in zip(CHAIN.configurations(Q[:5]), found, strict=True):
         pin.rnea(model, data, q, np.zeros(model.nv), np.zeros(model.nv))
@@ -42,7 +42,7 @@ def test_moments_are_those_of_inverse_dynamics_across_the_axis():
 def test_a_nuisance_moves_the_hand_as_the_robot_would(z):
     q, step = Q[:6], 1e-3
     G = DEPARTURES.effects(HAND, q, HAND.poses_and_derivatives(q, n_parameters=len(PARAMETERS)))[:, :, z]
-    M, T0 = moments(CHAIN, q), HAND.poses(q)
+    M, T0 = CHAIN.gravity_moments(q), HAND.poses(q)
     for k in range(len(q)):
         xi = np.zeros((8, 6))
         xi[z, 3:] = step * DEPARTURES.bending[z] * M[k, z]

@@ -4,9 +4,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import mjcf
 from calibration.errors import InputError
 from calibration.numerics.lie import exp6, jexp6, jlog6, log3, log6
-from calibration.robot.chain import chain_of_frames
+from calibration.recording.schema import Description
+from calibration.robot.chain import chain_of, chain_of_frames
+from calibration.robot.floating_base import floating_model
 from tests.calibration.robot.test_chain import OTHER_ROBOT, other_chain
 from tests.doubles import rigid_robot
 
@@ -109,3 +112,23 @@ def test_gravity_torques_of_all_configurations_are_pinocchio_s(chain, robot):
     expected = [pin.computeGeneralizedGravity(model, data, row)[ids] for row in c.configurations(q)]
     assert np.abs(expected).max() > 1.0
     np.testing.assert_allclose(c.gravity_torques(q), expected, atol=1e-12)
+
+
+def test_gravity_torques_are_those_of_the_floating_model_with_payload_and_gravity_of_the_description():
+    data = rigid_robot.description([], gravity=[0.3, -0.2, -9.7], payload={
+        "link": "gripper_grasping_frame", "mass": 2.0, "com": [0.01, 0.02, 0.1], "tolerance": 0.1,
+    })  # fmt: skip
+    described = Description.model_validate(data)
+    c, model = chain_of(mjcf.urdf(), described), floating_model(mjcf.urdf(), described)
+    q, data = rigid_robot.random_angles(np.random.default_rng(5), 6), model.createData()
+    ids = [model.joints[model.getJointId(name)].idx_v for name in c.measured]
+    for row, tau in zip(q, c.gravity_torques(q), strict=True):
+        v = np.zeros(model.nv)
+        v[ids] = row
+        expected = pin.computeGeneralizedGravity(model, data, pin.integrate(model, pin.neutral(model), v))[ids]
+        np.testing.assert_allclose(tau, expected[[c.measured.index(j) for j in c.joints]], atol=1e-12)
+    lighter = described.carrying(0.5)
+    np.testing.assert_allclose(
+        c.carrying(0.5).gravity_torques(q), chain_of(mjcf.urdf(), lighter).gravity_torques(q), atol=1e-12
+    )
+    assert np.abs(c.gravity_torques(q) - c.carrying(0.0).gravity_torques(q)).max() > 1.0
