@@ -32,11 +32,11 @@ class Diverged(TwinError):
         )
 
 
-class NotStanding(TwinError):
+class RobotFell(TwinError):
     """A robot that tipped over or left its plate."""
 
 
-class Shaking(TwinError):
+class BaseVibrates(TwinError):
     """A robot that does not come to rest before its trial: the solver overshoots, step for step.
 
     Attributes:

@@ -40,7 +40,7 @@ def picture(  # noqa: PLR0913  an option each
         raise ScenarioError("\n".join(wrong))
 
     from scenarios.steps.video import film
-    from twin.rendering.trial_video import ClipOptions
+    from twin.rendering import ClipOptions
 
     for path, seconds in ((still, 0.0), (clip, duration)):
         if path is not None:

@@ -10,7 +10,7 @@ as far as the hand reaches; fits that differ only in arm_7's angle, which the ma
 of them turn arm_1, arm_2 and arm_4 by 0.80, 0.72 and -0.69 rad. Which of them moves a robot is drawn.
 """
 
-from twin.motions.swings import Swing
+from twin.motions import Swing
 
 _FREQUENCY = 0.1972  # [Hz]
 

@@ -9,13 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.realism.log import Recorded
-from twin.base_tests.wrench_replay import Pull, carriage_on, replay
-from twin.config.base import Base
-from twin.config.distributions import drawn
-from twin.config.twin import TwinConfig
-from twin.defects.defect import Defect
-from twin.defects.wheels.from_config import ground, wheels_of
-from twin.instruments.force_plate import draw
+from twin.base_tests import WrenchHistory, massless_base_on, replay
+from twin.config import Base, TwinConfig, sampled
+from twin.defects import Defect, ground, wheels_of
+from twin.instruments import sample_plate
 from twin.random_streams import generator
 
 _HOLDS = 10.0  # times the drawn friction: no wheel slides
@@ -95,9 +92,9 @@ def turning(base: Base, weight: float) -> Base:
 def floor_of(config: TwinConfig, seed: int, condition: Condition, weight: float) -> tuple[Defect, ...]:
     """The wheels of one drawn robot under a condition, each drawn on its own where they turn."""
     if not condition.turning:
-        base = drawn(config, seed).base
+        base = sampled(config, seed).base
         return ground(base, wheels_of(base))
-    apart = (turning(drawn(config.base, seed, "wheel", str(k)), weight) for k in range(6))
+    apart = (turning(sampled(config.base, seed, "wheel", str(k)), weight) for k in range(6))
     return tuple(wheels_of(base)[k] for k, base in enumerate(apart))
 
 
@@ -109,10 +106,10 @@ def replayed(config: TwinConfig, seed: int, trial: Recorded, condition: Conditio
     Raises:
         Diverged: The simulation left the numbers.
     """
-    robot = drawn(config, seed)
-    plate = draw("plate", robot.instruments.plate, generator(seed, "plate"))
+    robot = sampled(config, seed)
+    plate = sample_plate("plate", robot.instruments.plate, generator(seed, "plate"))
     felt = (trial.w - plate.drift * trial.t[:, None]) @ np.linalg.inv(plate.gain).T
     floor = floor_of(config, seed, condition, -float(trial.rest[2]))
-    x = replay(carriage_on(floor, robot.timestep), Pull(trial.t, trial.rest + felt))
+    x = replay(massless_base_on(floor, robot.timestep), WrenchHistory(trial.t, trial.rest + felt))
     shift = trial.shifting(generator(seed, "shift", trial.trial_id)) if condition.shifting else 0.0
     return trial.seen(x, robot.instruments.marker_noise, generator(seed, "seen", trial.trial_id), shift)

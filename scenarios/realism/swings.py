@@ -15,12 +15,11 @@ from scipy.spatial.transform import Rotation
 from calibration.numerics.signals import RATE, Signal, low_passed, play
 from calibration.recording import Trial
 from scenarios.realism.arm_as_logged import AS_LOGGED
-from twin.campaign.laboratory import EPOCH, laboratory
-from twin.campaign.measure import measure
-from twin.config.twin import TwinConfig
-from twin.motions import motion as motions
+from twin import motions
+from twin.campaign import EPOCH, laboratory, measure
+from twin.config import TwinConfig
 from twin.random_streams import generator
-from twin.simulation.rollout import simulate
+from twin.simulation import simulate
 
 RAMP = (0.07, 0.09)  # [s] in which the log's hand starts: its markers show it, samples are 10 ms apart
 _SLOW = 2.5  # [Hz]

@@ -38,10 +38,10 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
     from calibration.design.plan import compared, nominal_task, plan
     from calibration.recording import plans_text
     from scenarios.files import yaml_file
-    from twin.campaign.dataset_description import declaration
+    from twin.campaign import describe_dataset
     from twin.random_streams import generator
 
-    description = declaration(scenario.twin, ())
+    description = describe_dataset(scenario.twin, ())
     rng = generator(scenario.seed, "design")
     found = plan(nominal_task(mjcf.urdf(), description, rng, _work()), n, criterion, rng)
     against = compared(found, rng)
@@ -62,12 +62,12 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
 def _work() -> "Sample":
     """Draws postures as the twin's campaigns do: in front of the robot, the hand in sight."""
     import mjcf
-    from twin.motions import postures
+    from twin.motions import sample_postures
 
     nominal = mjcf.model()
 
     def draw(n: int, rng: np.random.Generator) -> np.ndarray:
-        return rng.permutation(postures.draw(nominal, n, rng))
+        return rng.permutation(sample_postures(nominal, n, rng))
 
     return draw
 
@@ -81,9 +81,7 @@ def recording_too(scenario: "Scenario", file: Path) -> "Scenario":
     """
     import mjcf
     from calibration.recording import read_plans
-    from twin.motions.motion import RATE
-    from twin.motions.schedule import schedule
-    from twin.motions.swings import JOINTS
+    from twin.motions import JOINTS, RATE, schedule
 
     joints, remedies = read_plans(file)
     asked = [p for r in remedies for p in r.postures]

@@ -186,7 +186,7 @@ def versions() -> dict[str, str]:
 def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
     import twin
     from scenarios.files import yaml_file
-    from twin.rendering.robot_image import picture
+    from twin.rendering import picture
 
     progress("simulate", "", 0.0)
     yaml_file.write(out / "scenario.yaml", scenario, beside={"versions": versions()})

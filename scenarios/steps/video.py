@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from twin.rendering.trial_video import ClipOptions
+    from twin.rendering import ClipOptions
 
 
 def film(run_folder: Path | str, trial_id: str, out: Path | str, options: "ClipOptions") -> int:
@@ -23,8 +23,8 @@ def film(run_folder: Path | str, trial_id: str, out: Path | str, options: "ClipO
 
     from scenarios.steps.run_steps import load
     from twin import truth
-    from twin.campaign.laboratory import laboratory, second_session
-    from twin.rendering.trial_video import clip
+    from twin.campaign import laboratory, second_session
+    from twin.rendering import clip
 
     scenario = load(run_folder / "scenario.yaml")
     lab = laboratory(scenario.twin, scenario.seed)

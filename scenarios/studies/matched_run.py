@@ -36,17 +36,17 @@ def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
         NotCalibrated: There is no result that may be used.
     """
     import mjcf
-    from twin.campaign.dataset_description import declaration
-    from twin.motions import postures
+    from twin.campaign import describe_dataset
+    from twin.motions import sample_postures
     from twin.random_streams import generator
 
     rng, campaign = generator(scenario.seed, "matched"), scenario.twin.campaign
-    description, n = declaration(scenario.twin, ()), campaign.calibration_postures
+    description, n = describe_dataset(scenario.twin, ()), campaign.calibration_postures
     chain = chain_of(mjcf.urdf(), description)
     parameters = geometry_parameters(chain, description)
     theta = parameters.nominal + parameters.tolerance * rng.normal(size=len(parameters))
     true = nominal_hand(chain, parameters.nominal[:12]).with_theta(theta)
-    readings = rng.permutation(postures.draw(mjcf.model(), n + _NEW, rng))
+    readings = rng.permutation(sample_postures(mjcf.model(), n + _NEW, rng))
     moved = readings[:n] + play_start(chain, description) * rng.normal(size=(n, len(chain.joints)))
     samples = campaign.dwell * scenario.twin.instruments.mocap_rate
     seen = _measured(description, readings[:n], true.poses(moved), samples, rng)

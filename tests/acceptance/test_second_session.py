@@ -15,7 +15,7 @@ from calibration.prediction.predictor import predictor
 from calibration.prediction.second_session import registered_anew, registration_postures
 from calibration.robot.hand_uncertainty import Session
 from scenarios import load
-from twin.campaign.record import record
+from twin.campaign import record
 
 SEEDS = range(1000, 1010)
 STATIC = [f"twin.campaign.{name}=0" for name in ("sweep", "calibration_swing", "validation_swing")]

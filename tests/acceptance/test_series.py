@@ -20,11 +20,9 @@ from calibration.robot.hand import nominal_hand
 from calibration.robot.nominal_frames import nominal_frames
 from scenarios import load
 from scenarios.score.score import score
-from twin.campaign.dataset_description import declaration
-from twin.campaign.laboratory import laboratory
-from twin.campaign.measure import measure
-from twin.motions.schedule import schedule
-from twin.simulation.rollout import simulate
+from twin.campaign import describe_dataset, laboratory, measure
+from twin.motions import schedule
+from twin.simulation import simulate
 
 pytestmark = pytest.mark.slow
 SEEDS = range(1000, 1010)
@@ -137,7 +135,7 @@ def test_the_papers_nominal_error_is_one_of_the_series(capsys):
 
 def nominal_error(config, seed: int) -> tuple[float, float]:
     """RMSE per component [mm] and of the angle [deg] of the nominal prediction, base fixed, against the truth."""
-    lab, description = laboratory(config, seed), declaration(config, ())
+    lab, description = laboratory(config, seed), describe_dataset(config, ())
     chain = chain_of(mjcf.urdf(), description)
     clock = Clock("robot", 3.9, 1.2e-5, np.eye(2), 0.0, 1.0)
     models = {"nominal": nominal_hand(chain, nominal_frames(chain, description))}

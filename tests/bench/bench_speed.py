@@ -11,12 +11,10 @@ import mjcf
 import twin
 from calibration import Compensator
 from scenarios import load, run
-from twin.campaign.laboratory import laboratory
-from twin.campaign.measure import measure
-from twin.motions import motion as motions
-from twin.motions.swings import VALIDATION_SWINGS
-from twin.simulation.build import build
-from twin.simulation.rollout import simulate
+from twin import motions
+from twin.campaign import laboratory, measure
+from twin.motions import VALIDATION_SWINGS
+from twin.simulation import build, simulate
 from twin.simulation.setpoints import prepare
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from twin.defects.defect import Defect
-from twin.defects.gear import Gear, rotor_joint
-from twin.simulation.build import build
+from twin.defects import Defect, Gear
+from twin.defects.gear import rotor_joint
+from twin.simulation import build
 
 LINK_INERTIA = 0.05  # [kg.m2]
 OUTPUT_INERTIA = 0.004  # [kg.m2] of the output gear

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from calibration.recording.trial import Trial
 from tests.doubles import rigid_robot
-from twin.instruments.clock import Clock
+from twin.instruments import Clock
 
 GRID = 250.0
 _COARSE = 5  # gravity is computed on every so many samples

@@ -4,7 +4,7 @@ import pytest
 
 import mjcf
 from scenarios import load
-from twin.campaign.laboratory import laboratory
+from twin.campaign import laboratory
 
 
 @pytest.fixture(scope="session")

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from twin.defects.wheels.stiffness import HELD
 from twin.errors import TwinError
-from twin.simulation.base_joint import ROOT, base_poses, put_down
+from twin.simulation.base_joint import ROOT, base_poses, place_base
 from twin.simulation.build import Twin
 from twin.transforms import transform
 
@@ -38,7 +38,7 @@ _LATER = 0.1  # [s]
 _AT_REST = 1e-3  # share of a deflection that may be left after a release
 
 
-class Restless(TwinError):
+class LoadTestFailed(TwinError):
     """A base that does not come to rest, slips, or does not move, under a test load."""
 
 
@@ -143,7 +143,7 @@ def _weighed(b: Bench, loaded: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarr
             s, step = np.linspace(0.0, 1.0, len(x), endpoint=False), b.model.opt.timestep
             phi, slope = (1.0 - s) ** 2 * (1.0 + 2.0 * s - 15.0 * s**2), -s * (1.0 - s) * (36.0 - 60.0 * s)
             return step * phi @ x, x[0] + slope @ x / len(x)
-    raise Restless(f"released from {wrench[:3]} N, {wrench[3:]} N.m the base keeps {left:.1%} of its deflection")
+    raise LoadTestFailed(f"released from {wrench[:3]} N, {wrench[3:]} N.m the base keeps {left:.1%} of its deflection")
 
 
 def compliance(b: Bench) -> np.ndarray:
@@ -161,7 +161,7 @@ def compliance(b: Bench) -> np.ndarray:
         uneven, moves = abs((up + down)[j, j] / whole), abs(1.0 - (before[0] - before[1])[j, j] / whole)
         if S[j, j] > _RIGID[j] and max(uneven, moves) > _UNEVEN:
             how = f"opposite loads differ by {uneven:.1%}, {moves:.1%} are of the last {_LATER:g} s"
-            raise Restless(f"a wheel slips or lifts under {w[:3]} N, {w[3:]} N.m: {how}")
+            raise LoadTestFailed(f"a wheel slips or lifts under {w[:3]} N, {w[3:]} N.m: {how}")
     return np.asarray(S)
 
 
@@ -172,7 +172,7 @@ def bench(twin: Twin, gravity: float = 1.0) -> Bench:
         Restless: It does not come to rest.
     """
     T = transform(twin.model.body("plate").pos, np.array([1.0, 0.0, 0.0, 0.0]))
-    model, data = put_down(twin.model.__copy__(), T)
+    model, data = place_base(twin.model.__copy__(), T)
     model.opt.gravity *= gravity
     upper = _upper_joints(model)
     mujoco.mj_forward(model, data)
@@ -189,7 +189,7 @@ def bench(twin: Twin, gravity: float = 1.0) -> Bench:
     _check_guides(model)
     states = Bench(model, bare, hold, start).run(model, start, np.zeros(6), _SETTLE)
     if not np.isfinite(states[-1]).all():
-        raise Restless("the base does not come to rest on the bench: its state is not a number any more")
+        raise LoadTestFailed("the base does not come to rest on the bench: its state is not a number any more")
     return Bench(model, bare, hold, states[-1])
 
 
@@ -198,7 +198,7 @@ def _check_guides(model: mujoco.MjModel) -> None:
     sprung = model.jnt_stiffness[model.dof_jntid] > 0.0
     for d in np.flatnonzero(sprung & (model.dof_frictionloss > 0.0)):
         name, rubs = model.joint(model.dof_jntid[d]).name, model.dof_frictionloss[d]
-        raise Restless(
+        raise LoadTestFailed(
             f"the guide {name!r} rubs with {rubs:.3g} N, a test load does not move it: test with guide_friction 0"
         )
 

@@ -22,7 +22,7 @@ from twin.config.base import Base
 from twin.defects.defect import Defect
 from twin.defects.wheels.from_config import ground, wheels_of
 from twin.errors import Diverged
-from twin.simulation.base_joint import ROOT, base_poses, put_down
+from twin.simulation.base_joint import ROOT, base_poses, place_base
 from twin.simulation.build import Twin, build
 from twin.transforms import states_with_their_sensors, transform
 
@@ -32,12 +32,12 @@ _MASS, _INERTIA = 2.0, 0.05  # of what is left of the base [kg, kg.m2]
 _PLACE = (0.9, 0.45, 0.0)  # on the plate [m, lab]
 
 
-def carriage(base: Base, timestep: float = 0.001) -> Twin:
+def massless_base(base: Base, timestep: float = 0.001) -> Twin:
     """Base and wheels without weight; no value of `base` may be uncertain."""
-    return carriage_on(ground(base, wheels_of(base)), timestep)
+    return massless_base_on(ground(base, wheels_of(base)), timestep)
 
 
-def carriage_on(floor: Sequence[Defect], timestep: float = 0.001) -> Twin:
+def massless_base_on(floor: Sequence[Defect], timestep: float = 0.001) -> Twin:
     """The base without weight on wheels of their own."""
     spec = mjcf.spec()
     for element in (*spec.actuators, *spec.keys):
@@ -52,7 +52,7 @@ def carriage_on(floor: Sequence[Defect], timestep: float = 0.001) -> Twin:
 
 
 @dataclass(frozen=True)
-class Pull:
+class WrenchHistory:
     """A wrench on the base.
 
     Attributes:
@@ -64,7 +64,7 @@ class Pull:
     w: np.ndarray
 
 
-def replay(twin: Twin, pull: Pull) -> np.ndarray:
+def replay(twin: Twin, pull: WrenchHistory) -> np.ndarray:
     """Displacement (n, 6) [m, rad] of the base frame since pull.t[0], in the base frame of then.
 
     Args:
@@ -74,7 +74,7 @@ def replay(twin: Twin, pull: Pull) -> np.ndarray:
     Raises:
         Diverged: A state is not finite.
     """
-    model, data = put_down(twin.model, transform(np.array(_PLACE), np.array([1.0, 0.0, 0.0, 0.0])))
+    model, data = place_base(twin.model, transform(np.array(_PLACE), np.array([1.0, 0.0, 0.0, 0.0])))
     t = np.arange(-SETTLE, pull.t[-1] - pull.t[0], model.opt.timestep)
     w = np.stack([np.interp(t, pull.t - pull.t[0], column) for column in pull.w.T], axis=1)
     w *= np.clip((t + SETTLE) / _RISE, 0.0, 1.0)[:, None]

@@ -9,11 +9,11 @@ from calibration.recording import Description, TrialEntry, schema
 from twin.campaign.robot import BASE, TOOL, TORSO
 from twin.config.instruments import Instruments
 from twin.config.twin import TwinConfig
-from twin.simulation.force_plates import PLATE, T_lab_plate, Tiles
+from twin.simulation.force_plates import PLATE, PlateGrid, T_lab_plate
 from twin.simulation.wrist_sensor import WRIST_SENSOR
 
 
-def declaration(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:
+def describe_dataset(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:
     """The description of a recorded campaign; nothing drawn enters it."""
     i, d = config.instruments, config.datasheet
     joints = [schema.Joint(name=TORSO, encoders=("motor",), rate=i.robot_rate)]
@@ -53,7 +53,7 @@ def _plates(instruments: Instruments) -> tuple[schema.Plate, ...]:
     spec = mjcf.spec()
     T = T_lab_plate(spec.body(PLATE), instruments.plate_place)
     axes = cast(tuple[schema.Vector3, schema.Vector3, schema.Vector3], tuple(map(_vector, T[:3, :3].T)))
-    cut = Tiles(instruments.plate_grid).cut(*(2.0 * spec.geom(PLATE).size[:2]).tolist())
+    cut = PlateGrid(instruments.plate_grid).cut(*(2.0 * spec.geom(PLATE).size[:2]).tolist())
     return tuple(
         schema.Plate(name=t.name, centre=_vector(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size)
         for t in cut

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import mjcf
-from twin.campaign.robot import Robot, draw, links_seen
+from twin.campaign.robot import Robot, links_seen, sample
 from twin.campaign.second_session import moved, remounted
-from twin.config.distributions import drawn
+from twin.config.distributions import sampled
 from twin.config.twin import TwinConfig
 from twin.defects.defect import Defect
 from twin.simulation.build import Twin, build
@@ -39,8 +39,8 @@ class Laboratory:
 
 def laboratory(config: TwinConfig, seed: int) -> Laboratory:
     """Draw a robot and put it on its plate."""
-    config = drawn(config, seed)
-    robot = draw(config, mjcf.model(), seed)
+    config = sampled(config, seed)
+    robot = sample(config, seed)
     twin = built(config, robot.defects, links_seen(config, robot))
     x, y, yaw = config.base.pose
     T_lab_base = exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, yaw]))

@@ -23,7 +23,7 @@ from twin.instruments.sampling import averaged, interpolate, interpolate_poses
 from twin.motions.motion import Motion
 from twin.motions.swings import JOINTS
 from twin.random_streams import generator
-from twin.simulation.force_plates import PLATE, Tiles, felt
+from twin.simulation.force_plates import PLATE, PlateGrid, plate_sites
 from twin.simulation.kinematic import without_plate
 from twin.simulation.states import States
 from twin.transforms import transform
@@ -52,7 +52,7 @@ def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tu
         marker_body=tuple(c.name for c in lab.robot.clusters for _ in c.marker_names),
         t_mocap=t_mocap,
         marker_position=_markers(lab, motion, states, true, start),
-        plate=Tiles(i.plate_grid).names,
+        plate=PlateGrid(i.plate_grid).names,
         t_plate=t_plate,
         plate_wrench=_wrenches(lab, motion, states, true_plate, start),
         plate_centre=plate_centres(lab.twin.model),
@@ -60,10 +60,10 @@ def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tu
         dwell_stop=motion.dwells[:, 1] + start + late,
         approach=motion.approach,
     )
-    return (without_plate(trial) if is_carried(lab, motion) else trial), true
+    return (without_plate(trial) if is_kinematic(lab, motion) else trial), true
 
 
-def is_carried(lab: Laboratory, motion: Motion) -> bool:
+def is_kinematic(lab: Laboratory, motion: Motion) -> bool:
     """Whether no plate feels the robot."""
     return lab.config.campaign.carried or (motion.base is not None and motion.base.form == "kinematic")
 
@@ -80,7 +80,7 @@ def _wrist(lab: Laboratory, motion: Motion, states: States, t: np.ndarray) -> np
     sensor, rate = lab.config.instruments.wrist, lab.config.instruments.robot_rate
     if sensor is None:
         return None
-    worn = wrist_sensor.draw(sensor, generator(lab.seed, "wrist"))
+    worn = wrist_sensor.sample_wrist(sensor, generator(lab.seed, "wrist"))
     return wrist_sensor.measured(t, rate, states.t, states.wrist, worn, generator(lab.seed, motion.id, "wrist"))
 
 
@@ -93,7 +93,7 @@ def instrument_errors(lab: Laboratory) -> tuple[Defect | Clock | Latency, ...]:
         replace(force, offset=force.offset + late - worn[0].delay),
     )
     latencies = (Latency("mocap", late), Latency("robot", i.log.latency), Latency("plate", worn[0].delay))
-    held = () if i.wrist is None else (wrist_sensor.draw(i.wrist, generator(lab.seed, "wrist")),)
+    held = () if i.wrist is None else (wrist_sensor.sample_wrist(i.wrist, generator(lab.seed, "wrist")),)
     return robot, force, *(x for x in latencies if x.value), *worn, _volume(lab), *held
 
 
@@ -108,7 +108,7 @@ def plate_centres(model: mujoco.MjModel) -> np.ndarray:
     """Surface centre of each plate in the lab (n_plates, 3) [m]."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    return np.array([data.site(name).xpos for name in felt(model) or (PLATE,)])
+    return np.array([data.site(name).xpos for name in plate_sites(model) or (PLATE,)])
 
 
 def plate_axes(model: mujoco.MjModel) -> np.ndarray:
@@ -118,7 +118,9 @@ def plate_axes(model: mujoco.MjModel) -> np.ndarray:
 
 def _plates(lab: Laboratory) -> tuple[force_plate.PlateDefect, ...]:
     i = lab.config.instruments
-    return tuple(force_plate.draw(n, i.plate, generator(lab.seed, "plate", n)) for n in Tiles(i.plate_grid).names)
+    return tuple(
+        force_plate.sample_plate(n, i.plate, generator(lab.seed, "plate", n)) for n in PlateGrid(i.plate_grid).names
+    )
 
 
 def _volume(lab: Laboratory) -> motion_capture.Volume:

@@ -20,12 +20,11 @@ from calibration.recording import Trial, TrialEntry, write_trial
 from twin import truth
 from twin.base_tests.gravity_stiffness import gravity_stiffness
 from twin.base_tests.slip_load import slip_loads
-from twin.campaign import second_session as session
-from twin.campaign.dataset_description import declaration
+from twin.campaign.dataset_description import describe_dataset
 from twin.campaign.instrument_constants import constants
 from twin.campaign.laboratory import EPOCH, Laboratory, built, laboratory, second_session
-from twin.campaign.measure import instrument_errors, is_carried, measure, plate_centre
-from twin.campaign.second_session import CONFIRMATION
+from twin.campaign.measure import instrument_errors, is_kinematic, measure, plate_centre
+from twin.campaign.second_session import CONFIRMATION, session_parameters
 from twin.config.twin import TwinConfig
 from twin.defects.defect import Defect
 from twin.defects.inertia import Payload
@@ -36,7 +35,7 @@ from twin.defects.wheels.wheel import Wheel
 from twin.motions.motion import Motion
 from twin.motions.schedule import schedule
 from twin.simulation.build import Twin
-from twin.simulation.kinematic import arm_frame, carried
+from twin.simulation.kinematic import arm_frame, kinematic_states
 from twin.simulation.rollout import simulate
 from twin.simulation.states import States
 from twin.truth import Parameter
@@ -87,7 +86,7 @@ def record(
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    description = declaration(config, tuple(entries))
+    description = describe_dataset(config, tuple(entries))
     (out / "dataset/dataset.json").write_text(description.model_dump_json(indent=1) + "\n", encoding="utf-8")
     (out / "dataset/nominal.urdf").write_text(mjcf.urdf(), encoding="utf-8")
     _write_truth(lab, later if later is not lab else None, out / "truth")
@@ -113,7 +112,7 @@ def _one(lab: Laboratory, motion: Motion, start: float, out: Path, watch: Watch)
 
 def _states(lab: Laboratory, motion: Motion, time: float) -> States:
     """What the motion does at `time` [s] of the campaign."""
-    move = carried if is_carried(lab, motion) else simulate
+    move = kinematic_states if is_kinematic(lab, motion) else simulate
     return move(_in_trial(lab, motion, time), motion, lab.T_lab_base)
 
 
@@ -123,7 +122,7 @@ def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
     def now(defect: Defect) -> Defect:
         if isinstance(defect, Payload) and motion.payload is not None:
             return replace(defect, mass=motion.payload)
-        if isinstance(defect, Wheel) and motion.base is not None and not is_carried(lab, motion):
+        if isinstance(defect, Wheel) and motion.base is not None and not is_kinematic(lab, motion):
             return Rolling(defect)
         return replace(defect, time=time) if isinstance(defect, Warming) else defect
 
@@ -149,7 +148,7 @@ def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> Non
     derived |= {"T_lab_base": lab.T_lab_base, "plate_centre": plate_centre(lab.twin.model)}
     derived |= {f"T_{c.frames.replace('.', '_')}": c.T_link_body for c in robot.clusters}
     if later is not None:
-        parameters += session.parameters(later.robot)
+        parameters += session_parameters(later.robot)
         derived |= {f"{CONFIRMATION}.T_lab_base": later.T_lab_base}
         derived |= {f"{CONFIRMATION}.T_{c.frames.replace('.', '_')}": c.T_link_body for c in later.robot.clusters}
     truth.write_parameters(folder / "truth.json", parameters, derived)

@@ -2,17 +2,17 @@
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+import mjcf
 from twin.config.instruments import MarkerBody
 from twin.config.twin import TwinConfig
 from twin.defects.bending import Cable, Flexibility
 from twin.defects.defect import Defect
 from twin.defects.differential import Differential
 from twin.defects.gear import DirectDrive, Gear
-from twin.defects.gear_friction import Hysteresis
+from twin.defects.gear_friction import GearFriction
 from twin.defects.inertia import LinkMass, Payload
 from twin.defects.placement import Placement
 from twin.defects.thermal_drift import Warming
@@ -23,7 +23,7 @@ from twin.instruments.encoder import Encoder
 from twin.instruments.markers import Cluster, LooseMarker
 from twin.random_streams import generator
 from twin.simulation.build import HAND
-from twin.simulation.force_plates import FloorTilt, Laid, Tiles
+from twin.simulation.force_plates import FloorTilt, PlateGrid, PlatePlacement
 
 TORSO = "torso_lift_joint"
 TOOL = HAND
@@ -52,15 +52,15 @@ class Robot:
     loose: tuple[LooseMarker, ...] = ()
 
 
-def draw(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> Robot:
-    """Draw one robot of the series; the same seed gives the same robot."""
+def sample(config: TwinConfig, seed: int) -> Robot:
+    """One robot of the series; the same seed gives the same robot."""
     wheels = wheels_of(config.base)
     return Robot(
         defects=(
-            Tiles(config.instruments.plate_grid),
-            Laid(config.instruments.plate_place),
+            PlateGrid(config.instruments.plate_grid),
+            PlatePlacement(config.instruments.plate_place),
             *_placements(config, seed),
-            *_masses(config, nominal, seed),
+            *_masses(config, seed),
             *_gears(config, seed),
             _torso_drive(config),
             Flexibility("torso_lift_link", config.torso.bending_stiffness, config.torso.bending_damping),
@@ -84,8 +84,9 @@ def _placements(config: TwinConfig, seed: int) -> tuple[Placement, ...]:
     return tuple(Placement(name, twist) for name, twist in xi.items())
 
 
-def _masses(config: TwinConfig, nominal: mujoco.MjModel, seed: int) -> tuple[LinkMass, ...]:
+def _masses(config: TwinConfig, seed: int) -> tuple[LinkMass, ...]:
     """Links of the upper body with a mass of their own; the base's never moves against the plate."""
+    nominal = mjcf.model()
     links = [nominal.body(i).name for i in range(nominal.nbody)]
     heavy = [
         n for n in links if nominal.body(n).mass[0] > 0 and n.startswith(("torso", "head", "arm", "wrist", "gripper"))
@@ -111,7 +112,7 @@ def _gears(config: TwinConfig, seed: int) -> tuple[Defect, ...]:
     alone = [_gear(config, seed, name) for name in config.arm]
     trains: list[Defect] = [g for g in alone if not (config.coupled_wrist and g.joint_name in WRIST)]
     held = config.friction_held.items() if config.gear_form == "friction_held" else ()
-    frictions = [Hysteresis(name, h.stiffness, h.slip, h.holding) for name, h in held]
+    frictions = [GearFriction(name, h.stiffness, h.slip, h.holding) for name, h in held]
     if config.coupled_wrist:
         first, second = (g for g in alone if g.joint_name in WRIST)
         trains.append(Differential((first, second), tuple(f for f in frictions if f.joint_name in WRIST)))

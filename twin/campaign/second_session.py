@@ -39,7 +39,7 @@ def moved(config: TwinConfig, T_lab_base: np.ndarray, seed: int, session: str = 
     return T
 
 
-def parameters(robot: Robot, session: str = CONFIRMATION) -> tuple[Parameter, ...]:
+def session_parameters(robot: Robot, session: str = CONFIRMATION) -> tuple[Parameter, ...]:
     """What is true in that session only, `session.` before each name."""
     motor = (e for e in robot.encoders if e.side == "motor")
     found = (p for source in (*motor, *robot.clusters) for p in source.parameters())

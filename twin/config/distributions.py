@@ -57,25 +57,25 @@ class Distribution:
         return float(self.first + self.second * z)
 
 
-class Uncertain(float):
+class RandomValue(float):
     """A number with a distribution, of which it is the mean."""
 
     distribution: Distribution
 
-    def __new__(cls, distribution: Distribution) -> "Uncertain":
+    def __new__(cls, distribution: Distribution) -> "RandomValue":
         """The mean of a distribution."""
         value = super().__new__(cls, distribution.mean)
         value.distribution = distribution
         return value
 
-    def __reduce__(self) -> tuple[Callable[..., "Uncertain"], tuple[Distribution]]:
+    def __reduce__(self) -> tuple[Callable[..., "RandomValue"], tuple[Distribution]]:
         """Copy and pickle with the distribution."""
-        return Uncertain, (self.distribution,)
+        return RandomValue, (self.distribution,)
 
 
 def _validate(value: Any, handler: ValidatorFunctionWrapHandler) -> float:
     """Accept a number, or a distribution whose ends are accepted as numbers."""
-    if isinstance(value, Uncertain):
+    if isinstance(value, RandomValue):
         distribution = value.distribution
     elif isinstance(value, Mapping):
         distribution = _distribution(value)
@@ -83,7 +83,7 @@ def _validate(value: Any, handler: ValidatorFunctionWrapHandler) -> float:
         return float(handler(value))
     for end in distribution.ends:
         handler(end)
-    return Uncertain(distribution)
+    return RandomValue(distribution)
 
 
 def _distribution(value: Mapping[Any, Any]) -> Distribution:
@@ -106,7 +106,7 @@ def _distribution(value: Mapping[Any, Any]) -> Distribution:
 
 
 def _serialise(value: float) -> float | dict[str, list[float]]:
-    if isinstance(value, Uncertain):
+    if isinstance(value, RandomValue):
         d = value.distribution
         return {d.kind: [d.first, d.second]}
     return value
@@ -125,19 +125,19 @@ class Drawn:
 DRAWN = Drawn()
 
 
-def drawn(values: T, seed: int, *path: str) -> T:
+def sampled(values: T, seed: int, *path: str) -> T:
     """The same values with every uncertain one replaced by its draw; `path` is where they stand in the scenario."""
-    if isinstance(values, Uncertain):
+    if isinstance(values, RandomValue):
         return values.distribution.sample(generator(seed, "value", ".".join(path)))  # type: ignore[return-value]
     if is_dataclass(values) and not isinstance(values, type):
         old = {f.name: getattr(values, f.name) for f in fields(values)}
-        new = {name: drawn(value, seed, *path, name) for name, value in old.items()}
+        new = {name: sampled(value, seed, *path, name) for name, value in old.items()}
         changed = {name: value for name, value in new.items() if value is not old[name]}
         return replace(values, **changed) if changed else values
     if isinstance(values, Mapping):
-        found = {key: drawn(value, seed, *path, str(key)) for key, value in values.items()}
+        found = {key: sampled(value, seed, *path, str(key)) for key, value in values.items()}
         return found if any(found[k] is not v for k, v in values.items()) else values  # type: ignore[return-value]
     if isinstance(values, tuple):
-        several = tuple(drawn(value, seed, *path, str(k)) for k, value in enumerate(values))
+        several = tuple(sampled(value, seed, *path, str(k)) for k, value in enumerate(values))
         return several if any(a is not b for a, b in zip(several, values, strict=True)) else values  # type: ignore[return-value]
     return values

@@ -21,7 +21,7 @@ import mujoco
 
 from twin.defects.defect import Defect
 from twin.defects.gear import Gear, add_mesh, add_servo, mesh_tendon, rotor_joint, tune_mesh
-from twin.defects.gear_friction import Hysteresis
+from twin.defects.gear_friction import GearFriction
 from twin.errors import TwinError
 from twin.truth import Parameter
 
@@ -49,7 +49,7 @@ class Differential(Defect):
     """
 
     gears: tuple[Gear, Gear]
-    frictions: tuple[Hysteresis, ...] = ()
+    frictions: tuple[GearFriction, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that the motors are alike.
@@ -100,14 +100,14 @@ class Differential(Defect):
         if not self.frictions:
             return
         slips = {f.joint_name: f for f in self.frictions if f.slip > 0.0}
-        of = [slips.get(g.joint_name, Hysteresis(g.joint_name, 0.0, 0.0, 0.0)) for g in self.gears]
+        of = [slips.get(g.joint_name, GearFriction(g.joint_name, 0.0, 0.0, 0.0)) for g in self.gears]
         soft = sum(1.0 / g.stiffness for g in self.gears)
         slip = sum(f.slip / g.stiffness for f, g in zip(of, self.gears, strict=True)) / soft
         held = sum(1.0 / (g.stiffness + f.stiffness) for f, g in zip(of, self.gears, strict=True))
         stiffness = 2.0 / held - 2.0 / soft
         holding = {f.joint_name: f.holding for f in self.frictions}
         for i, (gear, mesh) in enumerate(zip(self.gears, of, strict=True), 1):
-            joint = Hysteresis(gear.joint_name, stiffness, slip, holding.get(gear.joint_name, 0.0))
+            joint = GearFriction(gear.joint_name, stiffness, slip, holding.get(gear.joint_name, 0.0))
             yield from joint.parameters()
             yield Parameter(f"differential.motor_{i}.slip", "N.m", 0.5 * mesh.slip)
             yield Parameter(f"differential.motor_{i}.slip_stiffness", "N.m/rad", 0.5 * mesh.stiffness)

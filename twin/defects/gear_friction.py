@@ -21,7 +21,7 @@ from twin.truth import Parameter
 
 
 @dataclass(frozen=True)
-class Hysteresis(Defect):
+class GearFriction(Defect):
     """Friction of a geared joint's mesh and of its link; applied after its `Gear`.
 
     Attributes:

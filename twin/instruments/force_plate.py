@@ -62,7 +62,7 @@ class PlateDefect(Defect):
         return tuple(found)
 
 
-def draw(name: str, errors: PlateErrors, rng: np.random.Generator) -> PlateDefect:
+def sample_plate(name: str, errors: PlateErrors, rng: np.random.Generator) -> PlateDefect:
     """One plate of the kind `errors` describes."""
     width = np.where(np.eye(6) == 1.0, errors.gain, errors.crosstalk)
     return PlateDefect(

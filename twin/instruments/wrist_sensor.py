@@ -42,7 +42,7 @@ class WristDefect(Defect):
         return tuple(found)
 
 
-def draw(sensor: WristSensor, rng: np.random.Generator) -> WristDefect:
+def sample_wrist(sensor: WristSensor, rng: np.random.Generator) -> WristDefect:
     """One sensor of the kind described."""
     return WristDefect(
         np.repeat([sensor.force_offset, sensor.moment_offset], 3) * rng.normal(size=6),

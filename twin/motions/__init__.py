@@ -1,1 +1,21 @@
-"""What the joints and the base are commanded to do."""
+"""What a campaign commands: set-points of joints and base, and the order of the trials."""
+
+from twin.motions.motion import RATE, BasePath, Motion, static_postures, swing
+from twin.motions.postures import sample_postures
+from twin.motions.schedule import schedule
+from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing, in_step
+
+__all__ = [
+    "CALIBRATION_SWINGS",
+    "JOINTS",
+    "RATE",
+    "VALIDATION_SWINGS",
+    "BasePath",
+    "Motion",
+    "Swing",
+    "in_step",
+    "sample_postures",
+    "schedule",
+    "static_postures",
+    "swing",
+]

@@ -146,7 +146,7 @@ def pushed(id: str, role: schema.Role, force: float, campaign: Campaign) -> Moti
     return Motion(id, role, "swing", id, still, *_no_dwells(), push=push)
 
 
-def postures(
+def static_postures(
     id: str, role: schema.Role, through: np.ndarray, campaign: Campaign, sides: np.ndarray | None = None
 ) -> Motion:
     """Rests in postures (n, 8), the first of them at the start, with straight moves in joint space between.

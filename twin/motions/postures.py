@@ -17,7 +17,7 @@ _UPWARDS = 0.2  # [-] least cosine between the hand's upper side and the vertica
 _ATTEMPTS = 1000  # per posture asked for
 
 
-def draw(model: mujoco.MjModel, n: int, rng: np.random.Generator) -> np.ndarray:
+def sample_postures(model: mujoco.MjModel, n: int, rng: np.random.Generator) -> np.ndarray:
     """Postures (n, 8) of the measured joints, in the order of `JOINTS` [m, rad].
 
     Raises:

@@ -7,9 +7,10 @@ import numpy as np
 
 from calibration.recording import schema
 from twin.config.campaign import Campaign
-from twin.motions import driving, postures
+from twin.motions import driving
 from twin.motions import motion as motions
 from twin.motions.motion import Motion
+from twin.motions.postures import sample_postures
 from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
 from twin.random_streams import generator
 
@@ -46,8 +47,8 @@ def _group(motion: Motion) -> str:
 
 def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
     """The second session: a few postures to register the markers anew, then what is asked for of validation."""
-    q = postures.draw(nominal, _REGISTRATION_POSTURES + 1, generator(seed, "postures", REGISTRATION))
-    register = motions.postures(f"{REGISTRATION}_confirmation", "confirmation", q, campaign)
+    q = sample_postures(nominal, _REGISTRATION_POSTURES + 1, generator(seed, "postures", REGISTRATION))
+    register = motions.static_postures(f"{REGISTRATION}_confirmation", "confirmation", q, campaign)
     swings = _swings("confirmation", campaign.validation_swing, VALIDATION_SWINGS, campaign)
     confirming = (
         *(replace(m, id=f"{m.id}_confirmation") for m in swings),
@@ -62,7 +63,7 @@ def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign
         return _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign)
     q = np.array([campaign.given_postures[0], *campaign.given_postures])
     sides = np.array(campaign.given_approaches) if campaign.given_approaches else None
-    return (motions.postures("postures", "calibration", q, campaign, sides),)
+    return (motions.static_postures("postures", "calibration", q, campaign, sides),)
 
 
 def _statics(
@@ -71,8 +72,8 @@ def _statics(
     """The first posture is where the trial starts, the n that follow are dwelt in; not drawn unless asked for."""
     if not _asked(campaign, id.replace("_confirmation", "_validation")):
         return ()
-    q = postures.draw(nominal, n + 1, generator(seed, "postures", role))
-    return (motions.postures(id, role, q, campaign),)
+    q = sample_postures(nominal, n + 1, generator(seed, "postures", role))
+    return (motions.static_postures(id, role, q, campaign),)
 
 
 def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:

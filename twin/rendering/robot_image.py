@@ -11,7 +11,7 @@ from twin.campaign.laboratory import Laboratory, laboratory
 from twin.config.twin import TwinConfig
 from twin.motions.swings import JOINTS
 from twin.rendering.raycaster import View, render
-from twin.simulation.base_joint import put_down
+from twin.simulation.base_joint import place_base
 from twin.simulation.build import build
 from twin.transforms import transform
 
@@ -34,7 +34,7 @@ def picture(config: TwinConfig, seed: int, path: Path, size: tuple[int, int] = S
     """
     lab, nominal = laboratory(config, seed), mjcf.model()
     model = build(with_markers(lab), lab.robot.defects, timestep=config.timestep, visual=True).model
-    model, data = put_down(model, lab.T_lab_base)
+    model, data = place_base(model, lab.T_lab_base)
     held_out = nominal.key("reach").qpos
     for joint in JOINTS:
         data.joint(joint).qpos = held_out[nominal.joint(joint).qposadr[0]]

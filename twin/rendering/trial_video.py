@@ -21,7 +21,7 @@ from twin.errors import TwinError
 from twin.rendering.raycaster import View
 from twin.rendering.renderer import Frames, Renderer
 from twin.rendering.robot_image import portrait, with_markers
-from twin.simulation.base_joint import put_down
+from twin.simulation.base_joint import place_base
 from twin.simulation.build import build
 from twin.truth import TruthTrial
 
@@ -72,7 +72,7 @@ def clip(lab: Laboratory, trial: TruthTrial, path: Path, options: ClipOptions) -
     model = build(with_markers(lab), lab.robot.defects, timestep=lab.config.timestep, visual=True).model
     view = portrait(mjcf.model(), trial.base_pose[0], options.size)
     model.vis.global_.fovy = np.degrees(view.field)
-    model, data = put_down(model, trial.base_pose[0])
+    model, data = place_base(model, trial.base_pose[0])
     mujoco.mj_kinematics(model, data)
     centre = data.site("plate").xpos.copy()
     poses = magnified(trial.base_pose, options.magnify)
@@ -107,7 +107,7 @@ def magnified(T: np.ndarray, m: float) -> np.ndarray:
 
 def posed(model: mujoco.MjModel, T_lab_base: np.ndarray, trial: TruthTrial, k: int) -> mujoco.MjData:
     """The state of sample k with the base at T_lab_base (4, 4)."""
-    stood, data = put_down(model, T_lab_base)
+    stood, data = place_base(model, T_lab_base)
     model.body_pos[:], model.body_quat[:] = stood.body_pos, stood.body_quat
     for joint, value in zip(trial.joint, trial.q_link_true[k], strict=True):
         data.joint(joint).qpos = value

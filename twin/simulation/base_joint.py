@@ -18,7 +18,7 @@ def anchored(model: mujoco.MjModel) -> bool:
     return int(model.jnt_type[model.body(ROOT).jntadr[0]]) != mujoco.mjtJoint.mjJNT_FREE
 
 
-def put_down(model: mujoco.MjModel, T_lab_base: np.ndarray) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def place_base(model: mujoco.MjModel, T_lab_base: np.ndarray) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A robot standing upright at T_lab_base (4, 4); the model is a copy where the place is part of it."""
     position, quat = placement(T_lab_base)
     if not anchored(model):

@@ -9,11 +9,11 @@ MuJoCo resets a simulation that runs away to the model's first posture, with fin
 import mujoco
 import numpy as np
 
-from twin.errors import Diverged, NotStanding, Shaking
+from twin.errors import BaseVibrates, Diverged, RobotFell
 from twin.motions.motion import SETTLE, Motion
 from twin.simulation.base_joint import ROOT, base_poses, base_velocities
-from twin.simulation.force_plates import felt
-from twin.simulation.setpoints import Inputs
+from twin.simulation.force_plates import plate_sites
+from twin.simulation.setpoints import RolloutInputs
 
 _FAST = 100.0  # [m/s, rad/s] nothing of this robot moves like that
 _MIN_UPRIGHT = 0.98  # [-] cosine of the base's tilt below which the robot has tipped
@@ -24,7 +24,7 @@ _SHAKES = 0.1, 1.0  # [m/s2], [rad/s2]
 _WHEEL = "_contact"  # ends the name of a wheel's contact geom
 
 
-def check(inputs: Inputs, motion: Motion, states: np.ndarray) -> None:
+def check(inputs: RolloutInputs, motion: Motion, states: np.ndarray) -> None:
     """Refuse a trial; states (n, ns) before each step.
 
     Raises:
@@ -46,7 +46,7 @@ def check(inputs: Inputs, motion: Motion, states: np.ndarray) -> None:
     _at_rest(inputs, motion, velocity)
 
 
-def _at_rest(inputs: Inputs, motion: Motion, velocity: np.ndarray) -> None:
+def _at_rest(inputs: RolloutInputs, motion: Motion, velocity: np.ndarray) -> None:
     model, h = inputs.model, inputs.model.opt.timestep
     still = velocity[inputs.settling - round(_STILL / h) : inputs.settling]
     changes = np.diff(base_velocities(model, still), n=2, axis=0).reshape(-1, 2, 3) / h
@@ -54,10 +54,12 @@ def _at_rest(inputs: Inputs, motion: Motion, velocity: np.ndarray) -> None:
     if (flips > _SHAKES).any():
         energy = model.dof_M0 * (np.diff(still, n=2, axis=0) ** 2).mean(axis=0)
         joint = model.joint(model.dof_jntid[int(np.argmax(energy))]).name
-        raise Shaking(motion.id, (float(flips[0]), float(flips[1])), str(joint))
+        raise BaseVibrates(motion.id, (float(flips[0]), float(flips[1])), str(joint))
 
 
-def _refuse_diverged(inputs: Inputs, motion: Motion, states: np.ndarray, speed: np.ndarray, late: np.ndarray) -> None:
+def _refuse_diverged(
+    inputs: RolloutInputs, motion: Motion, states: np.ndarray, speed: np.ndarray, late: np.ndarray
+) -> None:
     """Say when it first happens, and to which joint."""
     with np.errstate(invalid="ignore"):
         bad = late | ~np.isfinite(states).all(axis=1) | ~(speed < _FAST).all(axis=1)
@@ -73,7 +75,7 @@ def _fastest(model: mujoco.MjModel, speed: np.ndarray, reset: bool) -> str:
     return str(model.joint(model.dof_jntid[int(np.argmax(row))]).name)
 
 
-def _on_plate(inputs: Inputs, motion: Motion, T_lab_base: np.ndarray) -> None:
+def _on_plate(inputs: RolloutInputs, motion: Motion, T_lab_base: np.ndarray) -> None:
     model = inputs.model
     data = mujoco.MjData(model)
     data.qpos[:] = inputs.first[1 : 1 + model.nq]
@@ -94,7 +96,7 @@ def _on_plate(inputs: Inputs, motion: Motion, T_lab_base: np.ndarray) -> None:
 
 def _seams(model: mujoco.MjModel) -> np.ndarray:
     """Where plates meet (n, 2), x and y from the whole square's centre [m], NaN for the other axis."""
-    centres = np.array([model.body(model.site(name).bodyid[0]).pos[:2] for name in felt(model)]).reshape(-1, 2)
+    centres = np.array([model.body(model.site(name).bodyid[0]).pos[:2] for name in plate_sites(model)]).reshape(-1, 2)
     found = [np.empty((0, 2))]
     for axis in range(2):
         along = np.unique(np.round(centres[:, axis], 9))
@@ -107,4 +109,4 @@ def _seams(model: mujoco.MjModel) -> np.ndarray:
 def _refuse(found: np.ndarray, what: str, motion: Motion, step: float) -> None:
     """Say when it first happens."""
     if found.any():
-        raise NotStanding(f"trial {motion.id!r}: {what} at {int(np.argmax(found)) * step - SETTLE:.2f} s")
+        raise RobotFell(f"trial {motion.id!r}: {what} at {int(np.argmax(found)) * step - SETTLE:.2f} s")

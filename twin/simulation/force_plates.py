@@ -42,7 +42,7 @@ class Tile:
 
 
 @dataclass(frozen=True)
-class Tiles(Defect):
+class PlateGrid(Defect):
     """Plates in columns along x and rows along y.
 
     Attributes:
@@ -83,7 +83,7 @@ class Tiles(Defect):
         whole.contype, whole.conaffinity = UNTOUCHED
 
 
-def felt(model: mujoco.MjModel) -> tuple[str, ...]:
+def plate_sites(model: mujoco.MjModel) -> tuple[str, ...]:
     """Sites of the tiles of a model, in order; none where there is the one plate."""
     sites = [model.site(i).name for i in range(model.nsite)]
     tiles = {name for name in sites if name.startswith(PLATE)} - {PLATE}
@@ -91,7 +91,7 @@ def felt(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Laid(Defect):
+class PlatePlacement(Defect):
     """The plate where a laboratory has it; applied after it was cut.
 
     Attributes:

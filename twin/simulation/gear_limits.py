@@ -25,7 +25,7 @@ _BOUNCES, _STABLE = 2.0, 4.0
 _POSTURES = 64
 
 
-class Rings(TwinError):
+class GearTooStiff(TwinError):
     """A mesh that a time step cannot integrate: link and rotor would gain energy from it.
 
     Attributes:
@@ -55,9 +55,9 @@ def check_meshes(model: mujoco.MjModel, arm: Mapping[str, ArmJoint]) -> None:
         most = min(_BOUNCES * m / h**2, room - 2.0 * D / h)
         if most <= 0.0:
             share = 0.5 * h * (room - K) / D
-            raise Rings(name, "damping", joint.damping, max(0.0, share) * joint.damping, "N.m.s/rad")
+            raise GearTooStiff(name, "damping", joint.damping, max(0.0, share) * joint.damping, "N.m.s/rad")
         if most < K:
-            raise Rings(name, "stiffness", joint.stiffness, most / K * joint.stiffness, "N.m/rad")
+            raise GearTooStiff(name, "stiffness", joint.stiffness, most / K * joint.stiffness, "N.m/rad")
 
 
 def least_masses(model: mujoco.MjModel, names: tuple[str, ...]) -> np.ndarray:

@@ -20,7 +20,7 @@ from twin.truth import Parameter, twist_parameters
 _ROOT = "base_footprint"
 
 
-def carried(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
+def kinematic_states(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
     """States along a motion, at its set-points."""
     q = motion.command
     t = np.arange(len(q)) / RATE

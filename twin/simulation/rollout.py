@@ -12,8 +12,8 @@ from twin.simulation import wrist_sensor
 from twin.simulation.base_joint import anchored, floor_wrench
 from twin.simulation.build import Twin
 from twin.simulation.checks import check
-from twin.simulation.force_plates import PLATE, felt, on_plate
-from twin.simulation.setpoints import Inputs, driven, prepare
+from twin.simulation.force_plates import PLATE, on_plate, plate_sites
+from twin.simulation.setpoints import RolloutInputs, driven, prepare
 from twin.simulation.states import States
 from twin.transforms import states_with_their_sensors, transform
 
@@ -42,7 +42,7 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
     return _unpack(inputs, twin.links, states[skip:], sensors[0][skip:])
 
 
-def _unpack(inputs: Inputs, links: tuple[str, ...], states: np.ndarray, sensors: np.ndarray) -> States:
+def _unpack(inputs: RolloutInputs, links: tuple[str, ...], states: np.ndarray, sensors: np.ndarray) -> States:
     model, command, push = inputs.model, inputs.command[inputs.settling :], inputs.push[inputs.settling :]
     qpos, qvel = states[:, 1 : 1 + model.nq], states[:, 1 + model.nq : 1 + model.nq + model.nv]
     link = np.stack([qpos[:, model.joint(j).qposadr[0]] for j in JOINTS], axis=1)
@@ -51,7 +51,7 @@ def _unpack(inputs: Inputs, links: tuple[str, ...], states: np.ndarray, sensors:
     servos = [model.actuator(driven(j)).id for j in JOINTS]
     kp, kv = model.actuator_gainprm[servos, 0], -model.actuator_biasprm[servos, 2]
     wrench = _floor_wrench(model, qpos, qvel) if anchored(model) else on_plate(model, sensors, PLATE)
-    each = [on_plate(model, sensors, tile) for tile in felt(model)] or [wrench]
+    each = [on_plate(model, sensors, tile) for tile in plate_sites(model)] or [wrench]
     return States(
         t=np.arange(len(states)) * model.opt.timestep,
         motor=motor,

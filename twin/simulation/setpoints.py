@@ -13,12 +13,12 @@ from twin.defects.wheels.rolling_wheel import DRIVES, roll_joint
 from twin.motions.driving import differential_drive
 from twin.motions.motion import RATE, SETTLE, Motion
 from twin.motions.swings import JOINTS
-from twin.simulation.base_joint import put_down
+from twin.simulation.base_joint import place_base
 from twin.simulation.build import PUSH, Twin
 
 
 @dataclass(frozen=True)
-class Inputs:
+class RolloutInputs:
     """A rollout of n steps, `SETTLE` seconds of rest before the trial's first set-point included.
 
     Attributes:
@@ -38,9 +38,9 @@ class Inputs:
     settling: int
 
 
-def prepare(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> Inputs:
+def prepare(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> RolloutInputs:
     """What a rollout takes to simulate a trial, the robot upright at T_lab_base (4, 4)."""
-    model, data = put_down(twin.model, T_lab_base)
+    model, data = place_base(twin.model, T_lab_base)
     step = model.opt.timestep
     command = _interpolated(motion.command, step)
     control = np.zeros((len(command), model.nu))
@@ -53,7 +53,7 @@ def prepare(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> Inputs:
         angles = _interpolated(motion.base.wheel_angles(*differential_drive()), step)
         control[:, [model.actuator(roll_joint(name)).id for name in DRIVES]] = angles
     settling = len(command) - round(motion.duration / step) - 1
-    return Inputs(model, _first_state(model, data, motion.command[0]), control, command, push, settling)
+    return RolloutInputs(model, _first_state(model, data, motion.command[0]), control, command, push, settling)
 
 
 def driven(joint: str) -> str:

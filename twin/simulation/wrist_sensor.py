@@ -53,7 +53,7 @@ def on_wrist(model: mujoco.MjModel, sensors: np.ndarray, push: np.ndarray) -> np
         return np.full((len(sensors), 6), np.nan)
     quat, v, w = (sensed(model, sensors, [f"{WRIST}.{kind.name}"]) for kind in _MOVES)
     R = Rotation.from_quat(quat, scalar_first=True).as_matrix()
-    held = Hung.of(model, WRIST).wrench(R, v, w, model.opt.gravity, model.opt.timestep)
+    held = RigidBodyInertia.of(model, WRIST).wrench(R, v, w, model.opt.gravity, model.opt.timestep)
     return push_on(model, WRIST, PUSHED, push) - held
 
 
@@ -64,7 +64,7 @@ def sensed(model: mujoco.MjModel, sensors: np.ndarray, names: Sequence[str]) -> 
 
 
 @dataclass(frozen=True)
-class Hung:
+class RigidBodyInertia:
     """All that hangs on a site, one rigid body, in the site's axes.
 
     Attributes:
@@ -78,7 +78,7 @@ class Hung:
     inertia: np.ndarray
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, site: str) -> "Hung":
+    def of(cls, model: mujoco.MjModel, site: str) -> "RigidBodyInertia":
         """The body that bears the site, and those below it."""
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)

@@ -14,9 +14,9 @@ from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.stages.geometry.parameters import geometry_parameters, play_start
 from scenarios import load
-from twin.campaign.dataset_description import declaration
+from twin.campaign import describe_dataset
 
-DESCRIBED = declaration(load("humanoids2024").twin, ())
+DESCRIBED = describe_dataset(load("humanoids2024").twin, ())
 CHAIN = chain_of(mjcf.urdf(), DESCRIBED)
 PARAMETERS = geometry_parameters(CHAIN, DESCRIBED)
 HAND = nominal_hand(CHAIN, PARAMETERS.nominal[:12])

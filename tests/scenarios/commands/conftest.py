@@ -8,7 +8,7 @@ import pytest
 
 import calibration
 import twin
-import twin.rendering.robot_image
+import twin.rendering
 from scenarios.commands import main
 from scenarios.files import registry
 from tests.scenarios.commands.stand_ins import YAML, Engines, Scenario
@@ -35,7 +35,7 @@ def engines(monkeypatch, tmp_path):
         monkeypatch.setitem(sys.modules, module.__name__, module)
         package, _, leaf = module.__name__.rpartition(".")
         monkeypatch.setattr(importlib.import_module(package), leaf, module, raising=False)
-    monkeypatch.setattr(twin.rendering.robot_image, "picture", lambda config, seed, path: path.write_text("picture"))
+    monkeypatch.setattr(twin.rendering, "picture", lambda config, seed, path: path.write_text("picture"))
     (tmp_path / "known").mkdir()
     (tmp_path / "known" / "small.yaml").write_text(YAML)
     monkeypatch.setattr(registry, "HERE", tmp_path / "known")

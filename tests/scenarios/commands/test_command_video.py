@@ -7,7 +7,7 @@ import pytest
 from scenarios.commands import main
 from scenarios.files.errors import ScenarioError
 from scenarios.steps import video
-from twin.rendering.trial_video import ClipOptions, NothingToShow
+from twin.rendering import ClipOptions, NothingToShow
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_a_failed_clip_leaves_the_old_file_and_nothing_else(run_folder, tmp_path
         part.write_text("half")
         raise NothingToShow("nothing")
 
-    monkeypatch.setattr("twin.rendering.trial_video.clip", fails)
+    monkeypatch.setattr("twin.rendering.clip", fails)
     monkeypatch.setattr("scenarios.steps.run_steps.load", lambda path: __import__("scenarios").load("humanoids2024"))
     monkeypatch.setattr("twin.truth.read_trial", lambda path: None)
     with pytest.raises(NothingToShow):

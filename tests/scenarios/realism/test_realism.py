@@ -23,7 +23,7 @@ from scenarios.realism.log import Recorded, recorded, referred
 from scenarios.realism.replayed import AS_DRAWN, CAUSES, Condition, floor_of, gripping, inside, together
 from scenarios.realism.swings import LOG, Figures, Sway, figures, yaw_from_moment
 from scenarios.steps import import_export
-from twin.motions.swings import JOINTS
+from twin.motions import JOINTS
 
 ROOT = Path(__file__).parents[3]
 LOG_FILE = ROOT / "tests/data/vicon_forceplate_2023-09-20.csv"

@@ -22,11 +22,10 @@ from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
 from scenarios.steps.design import design, recording, recording_too
 from tests.doubles import rigid_robot
-from twin.campaign.dataset_description import declaration
-from twin.motions.motion import RATE
-from twin.motions.schedule import schedule
+from twin.campaign import describe_dataset
+from twin.motions import RATE, schedule
 
-DESCRIBED = declaration(load("humanoids2024").twin, ())
+DESCRIBED = describe_dataset(load("humanoids2024").twin, ())
 
 
 @pytest.fixture(scope="module")

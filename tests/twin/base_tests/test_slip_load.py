@@ -4,9 +4,10 @@ import pytest
 
 from tests.doubles.grounds import GROUNDS
 from tests.twin.base_tests.test_load_test import standing
+from twin.base_tests import normal_forces, slip_loads
 from twin.base_tests.load_test import bench
-from twin.base_tests.slip_load import normal_forces, slip_loads
-from twin.defects.wheels.stiffness import HELD, spatial_stiffness
+from twin.defects.wheels import spatial_stiffness
+from twin.defects.wheels.stiffness import HELD
 
 UNIT = np.eye(6)[list(HELD)]
 

@@ -1,7 +1,7 @@
 import numpy as np
 
-from twin.campaign.robot import draw
-from twin.defects.placement import Placement
+from twin.campaign import sample
+from twin.defects import Placement
 from twin.random_streams import generator
 
 
@@ -14,12 +14,12 @@ def test_streams_depend_on_their_names_and_not_on_order():
 
 
 def test_one_seed_is_one_robot(config, nominal):
-    numbers = [[p.value for d in draw(config, nominal, s).defects for p in d.parameters()] for s in (5, 5, 6)]
+    numbers = [[p.value for d in sample(config, s).defects for p in d.parameters()] for s in (5, 5, 6)]
     assert numbers[0] == numbers[1] != numbers[2]
 
 
 def test_placements_have_the_width_the_scenario_gives(config, nominal):
-    xi = np.array([[d.xi for d in draw(config, nominal, s).defects if isinstance(d, Placement)] for s in range(100)])
+    xi = np.array([[d.xi for d in sample(config, s).defects if isinstance(d, Placement)] for s in range(100)])
     np.testing.assert_allclose(xi[..., :3].std(), config.widths.placement_translation, rtol=0.05)
     np.testing.assert_allclose(xi[..., 3:].std(), config.widths.placement_rotation, rtol=0.05)
 

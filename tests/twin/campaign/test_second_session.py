@@ -2,14 +2,15 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
-from twin.campaign.laboratory import laboratory, second_session
-from twin.campaign.record import record
-from twin.config.disturbances import Departures, Loosened
-from twin.motions.schedule import schedule
+from twin.campaign import laboratory, record, second_session
+from twin.config import Departures
+from twin.config.disturbances import Loosened
+from twin.motions import schedule
 from twin.truth import read_trial
 
 
@@ -83,10 +84,10 @@ def test_homing_anew_has_the_width_it_is_given(config, lab):
 
 
 def test_a_campaign_with_two_sessions_tells_their_truths_apart(config, tmp_path, monkeypatch):
-    def only_xyz(*given):
+    def only_xyz(*given, schedule=schedule):
         return tuple(m for m in schedule(*given) if m.name == "xyz")
 
-    monkeypatch.setattr("twin.campaign.record.schedule", only_xyz)
+    monkeypatch.setattr(import_module("twin.campaign.record"), "schedule", only_xyz)
     short = replace(config.campaign, validation_swing=3.0, confirmation=True)
     record(replace(config, campaign=short), 0, tmp_path)
     description = json.loads((tmp_path / "dataset/dataset.json").read_text())

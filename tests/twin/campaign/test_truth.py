@@ -4,11 +4,9 @@ from dataclasses import fields, is_dataclass, replace
 
 import pytest
 
-import mjcf
 from scenarios import load
-from twin.campaign.laboratory import laboratory  # noqa: PLC2701
+from twin.campaign import laboratory, sample
 from twin.campaign.record import _write_truth
-from twin.campaign.robot import draw
 from twin.truth import read_parameters
 
 EVERYTHING = (
@@ -65,10 +63,10 @@ def full():
 @pytest.fixture(scope="module")
 def told(full, tmp_path_factory):
     """What truth.json says of a configuration, robots drawn but not compiled."""
-    folder, nominal = tmp_path_factory.mktemp("truth"), mjcf.model()
+    folder = tmp_path_factory.mktemp("truth")
 
     def of(config):
-        robot = draw(config, nominal, 0)
+        robot = sample(config, 0)
         true = tuple(p for d in robot.defects for p in d.parameters())
         _write_truth(replace(full, config=config, robot=robot, twin=replace(full.twin, truth=true)), None, folder)
         return read_parameters(folder / "truth.json")

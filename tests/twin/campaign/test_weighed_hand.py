@@ -10,9 +10,8 @@ from scipy.stats import binom
 from calibration import calibrate, load
 from calibration.stages import wrist_load
 from calibration.stages.wrist_load import Hanging
-from twin.campaign.laboratory import laboratory
-from twin.campaign.record import record
-from twin.config.twin import TwinConfig
+from twin.campaign import laboratory, record
+from twin.config import TwinConfig
 
 SEEDS = range(1000, 1008)
 pytestmark = pytest.mark.slow

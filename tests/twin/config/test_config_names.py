@@ -12,7 +12,7 @@ from scenarios import steps
 from scenarios.files.errors import ScenarioError
 from twin.campaign.robot import cluster
 from twin.config.names import ARM, TORSO, links
-from twin.motions.swings import JOINTS
+from twin.motions import JOINTS
 
 BEND = "{stiffness: 3.0e+4, damping: 30.0}"
 WARM = "{xi: [1.0e-4, 0.0, 0.0, 0.0, 0.0, 0.0], time_constant: 900.0}"

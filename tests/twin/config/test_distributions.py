@@ -9,10 +9,9 @@ import mjcf
 from scenarios import load
 from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
-from twin.campaign.dataset_description import declaration
-from twin.campaign.laboratory import laboratory
-from twin.config.distributions import Distribution, Uncertain, drawn
-from twin.simulation.build import build
+from twin.campaign import describe_dataset, laboratory
+from twin.config import Distribution, RandomValue, sampled
+from twin.simulation import build
 
 GAP = "twin.arm.arm_6_joint.gap"
 
@@ -46,16 +45,16 @@ def test_one_draw_does_not_depend_on_another():
         "twin.arm.arm_1_joint.gap={uniform: [0.001, 0.003]}",
         "twin.base.drive.stiffness.1={normal: [8000.0, 800.0]}",
     ).twin
-    gaps = [drawn(config, seed).arm["arm_6_joint"].gap for config, seed in ((one, 3), (more, 3), (one, 4))]
+    gaps = [sampled(config, seed).arm["arm_6_joint"].gap for config, seed in ((one, 3), (more, 3), (one, 4))]
     assert gaps[0] == gaps[1] != gaps[2]
     assert type(gaps[0]) is float
-    assert drawn(more, 3).base.drive.stiffness[1] != 8000.0
-    assert drawn(more, 3).base.drive.stiffness[0] == one.base.drive.stiffness[0]
+    assert sampled(more, 3).base.drive.stiffness[1] != 8000.0
+    assert sampled(more, 3).base.drive.stiffness[0] == one.base.drive.stiffness[0]
 
 
 def test_a_scenario_without_distributions_is_left_as_it_is():
     config = scenario().twin
-    assert drawn(config, 0) is config
+    assert sampled(config, 0) is config
 
 
 def test_distributions_outlive_a_written_file_and_a_changed_field(tmp_path):
@@ -64,9 +63,9 @@ def test_distributions_outlive_a_written_file_and_a_changed_field(tmp_path):
     assert "normal: [0.024, 0.002]" in (tmp_path / "scenario.yaml").read_text()
     for after in (load(tmp_path / "scenario.yaml"), before.quick()):
         gap = after.twin.arm["arm_6_joint"].gap
-        assert isinstance(gap, Uncertain) and gap.distribution == Distribution("normal", 0.024, 0.002)
+        assert isinstance(gap, RandomValue) and gap.distribution == Distribution("normal", 0.024, 0.002)
     joint = replace(before.twin.arm["arm_6_joint"], stiffness=1100.0)
-    assert isinstance(joint.gap, Uncertain)
+    assert isinstance(joint.gap, RandomValue)
 
 
 @pytest.mark.parametrize(
@@ -102,8 +101,8 @@ LOOSE = "twin.departures.loosened={gripper2: {sag: 1.0e-3, since: DRAWN}}"
 def test_what_happens_to_a_robot_can_be_drawn(path, found):
     config = scenario(path.replace("DRAWN", "{uniform: [0.01, 0.02]}")).twin
     values = {found(laboratory(config, seed).config) for seed in (1, 2)}
-    assert len(values) == 2 and all(0.01 < v < 0.02 and not isinstance(v, Uncertain) for v in values)
-    declaration(config, ()).model_dump_json()
+    assert len(values) == 2 and all(0.01 < v < 0.02 and not isinstance(v, RandomValue) for v in values)
+    describe_dataset(config, ()).model_dump_json()
 
 
 def test_what_a_person_decides_is_never_drawn():
@@ -119,4 +118,4 @@ def test_a_drawn_value_is_the_robots_truth_and_not_the_laboratorys():
     assert truth["backlash.arm_6_joint.gap"] == lab.config.arm["arm_6_joint"].gap != 0.025
     built = build(mjcf.spec(), lab.robot.defects, visual=True).model
     assert built.body("payload").mass[0] == truth["payload.mass"] != 0.45
-    assert declaration(config, ()).payload.mass == pytest.approx(0.45)
+    assert describe_dataset(config, ()).payload.mass == pytest.approx(0.45)

@@ -8,15 +8,13 @@ import pytest
 
 import mjcf
 from scenarios import load
-from twin.campaign.robot import draw
-from twin.defects.gear import Gear
-from twin.defects.inertia import LinkMass, Payload
-from twin.defects.placement import Placement
-from twin.defects.wheels.contact import Chatters
+from twin.campaign import sample
+from twin.defects import Gear, LinkMass, Payload, Placement
+from twin.defects.wheels.contact import ContactTooStiff
 from twin.errors import UnknownElement
-from twin.instruments.encoder import Encoder
-from twin.motions.swings import JOINTS
-from twin.simulation.build import build
+from twin.instruments import Encoder
+from twin.motions import JOINTS
+from twin.simulation import build
 
 TOOL = "gripper_grasping_frame"
 
@@ -91,8 +89,7 @@ def test_a_robot_has_one_make_of_arm_and_the_same_scatter(nominal):
     found = []
     for seed in range(8):
         usual, made = (
-            {d.link: d.scale for d in draw(c, nominal, seed).defects if isinstance(d, LinkMass)}
-            for c in (plain, config)
+            {d.link: d.scale for d in sample(c, seed).defects if isinstance(d, LinkMass)} for c in (plain, config)
         )
         ratio = {link: made[link] / usual[link] for link in usual}
         found.append({link: r for link, r in ratio.items() if r != pytest.approx(1.0)})
@@ -103,7 +100,7 @@ def test_a_robot_has_one_make_of_arm_and_the_same_scatter(nominal):
 def test_contacts_that_would_chatter_are_refused(lab):
     wheel = next(w for w in lab.robot.wheels if w.name == "caster_front_left")
     bad = replace(wheel, footing=replace(wheel.footing, damping=1000.0))
-    with pytest.raises(Chatters, match=r"caster_front_left.*at most 2\d\d N.s/m"):
+    with pytest.raises(ContactTooStiff, match=r"caster_front_left.*at most 2\d\d N.s/m"):
         build(mjcf.spec(), [bad])
 
 

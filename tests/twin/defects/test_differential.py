@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.doubles.gear_bench import bench, gear
-from twin.campaign.laboratory import laboratory
-from twin.defects.differential import Differential, UnlikeMotors
+from twin.campaign import laboratory
+from twin.defects import Differential, GearFriction
+from twin.defects.differential import UnlikeMotors
 from twin.defects.gear import mesh_tendon
-from twin.defects.gear_friction import Hysteresis
-from twin.motions.swings import JOINTS
+from twin.motions import JOINTS
 
 NAMES = ("pitch", "roll")
 GAPS, K = (0.024, 0.020), (1000.0, 1400.0)
@@ -65,8 +65,8 @@ def test_play_and_compliance_of_a_joint_are_the_truths():
 @pytest.mark.parametrize(
     "frictions",
     [
-        (Hysteresis("pitch", 500.0, 1.2, 0.0), Hysteresis("roll", 800.0, 0.4, 0.0)),
-        (Hysteresis("roll", 500.0, 0.8, 0.0),),
+        (GearFriction("pitch", 500.0, 1.2, 0.0), GearFriction("roll", 800.0, 0.4, 0.0)),
+        (GearFriction("roll", 500.0, 0.8, 0.0),),
     ],
 )
 def test_friction_of_a_joint_is_the_truths(frictions):

@@ -9,20 +9,18 @@ import pinocchio as pin
 import pytest
 
 import mjcf
-from twin.campaign.laboratory import laboratory
-from twin.campaign.measure import measure
+from twin import motions
+from twin.campaign import laboratory, measure
 from twin.campaign.record import _in_trial
-from twin.config.disturbances import Bending, Departures, Loosened, Warming
+from twin.config import Departures
+from twin.config.disturbances import Bending, Loosened, Warming
 from twin.config.disturbances import Cable as CableConfig
-from twin.defects.bending import Cable, Flexibility
-from twin.defects.inertia import LinkMass
-from twin.defects.placement import Placement
+from twin.defects import Cable, Flexibility, LinkMass, Placement
 from twin.errors import UnknownElement
-from twin.instruments.markers import LooseMarker
-from twin.motions import motion as motions
-from twin.motions.swings import FORWARD, JOINTS, in_step
-from twin.simulation.build import build
-from twin.simulation.rollout import simulate
+from twin.instruments import LooseMarker
+from twin.motions import JOINTS, in_step
+from twin.motions.swings import FORWARD
+from twin.simulation import build, simulate
 
 XI = (3e-4, -2e-4, 1e-4, 5e-4, 4e-4, -3e-4)
 EVERY = Departures(

@@ -10,10 +10,9 @@ from mujoco import rollout
 
 from scenarios import load
 from tests.doubles.grounds import GROUNDS
-from twin.campaign.laboratory import laboratory
+from twin.campaign import laboratory
 from twin.defects.gear import mesh_tendon, rotor_joint
-from twin.motions import motion
-from twin.motions.swings import JOINTS
+from twin.motions import JOINTS, motion
 from twin.simulation.setpoints import prepare
 
 STEPS = 2000

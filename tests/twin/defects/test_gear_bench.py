@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.doubles.gear_bench import LINK_INERTIA, OUTPUT_INERTIA, bench, gear
-from twin.defects.gear_friction import Hysteresis
+from twin.defects import GearFriction
 
 GAP, K, J = 0.02, 1000.0, LINK_INERTIA + OUTPUT_INERTIA
 SLIP, K_SLIP = 0.4, 500.0
-HYSTERESIS = Hysteresis("elbow", K_SLIP, SLIP, 0.0)
+HYSTERESIS = GearFriction("elbow", K_SLIP, SLIP, 0.0)
 
 
 def wave(amplitude, period=4.0, turns=2):
@@ -92,7 +92,7 @@ def test_a_blow_on_a_flank_is_that_of_a_spring_and_a_damper():
     assert np.abs(log.torque).max() < 1.03 * speed * np.sqrt(K * J)
 
 
-@pytest.mark.parametrize("extra", [(), (Hysteresis("elbow", K_SLIP, SLIP, 0.3),)], ids=["dead_zone", "friction_held"])
+@pytest.mark.parametrize("extra", [(), (GearFriction("elbow", K_SLIP, SLIP, 0.3),)], ids=["dead_zone", "friction_held"])
 def test_a_reversing_motor_makes_no_spike(extra):
     """Moved by motor against friction, neither speed nor torque of the link exceeds what an elastic blow can do."""
     train = replace(gear(), rotor_inertia=0.15, servo_stiffness=2500.0, servo_damping=23.0, coulomb=0.15, viscous=0.05)
@@ -119,7 +119,7 @@ def test_load_decides_the_flank_of_a_dead_zone_and_motion_that_of_held_play():
     def driven(extra):
         return bench([train, *extra]).run(command=command, torque=load)
 
-    dead_zone, held = driven([]), driven([Hysteresis("elbow", K_SLIP, 0.0, 1.0)])
+    dead_zone, held = driven([]), driven([GearFriction("elbow", K_SLIP, 0.0, 1.0)])
     settled = dead_zone.t > 0.5
     assert np.all(dead_zone.twist[settled, 0] > 0.45 * GAP)
     assert crossings(held) == 4
@@ -129,7 +129,7 @@ def test_load_decides_the_flank_of_a_dead_zone_and_motion_that_of_held_play():
 
 
 def test_held_play_does_not_creep():
-    held = bench([replace(gear(), coulomb=0.15), Hysteresis("elbow", K_SLIP, 0.2, 1.0)])
+    held = bench([replace(gear(), coulomb=0.15), GearFriction("elbow", K_SLIP, 0.2, 1.0)])
     angle = held.run(torque=np.full(20000, 1.0)).link[:, 0]
     assert angle[-1] - angle[1000] < 1e-6  # [rad] in 19 s
 

@@ -7,10 +7,9 @@ import pytest
 from scenarios import load
 from scenarios.files.errors import ScenarioError
 from twin import truth
-from twin.campaign.laboratory import laboratory
-from twin.motions import motion
-from twin.motions.swings import CALIBRATION_SWINGS
-from twin.simulation.rollout import simulate
+from twin.campaign import laboratory
+from twin.motions import CALIBRATION_SWINGS, motion
+from twin.simulation import simulate
 
 
 @pytest.fixture(scope="module")

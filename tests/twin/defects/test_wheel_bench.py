@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from twin.defects.wheels.bushing import Bushing
-from twin.defects.wheels.contact import Chatters, Contact
-from twin.defects.wheels.wheel import Wheel
-from twin.simulation.build import build
+from twin.defects.wheels import Bushing, Contact, Wheel
+from twin.defects.wheels.contact import ContactTooStiff
+from twin.simulation import build
 
 M, m, G = 12.0, 0.14, 9.81
 BENCH = f"""
@@ -109,7 +108,7 @@ def test_a_contact_on_which_the_light_wheel_would_hop_is_refused(kn, bears):
     if bears:
         assert np.ptp(heights(stand(1.7e5, 300.0, kn, 200.0, 1e-3), 0.0, 0.0, 1.0)[-100:], axis=0).max() < 1e-6
     else:
-        with pytest.raises(Chatters, match="contact stiffness 3e.06 N/m of 'caster' makes the wheel hop"):
+        with pytest.raises(ContactTooStiff, match="contact stiffness 3e.06 N/m of 'caster' makes the wheel hop"):
             stand(1.7e5, 300.0, kn, 200.0, 1e-3)
 
 

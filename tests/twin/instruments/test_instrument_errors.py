@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from twin.campaign.laboratory import EPOCH, laboratory
-from twin.campaign.measure import instrument_errors, measure
+from twin import motions
+from twin.campaign import EPOCH, laboratory, measure
+from twin.campaign.measure import instrument_errors
 from twin.config.instruments import LogErrors, MocapErrors, PlateErrors, WristSensor
 from twin.instruments import force_plate, motion_capture
-from twin.motions import motion as motions
-from twin.motions.swings import CALIBRATION_SWINGS
-from twin.simulation.rollout import simulate
+from twin.motions import CALIBRATION_SWINGS
+from twin.simulation import simulate
 
 START = EPOCH + 3.0
 
@@ -154,7 +154,7 @@ def test_the_distance_of_segments_is_the_least_over_their_points():
 
 def test_gains_are_read_back_from_wrenches_in_all_directions(lab):
     errors = PlateErrors(gain=5e-3, crosstalk=8e-3)
-    worn = force_plate.draw("plate", errors, np.random.default_rng(3))
+    worn = force_plate.sample_plate("plate", errors, np.random.default_rng(3))
     t, rng = np.arange(0.0, 4.0, 1e-3), np.random.default_rng(0)
     wrench = np.repeat(rng.normal(size=(40, 6)), 100, axis=0) * [200.0] * 1
     at = force_plate.Sampling(t[50::100], 0.0, 1000.0, np.full(6, 1e-6))
@@ -185,7 +185,7 @@ def test_the_anti_alias_filter_has_the_transfer_function_of_butterworth(f):
     t = np.arange(0.0, 4.0, 1e-3)
     wrench = np.outer(np.sin(2.0 * np.pi * f * t), np.ones(6))
     at = force_plate.Sampling(t[1000:-10], 0.0, 1000.0, np.full(6, 1e-9))
-    both = (force_plate.draw("plate", PlateErrors(cutoff=c), np.random.default_rng(0)) for c in (60.0, 0.0))
+    both = (force_plate.sample_plate("plate", PlateErrors(cutoff=c), np.random.default_rng(0)) for c in (60.0, 0.0))
     filtered, plain = (force_plate.measured(at, t, wrench, p, np.random.default_rng(0))[:, 0] for p in both)
     expected = 1.0 / np.sqrt(1.0 + (f / 60.0) ** 4)
     assert filtered.std() / plain.std() == pytest.approx(expected, rel=0.01)

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from twin.instruments import motion_capture
-from twin.instruments.clock import Clock
+from twin.instruments import Clock, motion_capture
 from twin.instruments.sampling import averaged, interpolate, interpolate_poses
 
 

@@ -7,13 +7,13 @@ import pytest
 
 from scenarios import load
 from scenarios.files.errors import ScenarioError
-from twin.campaign.laboratory import laboratory
-from twin.campaign.measure import measure  # noqa: PLC2701
+from twin.campaign import laboratory, measure
 from twin.campaign.record import _in_trial, _states
-from twin.config.disturbances import Departures, Warming
-from twin.motions import driving, schedule
-from twin.motions.motion import RATE, BasePath
-from twin.simulation.kinematic import carried, in_base
+from twin.config import Departures
+from twin.config.disturbances import Warming
+from twin.motions import RATE, BasePath, driving, schedule
+from twin.simulation import kinematic_states
+from twin.simulation.kinematic import in_base
 from twin.transforms import rotation_vector
 
 TRACK, RADIUS = 0.4044, 0.0985
@@ -67,7 +67,7 @@ def test_casters_that_turn_where_they_stand_roll_in_a_drive(robot, moves):
 
 
 def test_a_carried_spin_turns_about_the_base_frame_and_nothing_else_moves(robot, moves):
-    states = carried(robot.twin, moves["spin_kinematic"], robot.T_lab_base)
+    states = kinematic_states(robot.twin, moves["spin_kinematic"], robot.T_lab_base)
     base, hand = states.poses["base_footprint"], states.poses["gripper_grasping_frame"]
     np.testing.assert_allclose(base[:, :3, 3], np.tile(robot.T_lab_base[:3, 3], (len(base), 1)), atol=1e-15)
     yaw = rotation_vector(np.linalg.solve(robot.T_lab_base, base))
@@ -150,6 +150,6 @@ def test_an_anchored_base_cannot_drive():
 
 def test_a_campaign_without_sweeps_and_swings_has_none(heins, nominal):
     short = replace(heins.campaign, calibration_postures=4, validation_postures=4)
-    found = schedule.schedule(short, nominal, 0)
+    found = schedule(short, nominal, 0)
     assert [m.kind for m in found].count("static") == 2
     assert {m.kind for m in found} == {"static", "spin", "drive"}

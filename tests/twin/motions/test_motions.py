@@ -3,13 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from twin import motions
 from twin.errors import Unreachable
-from twin.motions import motion as motions
-from twin.motions import postures
-from twin.motions.motion import RATE
-from twin.motions.schedule import schedule
-from twin.motions.swings import CALIBRATION_SWINGS, JOINTS
-from twin.simulation.rollout import simulate
+from twin.motions import CALIBRATION_SWINGS, JOINTS, RATE, postures, sample_postures, schedule
+from twin.simulation import simulate
 
 
 def test_path_time_ramps_cruises_and_stops():
@@ -54,7 +51,7 @@ def test_no_validation_posture_is_a_calibration_posture(config, nominal):
 def test_postures_that_do_not_exist_are_told(nominal, monkeypatch):
     monkeypatch.setattr(postures, "_admissible", lambda *a: False)
     with pytest.raises(Unreachable, match="found 0 of 3 postures"):
-        postures.draw(nominal, 3, np.random.default_rng(0))
+        sample_postures(nominal, 3, np.random.default_rng(0))
 
 
 def test_a_soft_start_is_soft(config):

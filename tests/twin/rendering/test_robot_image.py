@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import scenarios
+from twin.rendering import picture
 from twin.rendering.raycaster import View, render
-from twin.rendering.robot_image import picture
 
 SIZE = (240, 190)
 BALL = """<mujoco><worldbody>
@@ -59,7 +59,7 @@ def test_no_graphics_driver_is_asked_for(tmp_path):
 import sys
 from pathlib import Path
 import scenarios
-from twin.picture import picture
+from twin.rendering import picture
 picture(scenarios.load("humanoids2024").twin, 4, Path({str(tmp_path / "twin.png")!r}), (60, 50))
 print([name for name in sys.modules if name.startswith("OpenGL.")])
 """

@@ -9,14 +9,13 @@ import pinocchio as pin
 import pytest
 from PIL import Image
 
-from twin.campaign.measure import measure
-from twin.motions import motion
-from twin.motions.swings import CALIBRATION_SWINGS
+from twin.campaign import measure
+from twin.motions import CALIBRATION_SWINGS, motion
+from twin.rendering import ClipOptions, NoGraphics, NothingToShow, clip
 from twin.rendering import renderer as graphics
 from twin.rendering.raycaster import View
-from twin.rendering.renderer import NoGraphics
-from twin.rendering.trial_video import ClipOptions, NothingToShow, clip, magnified, projected, reaction
-from twin.simulation.rollout import simulate
+from twin.rendering.trial_video import magnified, projected, reaction
+from twin.simulation import simulate
 
 SMALL = ClipOptions(magnify=30.0, start=0.5, duration=0.6, rate=5.0, size=(120, 93), renderer="rays")
 

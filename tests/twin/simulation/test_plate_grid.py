@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from calibration.numerics.wrench import centre_of_pressure
-from twin.campaign.dataset_description import declaration
-from twin.campaign.laboratory import laboratory
-from twin.campaign.measure import instrument_errors, measure
+from twin import motions
+from twin.campaign import describe_dataset, laboratory, measure
+from twin.campaign.measure import instrument_errors
 from twin.config.instruments import PlateErrors
-from twin.errors import NotStanding
-from twin.motions import motion as motions
-from twin.motions.swings import CALIBRATION_SWINGS
-from twin.simulation.force_plates import Tiles
-from twin.simulation.rollout import simulate
+from twin.errors import RobotFell
+from twin.motions import CALIBRATION_SWINGS
+from twin.simulation import simulate
+from twin.simulation.force_plates import PlateGrid
 
 
 def cut(config, grid, **instruments):
@@ -61,7 +60,7 @@ def test_cutting_the_plate_leaves_the_robot_s_motion_as_it_was(config, lab, stat
 
 def test_plates_are_recorded_declared_and_worn_each_for_itself(lab, states, motion):
     trial, _ = measure(lab, motion, states, 100.0)
-    declared = declaration(lab.config, ()).plates
+    declared = describe_dataset(lab.config, ()).plates
     assert trial.plate == tuple(p.name for p in declared) == ("plate1", "plate2")
     np.testing.assert_allclose(trial.plate_centre, [p.centre for p in declared])
     assert all(p.size == (0.45, 0.9) for p in declared)
@@ -75,12 +74,12 @@ def test_a_wheel_on_a_seam_is_refused(config, motion):
     lab = laboratory(cut(config, (1, 2)), 0)
     T_lab_base = lab.T_lab_base.copy()
     T_lab_base[1, 3] = 0.45  # heading along y, the axle of the drive wheels is then on the seam
-    with pytest.raises(NotStanding, match="stands on a seam of plate_grid"):
+    with pytest.raises(RobotFell, match="stands on a seam of plate_grid"):
         simulate(lab.twin, motion, T_lab_base)
 
 
 def test_columns_and_rows_fill_the_square():
-    tiles = Tiles((2, 3)).cut(0.9, 0.6)
+    tiles = PlateGrid((2, 3)).cut(0.9, 0.6)
     assert [t.name for t in tiles] == [f"plate{k}" for k in range(1, 7)]
     assert sum(t.size[0] * t.size[1] for t in tiles) == pytest.approx(0.54)
     np.testing.assert_allclose(tiles[1].shift, [0.225, -0.2])

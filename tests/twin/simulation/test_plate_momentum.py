@@ -6,10 +6,10 @@ import pytest
 from mujoco import rollout
 
 from scenarios import load
-from twin.campaign.laboratory import laboratory
-from twin.motions import motion as motions
-from twin.motions.swings import JOINTS, VALIDATION_SWINGS
-from twin.simulation.rollout import simulate
+from twin import motions
+from twin.campaign import laboratory
+from twin.motions import JOINTS, VALIDATION_SWINGS
+from twin.simulation import simulate
 from twin.simulation.setpoints import prepare
 
 SAMPLE = 10  # steps of a plate sample of 10 ms

@@ -7,17 +7,14 @@ import pytest
 
 from calibration import calibrate, load
 from tests.calibration.formats.test_exporter import exported, largest, run
-from twin.base_tests.load_test import load_test
-from twin.campaign.dataset_description import declaration
-from twin.campaign.laboratory import laboratory
-from twin.campaign.measure import measure
-from twin.campaign.record import record
+from twin import motions
+from twin.base_tests import load_test
+from twin.campaign import describe_dataset, laboratory, measure, record
 from twin.config.instruments import PlateErrors, PlatePlace
-from twin.errors import NotStanding
+from twin.errors import RobotFell
 from twin.instruments import force_plate
-from twin.motions import motion as motions
-from twin.motions.swings import CALIBRATION_SWINGS
-from twin.simulation.rollout import simulate
+from twin.motions import CALIBRATION_SWINGS
+from twin.simulation import simulate
 
 YAW = np.radians(25.0)
 PLACE = PlatePlace((0.03, -0.02), 0.005, YAW)
@@ -51,7 +48,7 @@ def test_the_robot_does_on_it_what_it_does_on_the_nominal_one(lab, motion, turne
 
 def test_it_is_declared_and_recorded_where_it_lies(turned, motion):
     lab, states = turned
-    (declared,) = declaration(lab.config, ()).plates
+    (declared,) = describe_dataset(lab.config, ()).plates
     np.testing.assert_allclose(np.transpose(declared.axes), R, atol=1e-12)
     np.testing.assert_allclose(declared.centre, [0.93, 0.43, 0.005], atol=1e-12)
     trial, _ = measure(lab, motion, states, 100.0)
@@ -61,7 +58,7 @@ def test_it_is_declared_and_recorded_where_it_lies(turned, motion):
 def test_tiles_are_turned_with_the_whole(config, motion, turned):
     lab = laboratory(laid(config, plate_grid=(2, 1)), 0)
     states = simulate(lab.twin, motion, lab.T_lab_base)
-    centres = np.array([p.centre for p in declaration(lab.config, ()).plates])
+    centres = np.array([p.centre for p in describe_dataset(lab.config, ()).plates])
     np.testing.assert_allclose(centres[1] - centres[0], R @ [0.45, 0.0, 0.0], atol=1e-12)
     lever = centres - [0.93, 0.43, 0.005]
     w = states.plates
@@ -91,14 +88,14 @@ def test_a_wheel_off_a_turned_plate_is_told_though_it_would_be_on_the_nominal_on
     on = laboratory(laid(corner, PlatePlace()), 0)
     simulate(on.twin, motion, on.T_lab_base)
     off = laboratory(laid(corner, PlatePlace(yaw=np.pi / 4.0)), 0)
-    with pytest.raises(NotStanding, match=r"is off the plate at -2\.00 s"):
+    with pytest.raises(RobotFell, match=r"is off the plate at -2\.00 s"):
         simulate(off.twin, motion, off.T_lab_base)
 
 
 def test_a_wheel_on_the_seam_of_a_turned_plate_is_refused(config, motion):
     along_y = laid(config, PlatePlace(yaw=np.pi / 2.0), plate_grid=(2, 1))
     lab = laboratory(replace(along_y, base=replace(config.base, pose=(0.92, 0.45, -np.pi / 2.0))), 0)
-    with pytest.raises(NotStanding, match="stands on a seam of plate_grid"):
+    with pytest.raises(RobotFell, match="stands on a seam of plate_grid"):
         simulate(lab.twin, motion, lab.T_lab_base)
 
 

@@ -4,10 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from twin.motions import motion
-from twin.motions.swings import CALIBRATION_SWINGS, JOINTS
-from twin.simulation.build import Twin
-from twin.simulation.rollout import simulate
+from twin.motions import CALIBRATION_SWINGS, JOINTS, motion
+from twin.simulation import Twin, simulate
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +111,7 @@ def test_the_plate_sees_a_push_at_the_hand(lab, config):
 
 def test_a_payload_weighs_what_its_trial_says(lab, config, nominal):
     from twin.campaign.record import _in_trial
-    from twin.motions.schedule import schedule
+    from twin.motions import schedule
 
     campaign = replace(config.campaign, payloads=(0.0, 2.0))
     masses = {

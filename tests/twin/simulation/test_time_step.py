@@ -10,11 +10,11 @@ import pytest
 
 from scenarios import load
 from tests.doubles.grounds import GROUNDS
-from twin.campaign.laboratory import laboratory
+from twin import motions
+from twin.campaign import laboratory
 from twin.instruments.sampling import averaged
-from twin.motions import motion as motions
-from twin.motions.swings import CALIBRATION_SWINGS, VALIDATION_SWINGS
-from twin.simulation.rollout import simulate
+from twin.motions import CALIBRATION_SWINGS, VALIDATION_SWINGS
+from twin.simulation import simulate
 from twin.transforms import rotation_vector
 
 SAMPLE = 0.01

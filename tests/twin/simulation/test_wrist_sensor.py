@@ -8,13 +8,10 @@ from scipy.spatial.transform import Rotation
 
 import mjcf
 from twin.campaign.robot import TOOL
-from twin.motions import motion
-from twin.motions.swings import CALIBRATION_SWINGS
-from twin.simulation import wrist_sensor
-from twin.simulation.build import build
-from twin.simulation.rollout import simulate
+from twin.motions import CALIBRATION_SWINGS, motion
+from twin.simulation import build, simulate, wrist_sensor
 from twin.simulation.setpoints import prepare
-from twin.simulation.wrist_sensor import Hung
+from twin.simulation.wrist_sensor import RigidBodyInertia
 
 FELT = (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE)
 
@@ -70,17 +67,17 @@ def test_a_push_on_the_hand_is_felt(lab, config):
     mujoco.mj_kinematics(model, data)
     R = data.site("wrist").xmat.reshape(3, 3).T @ data.site("push").xmat.reshape(3, 3)
     lever = data.site("wrist").xmat.reshape(3, 3).T @ (data.site("push").xpos - data.site("wrist").xpos)
-    felt = pushed.wrist - pushed.wrist[:900].mean(axis=0)
+    plate_sites = pushed.wrist - pushed.wrist[:900].mean(axis=0)
     for axis in range(3):
         f = -20.0 * R[:, axis]
-        plateau = np.linalg.norm(felt[:, :3] - f, axis=1) < 1.0
+        plateau = np.linalg.norm(plate_sites[:, :3] - f, axis=1) < 1.0
         assert plateau.sum() > 1500, "for two seconds, but for what the hand is turned by it"
-        np.testing.assert_allclose(felt[plateau, 3:].mean(axis=0), np.cross(lever, f), atol=0.15)
+        np.testing.assert_allclose(plate_sites[plateau, 3:].mean(axis=0), np.cross(lever, f), atol=0.15)
 
 
 def test_a_spinning_top_asks_for_no_more_than_its_weight_and_gyration():
     """A body on a turntable: w x (I w) and the centripetal force, in closed form."""
-    top, rate, step = Hung(2.0, np.array([0.1, 0.0, 0.05]), np.diag([0.01, 0.02, 0.03])), 3.0, 1e-4
+    top, rate, step = RigidBodyInertia(2.0, np.array([0.1, 0.0, 0.05]), np.diag([0.01, 0.02, 0.03])), 3.0, 1e-4
     angle = rate * step * np.arange(1000)
     R = Rotation.from_rotvec(np.outer(angle, [0.0, 0.0, 1.0])).as_matrix()
     w = np.tile([0.0, 0.0, rate], (1000, 1))

@@ -28,7 +28,7 @@ _STIFF = 2.0  # h^2 k_r / I, at most; a lifted wheel runs away at 4
 _NONE = (0.0, 0.0, 0.0)
 
 
-class RunsAhead(TwinError):
+class BushingTooStiff(TwinError):
     """A bushing so stiff that its wheel, held by friction, would follow the base within a step."""
 
     def __init__(self, wheel: str, stiffness: float, limit: float) -> None:
@@ -38,7 +38,7 @@ class RunsAhead(TwinError):
         )
 
 
-class TurnsLate(TwinError):
+class TorsionTooStiff(TwinError):
     """A bushing's torsion that the inertia of its wheel cannot follow within a step."""
 
     def __init__(self, wheel: str, what: str, limit: str) -> None:
@@ -107,9 +107,9 @@ class Bushing:
             inertia = float(model.dof_M0[model.joint(joint_name(name, 3 + int(i))).dofadr[0]])
             k, c, most_k, most_c = self.torsion[i], self.torsion_damping[i], _STIFF / step**2, _LATE / step
             if c > most_c * inertia:
-                raise TurnsLate(name, f"damping {c:g} N.m.s/rad", f"{most_c * inertia:.1g} N.m.s/rad")
+                raise TorsionTooStiff(name, f"damping {c:g} N.m.s/rad", f"{most_c * inertia:.1g} N.m.s/rad")
             if k > most_k * inertia:
-                raise TurnsLate(name, f"stiffness {k:g} N.m/rad", f"{most_k * inertia:.2g} N.m/rad")
+                raise TorsionTooStiff(name, f"stiffness {k:g} N.m/rad", f"{most_k * inertia:.2g} N.m/rad")
 
     def tune_held(self, model: mujoco.MjModel, name: str, body_name: str, geom_name: str) -> None:
         """Give back the damping that a wheel loses in the floor's plane while friction holds it.
@@ -120,7 +120,7 @@ class Bushing:
         mass, geom = float(model.body_subtreemass[model.body(body_name).id]), model.geom(geom_name)
         per_stiffness = model.opt.timestep / (mass * -float(geom.solref[1] / geom.solimp[1]))
         if max(self.stiffness[:2]) * per_stiffness > _AHEAD:
-            raise RunsAhead(name, max(self.stiffness[:2]), _AHEAD / per_stiffness)
+            raise BushingTooStiff(name, max(self.stiffness[:2]), _AHEAD / per_stiffness)
         for i in range(2):
             model.joint(joint_name(name, i)).damping[0] = self.damping[i] / (1.0 - self.stiffness[i] * per_stiffness)
 

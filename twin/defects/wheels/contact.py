@@ -26,7 +26,7 @@ _LEAST, _HEAVY = 1e-4, 0.05  # impedance that MuJoCo knows; at which h Bc makes 
 _HOPS, _BASE_HOPS = 8.0, 4.0 / 6.0  # Kc (1 - d) iw h^2, at most: of a wheel, of a base on six
 
 
-class Chatters(TwinError):
+class ContactTooStiff(TwinError):
     """A contact that overshoots rest within one step: its friction flips its sign, its wheel hops, or mass grows."""
 
     def __init__(self, wheel: str, what: str, does: str, limit: str) -> None:
@@ -69,10 +69,10 @@ class Contact:
         else:
             does, most = "its friction chatter", 1.0 / scale
         if self.damping * step > most:
-            raise Chatters(wheel, f"damping {self.damping:g} N.s/m", does, f"{most / step:.0f} N.s/m")
+            raise ContactTooStiff(wheel, f"damping {self.damping:g} N.s/m", does, f"{most / step:.0f} N.s/m")
         if self.stiffness * scale * step**2 > hops:
             limit = f"{hops / (scale * step**2):.2g} N/m"
-            raise Chatters(wheel, f"stiffness {self.stiffness:g} N/m", "the wheel hop", limit)
+            raise ContactTooStiff(wheel, f"stiffness {self.stiffness:g} N/m", "the wheel hop", limit)
         geom.solref[:] = -self.stiffness * scale, -self.damping * scale
         geom.solimp[:] = d, d, 0.001, 0.5, 2.0
         geom.friction[:] = self.friction, self.torsional_friction, self.rolling_friction
