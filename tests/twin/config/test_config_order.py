@@ -10,9 +10,9 @@ import yaml
 from scenarios import load
 from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
-from twin import motions
 from twin.campaign import laboratory, measure
 from twin.campaign.record import _states
+from twin.motions import motion as motions
 
 OVERRIDES = (
     "twin.coupled_wrist=true",

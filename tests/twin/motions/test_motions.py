@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from twin import motions
 from twin.errors import Unreachable
 from twin.motions import CALIBRATION_SWINGS, JOINTS, RATE, postures, sample_postures, schedule
+from twin.motions import motion as motions
 from twin.simulation import simulate
 
 
