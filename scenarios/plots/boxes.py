@@ -1,4 +1,4 @@
-"""Boxplot of absolute errors, a box a row.
+"""Boxplot of absolute errors, a box a row, along a logarithmic axis.
 
 Box: quartiles and median. Whiskers: 5 % and 95 %. Dot: root mean square.
 """
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from scenarios.plots.style import TRUTH
 
@@ -47,11 +48,23 @@ def error_boxes(samples: Sequence[Sample], quantity: str, floor: float | None, a
         ax.axvline(floor, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=0.9)
     ax.set_yticks(range(len(samples)), [s.label for s in samples])
     ax.set_ylim(len(samples) - 0.45, -0.55)
-    ax.set_xlim(left=0.0)
+    ax.set_xscale("log")
+    ax.set_xlim(*_limits(samples, floor))
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_xlabel(quantity)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
     return ax
+
+
+def _limits(samples: Sequence[Sample], floor: float | None) -> tuple[float, float]:
+    """From what is worth showing, a thousandth of the largest error at least, to a little above the largest."""
+    high = max(float(np.percentile(s.values, _SHARES[-1])) for s in samples)
+    low = min(float(np.percentile(s.values, _SHARES[1])) for s in samples)
+    low = min(low, floor) if floor else low
+    return 0.8 * max(low, 1e-3 * high), 1.3 * high
 
 
 def _box(y: float, sample: Sample, ax: Axes) -> None:

@@ -8,26 +8,19 @@ from matplotlib.figure import Figure
 
 from calibration.prediction import BASELINE
 from calibration.prediction import NOMINAL as NOMINAL_ROW
-from scenarios.plots import (
-    ESTIMATE,
-    NOMINAL,
-    ORACLE,
-    OTHER,
-    Line,
-    Sample,
-    drawing,
-    error_boxes,
-    error_traces,
-    figure,
-    intervals,
-    z_histogram,
-)
+from scenarios.plots.boxes import Sample, error_boxes
+from scenarios.plots.forest import intervals
+from scenarios.plots.histogram import z_histogram
+from scenarios.plots.style import ESTIMATE, NOMINAL, ORACLE, OTHER, drawing, figure
+from scenarios.plots.trace import Line, error_traces
 from scenarios.report.results.ladder import Step, floor, headline_model, oracle_base, predictive
 from scenarios.report.results.parameters import Known, groups
+from scenarios.report.results.published import add_medians, add_orientation
 from scenarios.report.results.run_results import Results
 from scenarios.report.results.traces import Trace
 
 WIDTH = 10.0  # [inch], as wide as the page
+_OVERVIEW = 5.6  # [inch], half as wide
 _ORIENTATION = "orientation error [deg]"
 _MOST_ITEMS = 40  # in one group of the forest plot
 _ENOUGH_Z = 20  # for a histogram
@@ -57,10 +50,43 @@ def boxes(results: Results, steps: Sequence[Step]) -> Figure | None:
             samples = [Sample(s.label, e, *_paint(s)) for (s, _), e in zip(rows, column, strict=True)]
             error_boxes(samples, quantity, low, ax)
             ax.tick_params(axis="y", labelleft=ax is axes[0])
-        widest = max(ax.get_xlim()[1] for ax in axes[:3])
-        for ax in axes[:3]:
-            ax.set_xlim(0.0, widest)
+        share_limits(axes[:3])
     return drawn
+
+
+def overview(results: Results, steps: Sequence[Step]) -> Figure | None:
+    """Errors per component and of orientation of the predictive rows, RMSE written beside, published medians marked."""
+    rows = [(s, mine) for s in steps if (mine := _of_step(results.traces, s))]
+    if not rows:
+        return None
+    position = [np.abs(np.concatenate([t.scored_position for t in mine]).ravel()) for _, mine in rows]
+    angle = [np.concatenate([t.scored_angle for t in mine]) for _, mine in rows]
+    shown = [s for s, _ in rows]
+    with drawing():
+        height = 0.34 * len(rows)
+        drawn = figure(_OVERVIEW, height + _AXIS + 0.06)
+        left = _width(s.model for s in shown)
+        share = (_OVERVIEW - left) / 2
+        axes = [_place(drawn, left + share * k, _AXIS, share - 0.42, height) for k in range(2)]
+        quantities = ("|error| per component [mm]", _ORIENTATION)
+        for ax, errors, quantity in zip(axes, (position, angle), quantities, strict=True):
+            samples = [Sample(s.model, e, *_paint(s)) for s, e in zip(shown, errors, strict=True)]
+            error_boxes(samples, quantity, None, ax)
+            ax.tick_params(axis="y", labelleft=ax is axes[0])
+            for y, e in enumerate(errors):
+                text = f"{np.sqrt((e**2).mean()):.2f}"
+                ax.annotate(text, (1.03, y), xycoords=("axes fraction", "data"), va="center", fontsize=7.5)
+        for axis in range(3):
+            add_medians(shown, axis, axes[0])
+        add_orientation(shown, axes[1])
+    return drawn
+
+
+def share_limits(axes: Sequence[Axes]) -> None:
+    """Draw axes along x to one scale."""
+    low, high = (pick(ax.get_xlim()[k] for ax in axes) for k, pick in enumerate((min, max)))
+    for ax in axes:
+        ax.set_xlim(low, high)
 
 
 def _floors(steps: Sequence[Step]) -> tuple[float | None, ...]:

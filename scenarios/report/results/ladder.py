@@ -1,4 +1,4 @@
-"""The ladder: rows in one order, each with how it was predicted, against the motion capture and against the truth."""
+"""The ladder: rows in one order, each with its inputs, against the motion capture and against the truth."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from scenarios.report.results.run_results import Results
 
 FLOOR = "floor"
 MEANINGS = {row.name: row.meaning for row in LADDER} | {
-    FLOOR: "the true parameters and states through the same measurements: what no model can undercut"
+    FLOOR: "true parameters and states through the same instruments: no model can do better"
 }
 BASES = {
-    "fixed": "base assumed still",
+    "fixed": "base assumed fixed",
     "plate": "base from the force plate",
     "dynamics": "base from inverse dynamics",
     "measured": "base measured",
@@ -77,6 +77,18 @@ def _position(key: tuple[str, str, str, str]) -> tuple[int, int, int]:
 
 def _index(known: Sequence[str], name: str) -> int:
     return known.index(name) if name in known else len(known)
+
+
+def best_of_each(steps: Iterable[Step]) -> tuple[Step, ...]:
+    """One predictive row a model, in the order of the ladder."""
+    steps = tuple(steps)
+    found = (predictive(steps, model) for model in dict.fromkeys(s.model for s in steps) if model != FLOOR)
+    return tuple(step for step in found if step is not None)
+
+
+def readable(steps: Sequence[Step]) -> tuple[Step, ...]:
+    """The rows a boxplot can hold: every prediction, and of the oracles the ones with the base measured."""
+    return tuple(s for s in steps if s.encoder == "motor" or s.base == "measured")
 
 
 def predictive(steps: Iterable[Step], model: str) -> Step | None:

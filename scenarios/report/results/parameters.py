@@ -10,7 +10,7 @@ import numpy as np
 
 from calibration import Estimate
 from calibration.inference.parameters import Model
-from scenarios.plots import Interval
+from scenarios.plots.forest import Interval
 from scenarios.report.results.formatting import readable
 from scenarios.report.results.result_files import Score
 from scenarios.report.results.run_results import Results

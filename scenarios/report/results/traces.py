@@ -8,6 +8,9 @@ import numpy as np
 
 from calibration.recording import netcdf
 
+PUSH = "push"
+"""Part of the name of a motion in which the hand is pushed."""
+
 
 @dataclass(frozen=True)
 class Trace:

@@ -1,1 +1,30 @@
-"""Sections of the report."""
+"""The sections of the report, in their order on the page; the first one is what a reader sees without scrolling."""
+
+from scenarios.report.results.section import Section
+from scenarios.report.sections.base_motion import BaseMotion
+from scenarios.report.sections.errors import HeldOutErrors
+from scenarios.report.sections.frames import Frames
+from scenarios.report.sections.joints import Joints
+from scenarios.report.sections.ladder import Ladder
+from scenarios.report.sections.paper_models import PaperModels
+from scenarios.report.sections.parameters import Parameters
+from scenarios.report.sections.payload import Payload
+from scenarios.report.sections.recordings import Recordings
+from scenarios.report.sections.reproduce import Reproduce
+from scenarios.report.sections.stages import Stages
+from scenarios.report.sections.verdict import Verdict
+
+SECTIONS: tuple[type[Section], ...] = (
+    Verdict,
+    Ladder,
+    HeldOutErrors,
+    PaperModels,
+    Frames,
+    BaseMotion,
+    Joints,
+    Payload,
+    Parameters,
+    Recordings,
+    Stages,
+    Reproduce,
+)

@@ -4,7 +4,11 @@ x = (t, theta)  displacement of the base frame since the first second [mm, mrad]
 R2_a = 1 - sum (x - x_hat)_a^2 / sum x_a^2         zero is a base that stays; the first second does not count
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,15 +21,19 @@ from calibration.prediction.base_pose import base_poses
 from calibration.prediction.predictor import REFERENCE, Predictor, predictor
 from calibration.recording import Trial, TrialEntry
 from calibration.stages.suspension import Suspension, laboratory, rest_of
-from scenarios.plots import ESTIMATE, OTHER, Line, drawing, figure, measured_beside
+from scenarios.plots.style import ESTIMATE, OTHER, drawing, figure
+from scenarios.plots.trace import Line, measured_beside
+from scenarios.report.results import suspension
 from scenarios.report.results.formatting import fixed
 from scenarios.report.results.run_results import Results
+from scenarios.report.results.section import Drawn, RunView
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 UNITS = ("mm", "mm", "mm", "mrad", "mrad", "mrad")
 _UNIT = 1e3  # mm in a metre, mrad in a radian
 _LINES = {"plate": (ESTIMATE, 1.7), "dynamics": (OTHER, 0.7)}
 _HEIGHT = 5.2  # [inch] of the figure
+_DIAGRAM = Path(__file__).parents[1] / "wheeled_base.svg"
 
 
 @dataclass(frozen=True)
@@ -115,6 +123,46 @@ class AxisSway:
     found: tuple[tuple[float | None, float | None, float], ...]
 
 
+@dataclass(frozen=True)
+class BaseMotion:
+    """The base on its wheels: measured and predicted motion, springs and dampers."""
+
+    view: RunView
+    title: ClassVar[str] = "Motion of the base"
+    template: ClassVar[str] = "base_motion.html"
+    folded: ClassVar[bool] = True
+
+    def figures(self) -> Mapping[str, Drawn]:
+        """The diagram, and the motion of the base in one trial."""
+        found, _ = self._sway
+        return {"wheels": _DIAGRAM, "sway": drawn(found) if found else None}
+
+    def context(self) -> Mapping[str, Any]:
+        """Motion of the base or why there is none; its springs and dampers."""
+        results = self.view.results
+        found, why = self._sway
+        fitted = results.estimate.suspension if results.estimate else None
+        return {
+            "sway": found,
+            "sway_axes": lines(found) if found else (),
+            "why_no_sway": why,
+            "base_scores": results.score.base if results.score else (),
+            "axis_lines": suspension.axis_lines(results),
+            "suspension_sources": suspension.sources(results),
+            "held_out_yaw": suspension.held_out_yaw(results),
+            "suspension_form": fitted.form if fitted else "",
+            "suspension_messages": suspension.messages(results),
+            "elements": suspension.elements(results, "K"),
+            "damping": suspension.elements(results, "C"),
+            "structures": suspension.structures(results.description),
+            "wheel_combinations": suspension.combinations(results),
+        }
+
+    @cached_property
+    def _sway(self) -> tuple[Sway | None, str]:
+        return sway(self.view.results)
+
+
 def sway(results: Results) -> tuple[Sway | None, str]:
     """The first held-out moving trial; or none, and why."""
     estimate, dataset = results.estimate, results.dataset
@@ -195,4 +243,4 @@ def drawn(found: Sway) -> Figure:
 
 
 def _worth(p: Predicted, k: int) -> str:
-    return fixed(float(max(p.r2[k], -9.99)), 2) if p.moves[k] else "left still"
+    return fixed(float(max(p.r2[k], -9.99)), 2) if p.moves[k] else "not predicted"

@@ -1,12 +1,15 @@
-"""The discrepancy of each arm joint on held-out moving trials, and what its model says of the same samples.
+"""Motor minus link reading of each arm joint on held-out moving trials, and what its model predicts.
 
 Trials with a payload of their own or a push are left out where there are others: one load, one picture.
 
 y = q_motor - q_link - zero [mrad]  against  theta [rad], while |dq| > 0.02 rad/s; forth dq > 0, back dq < 0
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,12 +18,23 @@ from matplotlib.figure import Figure
 from calibration.errors import NotEnoughData
 from calibration.prediction.predictor import predictor
 from calibration.recording import Trial
-from calibration.stages.joints import JointModel, JointModels, Samples, pooled, samples_of
-from scenarios.plots import BACK, FORTH, Flank, drawing, figure, hysteresis
-from scenarios.report.results.formatting import fixed
+from calibration.stages.joints import JointModel, JointModels, Samples, limit_of, pooled, samples_of
+from scenarios.plots.hysteresis import BACK, FORTH, Flank, hysteresis
+from scenarios.plots.style import drawing, figure
+from scenarios.report.results.formatting import fixed, significant
+from scenarios.report.results.result_files import Regime
 from scenarios.report.results.run_results import Results
-from scenarios.report.sections.payload import PUSH
+from scenarios.report.results.section import Drawn, RunView
+from scenarios.report.results.traces import PUSH
 
+REGIMES = {
+    "repetition": "The same motions again, settled, by models fitted to other repetitions",
+    "start_stop": "Starts and stops of those motions",
+    "unseen_motion": "Other motions, held out",
+    "static": "Static postures, held out",
+}
+_HELPS = 10.0  # [%] of the RMS
+_DIAGRAM = Path(__file__).parents[1] / "joint_chain.svg"
 _MOVING = 0.02  # [rad/s]
 _COLUMNS = 4
 _HEIGHT = 2.0  # [inch] of a panel
@@ -67,6 +81,58 @@ class Loop:
             Flank(label, colour, self.t[k], self.theta[k], self.measured[k], self.model[k] if self.corrected else None)
             for label, colour, k in ways
         )
+
+
+@dataclass(frozen=True)
+class JointLine:
+    """What the joint model of one joint is: degree (none: no correction), rho [s/rad], R2, discrepancy rms [mrad].
+
+    `rho` says so where the search for it ended at a limit.
+    """
+
+    joint: str
+    degree: str
+    rho: str
+    rms: float
+    r2: float
+    r2_out: float
+
+
+@dataclass(frozen=True)
+class RegimeRows:
+    """One regime: what it is, its rows by joint, and where the model helps in a sentence."""
+
+    meaning: str
+    rows: tuple[Regime, ...]
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Joints:
+    """The drive chain, measured and modelled hysteresis, the models and where they help."""
+
+    view: RunView
+    title: ClassVar[str] = "Joints: backlash, compliance, hysteresis"
+    template: ClassVar[str] = "joints.html"
+    folded: ClassVar[bool] = True
+
+    def figures(self) -> Mapping[str, Drawn]:
+        """The diagram, and the loops of every joint."""
+        return {"joint": _DIAGRAM, "loops": drawn(self._loops[0])}
+
+    def context(self) -> Mapping[str, Any]:
+        """Loops or why there are none, models, regimes."""
+        found, why = self._loops
+        return {
+            "loops": found,
+            "why_no_loops": why,
+            "joint_lines": joint_lines(self.view.results),
+            "regimes": by_regime(self.view.results.evaluation.regimes),
+        }
+
+    @cached_property
+    def _loops(self) -> tuple[tuple[Loop, ...], str]:
+        return loops(self.view.results)
 
 
 def loops(results: Results) -> tuple[tuple[Loop, ...], str]:
@@ -137,3 +203,51 @@ def _legend(panels: Sequence[Axes], ax: Axes) -> None:
     for handle in drawn.legend_handles:
         if handle is not None:
             handle.set_alpha(1.0)
+
+
+def joint_lines(results: Results) -> tuple[JointLine, ...]:
+    """The joint models of an estimate."""
+    models = results.estimate.joint_models if results.estimate else ()
+    return tuple(
+        JointLine(
+            m.joint,
+            "none" if m.degree is None else str(m.degree),
+            _rho(m),
+            1e3 * m.quality.rms,
+            m.quality.r2,
+            m.quality.r2_out,
+        )
+        for m in models
+    )
+
+
+def _rho(model: JointModel) -> str:
+    if model.degree is None:
+        return fixed(None, 0)
+    at = {"lowest": "≤ ", "highest": "≥ ", None: ""}[limit_of(model.rho)]
+    return at + significant(model.rho)
+
+
+def by_regime(regimes: Sequence[Regime]) -> tuple[RegimeRows, ...]:
+    """The regimes there are, the model's own first; others than ours by their name."""
+    names = dict.fromkeys((*REGIMES, *(r.regime for r in regimes)))
+    groups = ((REGIMES.get(name, name), tuple(r for r in regimes if r.regime == name)) for name in names)
+    return tuple(RegimeRows(meaning, rows, _sentence(meaning, rows)) for meaning, rows in groups if rows)
+
+
+def _sentence(meaning: str, rows: Sequence[Regime]) -> str:
+    cuts = [r.cut_percent for r in rows if r.cut_percent >= _HELPS]
+    harmed, as_it_was, hardly = (
+        ", ".join(r.joint.removesuffix("_joint") for r in rows if chosen(r))
+        for chosen in (
+            lambda r: r.cut_percent < 0.0,
+            lambda r: r.cut_percent == 0.0,
+            lambda r: 0.0 < r.cut_percent < _HELPS,
+        )
+    )
+    text = f"{meaning}: the rms falls by 10 % or more in {len(cuts)} of {len(rows)} joints"
+    if cuts:
+        text += f" (by {min(cuts):.0f} to {max(cuts):.0f} %)" if len(cuts) > 1 else f" (by {cuts[0]:.0f} %)"
+    text += f", by less in {hardly}" if hardly else ""
+    text += f", grows in {harmed}" if harmed else ""
+    return text + (f", is left as it is in {as_it_was}." if as_it_was else ".")

@@ -1,13 +1,14 @@
 """Rows of the ladder trial by trial, where trials differ by what the hand carries or by a push."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from scenarios.report.results.ladder import Step
+from scenarios.report.results.ladder import MEANINGS, Step
 from scenarios.report.results.result_files import TrialErrors
 from scenarios.report.results.run_results import Results
-
-PUSH = "push"
+from scenarios.report.results.section import Drawn, RunView
+from scenarios.report.results.traces import PUSH
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,26 @@ class LoadRow:
     errors: tuple[TrialErrors | None, ...]
 
 
+@dataclass(frozen=True)
+class Payload:
+    """Errors by payload and push; left out where no trial differs."""
+
+    view: RunView
+    title: ClassVar[str] = "Payload and push"
+    template: ClassVar[str] = "payload.html"
+    folded: ClassVar[bool] = True
+
+    def figures(self) -> Mapping[str, Drawn]:
+        """None."""
+        return {}
+
+    def context(self) -> Mapping[str, Any] | None:
+        """Trials and rows."""
+        trials = loaded_trials(self.view.results)
+        rows = load_rows(self.view.results, self.view.steps, trials)
+        return {"loaded": trials, "load_rows": rows} if rows else None
+
+
 def loaded_trials(results: Results) -> tuple[LoadedTrial, ...]:
     """Held-out moving trials; none unless they differ in payload or push."""
     description = results.description
@@ -44,6 +65,6 @@ def loaded_trials(results: Results) -> tuple[LoadedTrial, ...]:
 def load_rows(results: Results, steps: Sequence[Step], trials: Sequence[LoadedTrial]) -> tuple[LoadRow, ...]:
     """Predictive rows of the ladder, in its order."""
     errors = {(e.model, e.base, e.encoder, e.trial): e for e in results.evaluation.trials}
-    rows = [s for s in steps if s.encoder == "motor" and s.base != "measured"]
+    rows = [s for s in steps if s.kind == "predictive" and s.model in MEANINGS]
     found = (LoadRow(s.label, tuple(errors.get((s.model, s.base, s.encoder, t.trial)) for t in trials)) for s in rows)
     return tuple(row for row in found if any(row.errors))

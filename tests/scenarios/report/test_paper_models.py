@@ -1,5 +1,5 @@
-from scenarios.report.results.ladder import Step
-from scenarios.report.sections.paper_models import paper_steps, readable
+from scenarios.report.results.ladder import Step, readable
+from scenarios.report.results.published import paper_steps
 
 
 def step(model, base, encoder="motor"):

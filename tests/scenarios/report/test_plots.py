@@ -5,32 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.plots import (
-    BACK,
-    ESTIMATE,
-    FORTH,
-    MISSED,
-    TRUTH,
-    Flank,
-    Interval,
-    Line,
-    Sample,
-    drawing,
-    error_boxes,
-    error_traces,
-    figure,
-    frame_chain,
-    hysteresis,
-    intervals,
-    joint_chain,
-    measured_beside,
-    svg,
-    wheeled_base,
-    z_histogram,
-)
-from scenarios.plots.hysteresis import strokes
-from scenarios.plots.trace import thinned
-from tests.doubles.draw_frames import frames_svg
+from scenarios.plots.boxes import Sample, error_boxes
+from scenarios.plots.forest import Interval, intervals
+from scenarios.plots.histogram import z_histogram
+from scenarios.plots.hysteresis import BACK, FORTH, Flank, hysteresis, strokes
+from scenarios.plots.style import ESTIMATE, MISSED, TRUTH, drawing, figure, svg
+from scenarios.plots.trace import Line, error_traces, measured_beside, thinned
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -59,6 +41,10 @@ def test_boxes_show_quartiles_median_and_root_mean_square_of_each_row(ax):
     np.testing.assert_allclose(dots, [np.sqrt((values**2).mean()), 0.1 * np.sqrt((values**2).mean())])
     (floor,) = (line for line in ax.lines if line.get_color() == TRUTH)
     np.testing.assert_allclose(floor.get_xdata(), 0.5)
+    assert ax.get_xscale() == "log"
+    low, high = ax.get_xlim()
+    assert low < 0.5, "the floor is in sight"
+    assert high > 95.0
 
 
 def test_traces_have_a_line_a_row_and_a_zero(ax):
@@ -101,20 +87,16 @@ def test_a_line_ends_where_time_jumps_or_starts_anew():
 
 
 @pytest.mark.parametrize(
-    ("draw", "names"),
+    ("name", "words"),
     [
-        (joint_chain, ("backlash.", "gear.<joint>.", "encoder.<joint>.motor.", "encoder.<joint>.link.", "q_link")),
-        (frame_chain, ("frame.base.base", "frame.base.arm", "frame.tool.hand", "base_footprint", "$T_{ae}(q)$")),
-        (wheeled_base, ("suspension.<wheel>.", "contact.<wheel>.", "base_footprint", "wrench", "$r_i$")),
+        ("joint_chain", ("backlash.", "gear.&lt;joint&gt;.", "encoder.&lt;joint&gt;.motor.", "q_link")),
+        ("frame_chain", ("frame.base.base", "frame.base.arm", "frame.tool.hand", "base_footprint")),
+        ("wheeled_base", ("suspension.&lt;wheel&gt;.", "contact.&lt;wheel&gt;.", "base_footprint", "wrench")),
     ],
 )
-def test_diagrams_name_the_parameters_inside_their_frame(ax, draw, names):
-    assert draw(ax) is ax
-    words = " ".join(text.get_text() for text in ax.texts)
-    assert [name for name in names if name not in words] == []
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    places = [text.get_position() for text in ax.texts if text.get_text()]
-    assert all(left < x < right and low < y < high for x, y in places)
+def test_diagrams_name_the_parameters(name, words):
+    text = (ROOT / f"scenarios/report/{name}.svg").read_text(encoding="utf-8")
+    assert [word for word in words if word not in text] == []
 
 
 def test_thinning_keeps_every_extreme_and_the_gaps():
@@ -169,6 +151,6 @@ def test_svg_is_the_same_every_time_has_its_own_ids_and_no_reference_outside():
     assert 'href="http' not in text
 
 
-def test_the_frames_in_the_documents_are_the_ones_we_draw():
-    """`python -m tests.draw_frames` writes them again."""
-    assert (Path(__file__).parents[3] / "docs/frames.svg").read_text(encoding="utf-8") == frames_svg()
+def test_the_frames_in_the_documents_are_those_of_the_report():
+    documented, reported = ROOT / "docs/frames.svg", ROOT / "scenarios/report/frame_chain.svg"
+    assert documented.read_bytes() == reported.read_bytes()

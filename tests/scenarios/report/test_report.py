@@ -5,6 +5,7 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from calibration import Evaluation
@@ -16,9 +17,12 @@ from scenarios.files.errors import ScenarioError
 from scenarios.report import write
 from scenarios.report.results import figures
 from scenarios.report.results.formatting import cell, count, decimals, error, fixed, readable, significant
+from scenarios.report.results.headline import headline
 from scenarios.report.results.ladder import Step, headline_model
 from scenarios.report.results.ladder import ladder as ordered
 from scenarios.report.results.run_results import read
+from scenarios.report.results.section import run_view
+from scenarios.report.sections import SECTIONS
 from tests.doubles.html_page import Page
 from tests.doubles.run_folder import (
     PIXEL,
@@ -56,7 +60,7 @@ def run(whole, tmp_path):
 @pytest.fixture
 def plain(monkeypatch):
     """Pages without figures are written faster."""
-    for name in ("boxes", "traces", "forest", "z_scores"):
+    for name in ("overview", "boxes", "traces", "forest", "z_scores"):
         monkeypatch.setattr(figures, name, lambda *_: None)
 
 
@@ -81,8 +85,11 @@ def test_the_same_results_give_the_same_bytes_wherever_they_are(whole, run):
 
 def test_tables_and_figures_are_numbered_in_their_order(whole):
     text = Page(whole / "report.html").text
-    for kind, n in (("Table", 7), ("Figure", 7)):
-        assert [int(k) for k in re.findall(rf"{kind} (\d+)\. ", text)] == list(range(1, n + 1))
+    for kind in ("Table", "Figure"):
+        found = [int(k) for k in re.findall(rf"{kind} (\d+)\. ", text)]
+        assert found == list(range(1, len(found) + 1))
+        assert len(found) >= 7
+    assert "table 0" not in text, "a reference to a table without a caption"
 
 
 def test_the_page_can_be_read_without_seeing(whole):
@@ -97,15 +104,43 @@ def test_the_verdict_comes_first_with_the_figures_of_the_rows(whole):
     text = Page(whole / "report.html").text
     rows = {(r.model, r.base, r.trials): r for r in read(whole).evaluation.rows}
     nominal, ours = (rows[model, "fixed", "dynamic"] for model in ("nominal", "model_2"))
-    verdict = text[text.index("Verdict") : text.index("What these figures are")]
-    for row in (nominal, ours, rows["registration", "fixed", "dynamic"], rows["model_2", "measured", "dynamic"]):
-        assert error(row.position_rmse_component_mm) in verdict
-        assert error(row.position_rmse_norm_mm) in verdict
-        assert error(row.orientation_rmse_deg) in verdict
-    assert "Warning, geometry: arm_3 never moved" in verdict
-    assert "synthetic twin" in text
+    verdict = text[text.index("calibrated") : text.index("of the stages, and what")]
+    assert error(nominal.position_rmse_component_mm) in verdict
+    for digits in (ours.position_rmse_component_mm, ours.position_rmse_norm_mm, ours.orientation_rmse_deg):
+        assert error(digits) in verdict
+    assert "motion of the base" in verdict, "what the error consists of"
+    findings = text[text.index("of the stages, and what") : text.index("Each row predicts")]
+    for row in (rows["registration", "fixed", "dynamic"], rows["model_2", "measured", "dynamic"]):
+        assert error(row.position_rmse_component_mm) in findings
+    assert "Warning, geometry: arm_3 never moved" in findings
+    assert "simulated robot" in text
     assert "no bias is removed" in text
     assert "A small <example>" in text, "text is escaped"
+
+
+def test_the_shares_of_the_error_add_up_in_squares(whole):
+    view = run_view(read(whole))
+    found = headline(view.results, view.steps)
+    total = sum(share.size**2 for share in found.shares) ** 0.5
+    np.testing.assert_allclose(total, view.headline.main.position_rmse_component_mm)
+
+
+def test_next_steps_are_ranked_by_what_they_gain(whole):
+    view = run_view(read(whole))
+    first = headline(view.results, view.steps).next_steps[0]
+    best = min(s.main.position_rmse_component_mm for s in view.steps if s.kind == "oracle: base")
+    np.testing.assert_allclose(first.gain, view.headline.main.position_rmse_component_mm - best)
+    assert "measure the base" in first.text
+
+
+def test_sections_are_numbered_and_named_by_the_page_alone(whole):
+    view = run_view(read(whole))
+    names = [name for section in SECTIONS for name in section(view).figures()]
+    assert len(names) == len(set(names))
+    page = Page(whole / "report.html")
+    shown = [section for section in SECTIONS if section.title and section(view).context() is not None]
+    links = [link for link in page.links if link.startswith("#") and link[1:] in page.ids]
+    assert {f"#{section.template.removesuffix('.html')}" for section in shown} <= set(links)
 
 
 def test_the_ladder_has_every_row_in_order_with_its_kind(whole):
@@ -124,11 +159,12 @@ def test_the_ladder_has_every_row_in_order_with_its_kind(whole):
 
 def test_parameters_stand_beside_their_truth_with_what_was_left_out(whole):
     text = Page(whole / "report.html").text
-    assert re.search(r"\d+ of 31 intervals of 95 % hold the truth", text)
+    assert re.search(r"\d+ of 31 intervals of 95 % contain the truth", text)
     assert "−1 geometry.turn.rz" in text, "terms of a combination"
     assert "Not estimated: 1 of link masses." in text
     assert {p.name for p in (whole / "figures").iterdir()} == {
         "errors.svg",
+        "headline.svg",
         "joint.svg",
         "parameters.svg",
         "traces.svg",
@@ -153,8 +189,8 @@ def test_the_page_says_what_was_recorded_and_how_to_make_it_again(whole):
     [
         ("score.json", "against the truth"),
         ("figures", "The twin, seed"),
-        ("estimate", "What each stage said"),
-        ("dataset", "What was recorded"),
+        ("estimate", "Messages of the stages"),
+        ("dataset", "sigma 0.100 mm per axis"),
         ("scenario.yaml", "seed 7"),
     ],
 )
@@ -180,7 +216,7 @@ def test_real_data_are_not_called_a_twin(run):
     (run / "score.json").unlink()
     write(run)
     text = Page(run / "report.html").text
-    assert "All figures are of a synthetic twin" not in text
+    assert "simulated robot" not in text
     assert "No truth is known" in text
     assert "Departures from nominal" in text
     assert not (run / "figures/z_scores.svg").exists(), "a figure of an earlier report"
@@ -192,7 +228,7 @@ def test_a_calibration_that_does_not_help_is_said_to_be_one(run, plain):
     write(run)
     text = Page(run / "report.html").text
     assert "no better than fitting the marker frames alone" in text
-    assert "down from" not in text
+    assert "not calibrated" in text
 
 
 def test_intervals_that_are_too_narrow_are_told(run, plain):
@@ -217,7 +253,7 @@ def test_static_trials_alone_are_enough(run, plain):
     Evaluation(tuple(ladder(found, "mocap")), tuple(found)).save(run)
     (run / "score.json").unlink()
     write(run)
-    assert "On held-out static trials" in Page(run / "report.html").text
+    assert "Error of the hand on unseen static trials" in Page(run / "report.html").text
 
 
 def test_the_headline_is_the_main_model_where_it_was_evaluated(whole):

@@ -22,10 +22,11 @@ from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Suspension
 from calibration.verdict import Verdict
 from scenarios.report import write
+from scenarios.report.results import suspension
 from scenarios.report.results.formatting import fixed
 from scenarios.report.results.result_files import Regime
 from scenarios.report.results.run_results import read
-from scenarios.report.sections import base_motion, joint_regimes, suspension
+from scenarios.report.sections import base_motion
 from scenarios.report.sections import joints as loops
 from scenarios.report.sections import payload as loads
 from tests.calibration.stages.suspension.test_suspension_fit import C, K, record
@@ -175,7 +176,7 @@ def test_the_true_springs_predict_the_axes_that_are_moved(whole):
     roll = row_of(whole, "The same trial in figures", "roll [mrad]")
     assert roll[2] == fixed(np.nanstd(found.measured[found.t <= 1.0, 3]), 2), "noise, by the first second"
     assert roll[3:5] == [fixed(p.r2[3], 2), fixed(p.r2_middle[3], 2)]
-    assert row_of(whole, "The same trial in figures", "yaw [mrad]")[3] == "left still"
+    assert row_of(whole, "The same trial in figures", "yaw [mrad]")[3] == "not predicted"
     assert row_of(whole, "The same trial in figures", "yaw [mrad]")[0] == fixed(np.ptp(found.measured[rows, 5]), 2)
 
 
@@ -203,8 +204,8 @@ def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, told):
 def test_yaw_is_told_with_what_stays(whole):
     found, _ = base_motion.sway(read(whole))
     left = np.sqrt(((found.measured - found.predicted[0].x)[found.scored, 5] ** 2).mean())
-    assert f"it is left still here and {fixed(left, 1)} mrad rms stay" in text_of(whole)
-    assert "over all left-out calibration trials its R2 is −0.10" in text_of(whole)
+    assert f"it is not predicted here, residual {fixed(left, 1)} mrad rms" in text_of(whole)
+    assert "cross-validated over the calibration trials its R2 is −0.10" in text_of(whole)
 
 
 def test_stiffness_stands_beside_the_truth(whole):
@@ -240,7 +241,7 @@ def test_wheels_are_told_as_combinations_with_the_rank_of_one_wrench(whole):
     text = text_of(whole)
     assert "36 stiffnesses leave 14 combinations" in text
     assert "36 stiffnesses leave 11 combinations" in text
-    assert row_of(whole, "What is known of the wheels", "suspension.wheel_left.kz + 1") == [
+    assert row_of(whole, "Identifiable combinations of the wheels", "suspension.wheel_left.kz + 1") == [
         "150\u202f000",
         "2\u202f000",
     ]
@@ -278,11 +279,9 @@ def test_regimes_are_told_joint_by_joint_and_in_sentences(whole):
 
 
 def test_regimes_have_our_order_and_unknown_ones_come_last():
-    found = joint_regimes.by_regime(
-        tuple(Regime(**REGIMES[0] | {"regime": r}) for r in ("other", *reversed(joint_regimes.REGIMES)))
-    )
-    assert [r.meaning for r in found] == [*joint_regimes.REGIMES.values(), "other"]
-    assert {r for r in get_args(CalibratedRegime)} == set(joint_regimes.REGIMES)
+    found = loops.by_regime(tuple(Regime(**REGIMES[0] | {"regime": r}) for r in ("other", *reversed(loops.REGIMES))))
+    assert [r.meaning for r in found] == [*loops.REGIMES.values(), "other"]
+    assert {r for r in get_args(CalibratedRegime)} == set(loops.REGIMES)
 
 
 def test_trials_are_apart_where_payload_or_push_differ(run, recording):
@@ -316,7 +315,7 @@ def test_trials_are_apart_where_payload_or_push_differ(run, recording):
 
 
 def test_trials_of_one_load_need_no_table(whole):
-    assert "What the hand carries" not in text_of(whole)
+    assert "Payload and push" not in text_of(whole)
 
 
 def test_diagrams_and_figures_can_be_read_without_seeing(whole):

@@ -1,4 +1,4 @@
-"""The base's springs: elements of K and C, identified beside true, and what one wrench tells of the wheels."""
+"""The base's springs: elements of K and C, identified beside true, and what one wrench identifies of the wheels."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -64,6 +64,14 @@ class WheelCombination:
     sigma: float
 
 
+@dataclass(frozen=True)
+class AxisLine:
+    """R2 of one axis of the base on left-out trials, against a base that stays, and whether it is moved, by source."""
+
+    axis: str
+    found: tuple[tuple[float, bool], ...]
+
+
 def elements(results: Results, letter: Literal["K", "C"]) -> tuple[Element, ...]:
     """The upper triangle of K or C as far as it is not zero in both; none without a suspension."""
     suspension = results.estimate.suspension if results.estimate else None
@@ -110,7 +118,30 @@ def combinations(results: Results) -> tuple[WheelCombination, ...]:
     )
 
 
-def said(results: Results) -> tuple[str, ...]:
-    """What the stage said, in its words; what it says of each source of the wrench is in a table."""
+def sources(results: Results) -> tuple[str, ...]:
+    """Sources of the wrench the suspension was tried with."""
+    suspension = results.estimate.suspension if results.estimate else None
+    return tuple(source for source, _ in suspension.held_out) if suspension else ()
+
+
+def axis_lines(results: Results) -> tuple[AxisLine, ...]:
+    """The axes of the base, by source of the wrench."""
+    suspension = results.estimate.suspension if results.estimate else None
+    if suspension is None:
+        return ()
+    tried = [(np.maximum(h.r2, -9.99), h.moves) for _, h in suspension.held_out]
+    return tuple(
+        AxisLine(axis, tuple((float(r2[k]), bool(moves[k])) for r2, moves in tried)) for k, axis in enumerate(AXES)
+    )
+
+
+def held_out_yaw(results: Results) -> dict[str, float]:
+    """R2 of yaw on left-out trials, by source of the wrench."""
+    lines = axis_lines(results)
+    return {s: lines[5].found[k][0] for k, s in enumerate(sources(results))}
+
+
+def messages(results: Results) -> tuple[str, ...]:
+    """Messages of the stage; those of each source of the wrench are in a table."""
     verdicts = results.estimate.verdicts if results.estimate else ()
     return tuple(v.message for v in verdicts if v.stage == STAGE and not v.message.startswith("from "))

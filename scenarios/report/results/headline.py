@@ -1,0 +1,161 @@
+"""The result of a run in a few lines: whether it is calibrated, its error on unseen motion, of what, and what next.
+
+    e_base^2 = e(row)^2 - e(row, base measured)^2       e_rest^2 = e(row, base measured)^2 - e(floor)^2
+
+e: position RMSE per component [mm]. Shares add up in squares.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from calibration.prediction import BASELINE, NOMINAL
+from scenarios.report.results.formatting import error
+from scenarios.report.results.ladder import BASES, FLOOR, Step, floor, headline_model, oracle_base, predictive
+from scenarios.report.results.result_files import Row
+from scenarios.report.results.run_results import Results
+
+_NBSP = "\N{NO-BREAK SPACE}"
+_STEPS = 3
+_WORTH = 0.05  # of the error, below which a gain is no next step [-]
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A finding: `level` is `refused`, `missing` or `warning`."""
+
+    level: str
+    stage: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Share:
+    """A cause of the remaining error and its size [mm]."""
+
+    cause: str
+    size: float
+
+
+@dataclass(frozen=True)
+class NextStep:
+    """What to do, and by how much it lowers the error [mm]; None where that is not known."""
+
+    text: str
+    gain: float | None
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What a reader needs first.
+
+    Attributes:
+        badge: `calibrated`, `not calibrated` or, of an evaluation without estimate, `evaluated`.
+        sentence: The error on unseen motion, before and after.
+        shares: What it consists of, the largest first; empty without the rows to tell it from.
+        next_steps: At most three, the largest gain first.
+        notices: Every finding, the worst first.
+    """
+
+    badge: str
+    sentence: str
+    shares: tuple[Share, ...]
+    next_steps: tuple[NextStep, ...]
+    notices: tuple[Notice, ...]
+
+
+def headline(results: Results, steps: Sequence[Step]) -> Headline:
+    """The headline of a run from its saved results; `steps` are the rows it is about."""
+    found = _notices(results, steps)
+    estimate = results.estimate
+    if estimate is None:
+        badge = "evaluated"
+    else:
+        useless = any(n.stage == "evaluation" and n.level == "refused" for n in found)
+        badge = "calibrated" if estimate.calibrated and not useless else "not calibrated"
+    model = headline_model(results, steps)
+    best = predictive(steps, model)
+    shares = _shares(steps, best) if best else ()
+    refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
+    ranked = (*refused, *_next_steps(steps, best, found))[:_STEPS]
+    return Headline(badge, _sentence(steps, best), shares, ranked, found)
+
+
+def figures(row: Row) -> str:
+    """Position and orientation error of a row in words."""
+    component, norm = error(row.position_rmse_component_mm), error(row.position_rmse_norm_mm)
+    turned = "" if row.orientation_rmse_deg is None else f", {error(row.orientation_rmse_deg)}°"
+    return f"{component}{_NBSP}mm per component ({norm}{_NBSP}mm norm){turned}"
+
+
+def better(ours: Row, theirs: Row) -> bool:
+    """Whether a row's error of position is smaller."""
+    return ours.position_rmse_norm_mm < theirs.position_rmse_norm_mm
+
+
+def _sentence(steps: Sequence[Step], best: Step | None) -> str:
+    if best is None:
+        return "No row predicts from motor encoders alone; see the ladder."
+    nominal = predictive(steps, NOMINAL)
+    base = BASES.get(best.base, best.base)
+    trials = "moving" if best.trials == "dynamic" else best.trials
+    text = f"Error of the hand on unseen {trials} trials: {figures(best.main)}"
+    if nominal is not None and nominal is not best:
+        verb = "instead of" if better(best.main, nominal.main) else "no better than"
+        text += f", {verb} {error(nominal.main.position_rmse_component_mm)}{_NBSP}mm with the nominal robot"
+    return f"{text}. Row {best.model}, motor encoders, {base}."
+
+
+def _shares(steps: Sequence[Step], best: Step) -> tuple[Share, ...]:
+    whole, given, low = best.main.position_rmse_component_mm, oracle_base(steps, best.model), floor(steps)
+    rest = min(whole, given.main.position_rmse_component_mm) if given else whole
+    last = min(rest, low.position_rmse_component_mm) if low else 0.0
+    arm = "arm: joints and geometry" if low else "arm: joints, geometry and measurement noise"
+    found = (
+        Share("motion of the base", (whole**2 - rest**2) ** 0.5),
+        Share(arm, (rest**2 - last**2) ** 0.5),
+        Share("floor of the instruments", last),
+    )
+    return tuple(sorted((share for share in found if share.size > 0.0), key=lambda share: -share.size))
+
+
+def _next_steps(steps: Sequence[Step], best: Step | None, notices: Sequence[Notice]) -> tuple[NextStep, ...]:
+    """Rows of the same robot that do better, each by its gain; then what the stages ask to record."""
+    found = list(_gains(steps, best)) if best else []
+    found.sort(key=lambda step: -(step.gain or 0.0))
+    asked = [NextStep(f"{n.stage}: {n.message}", None) for n in notices if "record_next" in n.message]
+    return (*found, *asked)
+
+
+def _gains(steps: Sequence[Step], best: Step) -> Iterator[NextStep]:
+    rows = [s for s in steps if s.model != FLOOR and better(s.main, best.main)]
+    whole = best.main.position_rmse_component_mm
+    ways = (
+        ("predict with", [s for s in rows if s.kind == "predictive"]),
+        ("measure the base while the robot works, with", [s for s in rows if s.kind == "oracle: base"]),
+        ("read the link-side encoders, with", [s for s in rows if s.kind == "oracle: encoder"]),
+    )
+    for verb, possible in ways:
+        if possible:
+            one = min(possible, key=lambda s: s.main.position_rmse_component_mm)
+            after = one.main.position_rmse_component_mm
+            if whole - after < _WORTH * whole:
+                continue
+            base = f", {BASES.get(one.base, one.base)}" if one.base != "measured" else ""
+            text = f"{verb} {one.model}{base}: {error(after)}{_NBSP}mm instead of {error(whole)}{_NBSP}mm"
+            yield NextStep(text, whole - after)
+
+
+def _notices(results: Results, steps: Sequence[Step]) -> tuple[Notice, ...]:
+    found = (*(results.estimate.verdicts if results.estimate else ()), *results.evaluation.verdicts)
+    notices = [Notice(v.verdict, v.stage, v.message) for v in found if v.verdict != "ok"]
+    notices += _no_gain(steps, headline_model(results, steps))
+    return tuple(sorted(notices, key=lambda notice: ("refused", "missing", "warning").index(notice.level)))
+
+
+def _no_gain(steps: Sequence[Step], model: str) -> Iterator[Notice]:
+    best, baseline = predictive(steps, model), predictive(steps, BASELINE)
+    if best is None or baseline is None or best is baseline or model == "arm_tool":
+        return  # arm_tool and registration place the same hand; they differ in what they call its frames
+    if not better(best.main, baseline.main):
+        message = f"{model} predicts no better than fitting the marker frames alone; do not use its geometry"
+        yield Notice("refused", "evaluation", message)
