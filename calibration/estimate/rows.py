@@ -91,7 +91,9 @@ LADDER = (
         registered=False,
         published=Published("measured", "motor", constants_removed=False),
     ),
-    LadderRow(BASELINE, "datasheet geometry, marker bodies fitted: the baseline of every calibration", BASELINE, means=True),
+    LadderRow(
+        BASELINE, "datasheet geometry, marker bodies fitted: the baseline of every calibration", BASELINE, means=True
+    ),
     LadderRow(
         "arm_tool",
         "base frame from spins and drives, then arm base and tool; the arm itself with its factory calibration",
