@@ -42,7 +42,7 @@ bench-peer: $(READY) .venv-peer/ready
 	@.venv-peer/bin/python -m pip install -qq --disable-pip-version-check figaroh==1.0.2
 	@touch $@
 
-$(READY): requirements.txt pyproject.toml
+$(READY): requirements.txt pyproject.toml scenarios/testing/pytest_plugin.py
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \
 	  echo "Python 3.11 to 3.14 is needed; $(PYTHON) is $$($(PYTHON) --version 2>&1 | head -1)."; \
 	  echo "Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }

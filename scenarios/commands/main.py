@@ -15,6 +15,7 @@ from typing import Annotated
 
 import typer
 
+from scenarios.commands import check as command_check
 from scenarios.commands import dataset as command_dataset
 from scenarios.commands import design as command_design
 from scenarios.commands import import_export, quicklook, video
@@ -169,6 +170,7 @@ study = app.command()(command_study.study)
 look = app.command()(quicklook.look)
 picture = app.command()(video.picture)
 reality = app.command()(command_reality.reality)
+check = app.command()(command_check.check)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

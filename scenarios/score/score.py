@@ -18,6 +18,7 @@ import numpy as np
 from calibration import Dataset, Estimate, Evaluation, predictions
 from calibration.evaluation import Row, TrialErrors, ladder, pose_errors, row_entry, scored_errors
 from calibration.inference.parameters import Model
+from calibration.inference.parameters import Parameter as EstimatedParameter
 from calibration.mocap import poses_of, relabelled_trial
 from calibration.prediction import BASELINE
 from scenarios.files.errors import ScenarioError
@@ -79,10 +80,10 @@ class ParameterScore:
             "schema": 1,
             "parameters": [_entry(p) for p in self.parameters],
             "combinations": [_entry(p) for p in self.combinations],
-            "coverage_95": self.coverage_95,
+            "coverage_95": _finite(self.coverage_95),
             "n_covered": self.n_covered,
             "n_judged": self.n_judged,
-            "nees": self.nees,
+            "nees": _finite(self.nees),
             "dof": self.dof,
         }
 
@@ -126,13 +127,18 @@ def judge_parameters(model: Model, true: Iterable[Parameter]) -> ParameterScore:
     parameters = tuple(_parameter(name, unit, value, model) for name, unit, value in true)
     matrix, errors, combinations = _identified(model, {name: value for name, _, value in true})
     covered = np.abs(errors / np.sqrt(np.diag(matrix))) <= SPAN_95
-    nees, dof = _nees(errors, matrix)
-    return ParameterScore(parameters, combinations, float(covered.mean()), int(covered.sum()), len(covered), nees, dof)
+    nees, dof = _nees(errors, matrix) if len(errors) else (np.nan, 0)
+    share = float(covered.mean()) if len(covered) else np.nan
+    return ParameterScore(parameters, combinations, share, int(covered.sum()), len(covered), nees, dof)
 
 
 def _entry(judged: Judged) -> dict[str, object]:
-    """JSON has no NaN: what is not there is null."""
-    return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in asdict(judged).items()}
+    return {k: _finite(v) for k, v in asdict(judged).items()}
+
+
+def _finite(value: object) -> object:
+    """JSON has no NaN: what is not known is null."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _read_parameters(path: Path) -> tuple[Parameter, ...]:
@@ -148,8 +154,13 @@ def _parameter(name: str, unit: str, value: float, model: Model) -> Judged:
     found = next((p for p in model.parameters if p.name == name), None)
     if found is None:
         return Judged(name, unit, value, np.nan, np.nan, np.nan, "not_estimated")
-    z = (found.value - value) / found.sigma if found.status == "estimated" else np.nan
+    z = (found.value - value) / found.sigma if _has_interval(found) else np.nan
     return Judged(name, unit, value, found.value, found.sigma, z, found.status)
+
+
+def _has_interval(p: EstimatedParameter) -> bool:
+    """Whether an estimate came with a standard deviation; other programs' need not."""
+    return p.status == "estimated" and p.sigma > 0.0
 
 
 def _identified(model: Model, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray, tuple[Judged, ...]]:
@@ -157,7 +168,7 @@ def _identified(model: Model, values: dict[str, float]) -> tuple[np.ndarray, np.
     names = [p.name for p in model.parameters]
     theta = np.array([p.value for p in model.parameters])
     true = np.array([values.get(n, np.nan) for n in names])
-    alone = [i for i, p in enumerate(model.parameters) if p.status == "estimated" and np.isfinite(true[i])]
+    alone = [i for i, p in enumerate(model.parameters) if _has_interval(p) and np.isfinite(true[i])]
     rows = [np.eye(len(names))[i] for i in alone]
     judged = []
     fixed_alone = {names[i] for i in alone}
@@ -167,7 +178,7 @@ def _identified(model: Model, values: dict[str, float]) -> tuple[np.ndarray, np.
             unit = model.parameters[names.index(c.name)].unit
             judged.append(Judged(c.name, unit, value, c.value, c.sigma, (c.value - value) / c.sigma, "combined"))
             rows.append(c.coefficients)
-    A = np.array(rows).reshape(-1, len(names))
+    A = np.array(rows).reshape(len(rows), len(names))
     return A @ model.covariance @ A.T, A @ (theta - np.nan_to_num(true)), tuple(judged)
 
 

@@ -1,0 +1,105 @@
+"""The command `check`: limits on the figures of an evaluation, for continuous integration without pytest.
+
+A figure is `ROW[:BASE[:ENCODER[:TRIALS]]].METRIC`, or `coverage`. The base is, unless named, the best source of its
+motion that does not measure it; encoder `motor`; trials `dynamic`. Against the truth where score.json is there.
+"""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scenarios.commands.options import FAILED
+from scenarios.files.errors import ScenarioError
+
+_SHORT = {
+    "mm": "position_rmse_component_mm",
+    "norm": "position_rmse_norm_mm",
+    "p95": "position_p95_norm_mm",
+    "max": "position_max_norm_mm",
+    "deg": "orientation_rmse_deg",
+    "skill": "skill",
+}
+_BASES = ("dynamics", "plate", "fixed")
+
+
+def check(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run or evaluation folder.")],
+    highest: Annotated[
+        list[str] | None,
+        typer.Option("--max", metavar="ROW.METRIC=VALUE", help="Fail above this value; repeatable."),
+    ] = None,
+    lowest: Annotated[
+        list[str] | None,
+        typer.Option("--min", metavar="ROW.METRIC=VALUE", help="Fail below this value; repeatable."),
+    ] = None,
+) -> None:
+    """Compare figures of an evaluation with limits; exit 1 where one is exceeded.
+
+    Metrics: mm (RMSE per component), norm, p95, max [mm], deg, skill; and coverage of 95 % intervals.
+
+    Example: tiago-twin check runs/demo --max model_2.mm=2.5 --max model_3:plate.deg=0.8 --min coverage=0.6
+    """
+    limits = [(text, 1.0) for text in highest or ()] + [(text, -1.0) for text in lowest or ()]
+    if not limits:
+        raise ScenarioError("check: no limit; name one, such as --max model_2.mm=2.5")
+    exceeded = 0
+    for text, sign in limits:
+        name, equals, value = text.partition("=")
+        if not equals or not _is_number(value):
+            raise ScenarioError(f"check: {text}: write ROW.METRIC=VALUE, such as model_2.mm=2.5")
+        found, limit = _figure(run_folder, name), float(value)
+        failed = sign * found > sign * limit
+        exceeded += failed
+        typer.echo(
+            f"{'FAILED' if failed else 'ok':6} {name} = {found:.4g}, {'at most' if sign > 0 else 'at least'} {limit:g}"
+        )
+    if exceeded:
+        raise typer.Exit(FAILED)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _figure(folder: Path, name: str) -> float:
+    score = folder / "score.json"
+    if name == "coverage":
+        found = _json(score).get("coverage_95")
+    else:
+        row, _, metric = name.rpartition(".")
+        key = _SHORT.get(metric, metric)
+        entry = _row(_json(score if score.is_file() else folder / "evaluation.json")["rows"], row)
+        if key not in entry or isinstance(entry[key], (str, dict)):
+            raise ScenarioError(f"check: {name}: no metric {metric!r}; there are {', '.join(_SHORT)} and coverage")
+        found = entry[key]
+    if found is None:
+        raise ScenarioError(f"check: {name} is not known in {folder}")
+    return float(found)
+
+
+def _row(rows: Sequence[dict[str, Any]], text: str) -> dict[str, Any]:
+    model, base, encoder, trials = (*text.split(":"), "", "", "", "")[:4]
+    wanted = (model, encoder or "motor", trials or "dynamic")
+    found = {row["base"]: row for row in rows if (row["model"], row["encoder"], row["trials"]) == wanted}
+    source = base or next((b for b in _BASES if b in found), "")
+    if source not in found:
+        known = dict.fromkeys(f"{r['model']}:{r['base']}:{r['encoder']}:{r['trials']}" for r in rows)
+        raise ScenarioError(f"check: no row {text!r}; there are {', '.join(known)}")
+    return found[source]
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}; make it with tiago-twin evaluate") from error
+    except ValueError as error:
+        raise ScenarioError(f"{path}: broken JSON: {error}") from error
+    return content
