@@ -36,8 +36,8 @@ from calibration.mocap.cluster_pose import body_poses
 from calibration.numerics.lie import compose, from_vector, inverse
 from calibration.recording.experiment import ExperimentPlan, Motion, Sigma
 from calibration.recording.schema import Description
-from calibration.robot.chain import Chain
-from calibration.robot.nominal_frames import AXES, frame_names, nominal_frames
+from calibration.robot.laboratory import Laboratory
+from calibration.robot.nominal_frames import AXES, frame_names
 from calibration.stages.frames.base_rests import Stations, from_planar
 from calibration.stages.frames.base_stage import STAGE, locate_base
 from calibration.stages.joints.model import JointModel, monomials
@@ -60,18 +60,18 @@ _SECONDS, _HERTZ = 25.0, 0.2  # of a swing
 
 
 def drive_next(
-    chain: Chain, description: Description, stations: Stations | None, model: Model | None
+    lab: Laboratory, stations: Stations | None, model: Model | None
 ) -> tuple[ExperimentPlan | None, tuple[Verdict, ...]]:
     """Motions to record after `model` from `stations`, both None where there are none; None where none is missing."""
     kinds = () if stations is None or model is None else stations.kinds
     motions = tuple(m for m in (SPIN, DRIVE) if m.kind not in kinds)
     if not motions:
         return None, ()
-    base = nominal_frames(chain, description)[:6]
+    description, base = lab.description, lab.nominal_frames[:6]
     if model is not None:
         base = np.array([p.value for p in model.parameters[:6]])
     planned = _planned(description, base, motions, stations if kinds else None)
-    found, _ = locate_base(chain, description, planned)
+    found, _ = locate_base(lab, planned)
     if found is None:
         return None, ()
     tol, name = description.tolerances, frame_names()[0]

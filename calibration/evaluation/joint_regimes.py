@@ -85,7 +85,7 @@ def on_repetitions(models: JointModels, trials: Iterable[Trial], terms: Terms) -
     of_trials = [samples_of(models.inputs.of_trial(trial.id), trial, models.zero) for trial in moving]
     if not of_trials:
         return ()
-    noise = models.inputs.description.sigmas.encoder
+    noise = models.inputs.lab.description.sigmas.encoder
     columns = zip(models.inputs.measured, models.zero, zip(*of_trials, strict=True), strict=True)
     return tuple(
         found

@@ -23,7 +23,7 @@ from calibration.numerics.lie import adjoint, inverse
 from calibration.numerics.wrench import in_frame
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
-from calibration.stages.suspension.base_response import Laboratory, forcing_of
+from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import floor_load
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of, upright
@@ -126,13 +126,13 @@ class BaseState:
     moved: np.ndarray
 
 
-def base_poses(suspension: Suspension, lab: Laboratory, trial: Trial, source: Source) -> np.ndarray:
+def base_poses(suspension: Suspension, lab: WrenchSources, trial: Trial, source: Source) -> np.ndarray:
     """T_lab_B (n, 4, 4) of the base's marker body at `t_mocap`; outside the wrench's recording it stays.
 
     Raises:
         NotEnoughData: The wrench, or the base's markers of the first second, were not recorded.
     """
-    rest = rest_of(lab.description, trial, lab.T_base_B)
+    rest = rest_of(lab.lab.description, trial, lab.T_base_B)
     load = lab.plate_load(trial, rest.T_lab_0) if source == "plate" else lab.dynamics_load(trial, rest.T_lab_0)
     forcing = forcing_of(load, float(trial.t_mocap[0]))
     x = suspension.displaced(forcing, source)

@@ -26,6 +26,7 @@ from calibration.recording.schema import Description
 from calibration.robot.chain import Chain, chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
+from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.parameters import parameter_names
@@ -106,7 +107,7 @@ class Compensator:
         play = model.play if len(model.play) else np.zeros(len(chain.joints))
         joints = None
         if estimate.joint_models and laboratory is not None:
-            inputs = input_model(estimate.urdf, laboratory.carrying(payload), hand)
+            inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
         return cls(hand, _covariance(chain, model), play, model.hand_error, joints, estimate.suspension, laboratory)
 

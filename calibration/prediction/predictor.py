@@ -33,6 +33,7 @@ from calibration.recording.schema import Description, Role, TrialEntry
 from calibration.recording.trial import Trial
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
+from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.clocks.stage import synchronise
 from calibration.stages.geometry.model_of_fit import hand_of
@@ -179,11 +180,13 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     robot = estimate.clock("robot")
     trials = () if robot is not None else tuple(trial for _, trial in relabelled_trials(dataset, "calibration"))
     if trials:
-        robot = next((c for c in synchronise(dataset.urdf, description, trials)[0] if c.instrument == "robot"), None)
+        robot = next(
+            (c for c in synchronise(Laboratory(dataset.urdf, description), trials)[0] if c.instrument == "robot"), None
+        )
     joints = None
     corrected = next((models[row.name] for row in LADDER if row.joints and row.name in models), None)
     if corrected is not None:
-        inputs = input_model(dataset.urdf, description, corrected)
+        inputs = input_model(Laboratory(dataset.urdf, description), corrected)
         joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
     return Predictor(models, dataset.urdf, description, robot, estimate.clock("plate"), estimate.suspension, joints)
 

@@ -27,9 +27,11 @@ from calibration.errors import NotEnoughData, ShapeError
 from calibration.mocap.postures import Postures, dwell_windows
 from calibration.numerics.lie import from_vector, inverse, skew
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
 _FEWEST = 6  # postures
@@ -131,9 +133,9 @@ def _least_squares(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return x, psi.T @ psi
 
 
-def drawn(urdf: str, description: Description, link: str) -> Hanging:
+def drawn(lab: Laboratory, link: str) -> Hanging:
     """What hangs on the sensor at `link` by the drawing and the declared payload, as wide as their tolerances."""
-    model = pin.buildModelFromXML(urdf)
+    model, description = pin.buildModelFromXML(lab.urdf), lab.description
     data, sensor = model.createData(), model.getFrameId(link)
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     tolerance, payload = description.tolerances, description.payload
@@ -169,8 +171,7 @@ def _bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[tuple[pin
 
 
 def weighed(
-    urdf: str,
-    description: Description,
+    lab: Laboratory,
     trials: Sequence[Trial],
     robot: Clock | None,
     hand: HandModel,
@@ -179,8 +180,7 @@ def weighed(
     """What is to be said of the load of the hand; nothing where no wrist was recorded.
 
     Args:
-        urdf: Of the nominal robot.
-        description: Of the dataset, its payload that of these trials.
+        lab: Nominal robot and setup, its payload that of these trials.
         trials: Continuous ones; their dwells count.
         robot: The robot's clock.
         hand: The calibrated robot.
@@ -189,7 +189,7 @@ def weighed(
     recorded = [trial for trial in trials if np.isfinite(trial.wrist_wrench).any()]
     if not recorded or robot is None:
         return ()
-    link = description.wrist_link
+    description, link = lab.description, lab.description.wrist_link
     if link is None:
         return (Verdict(_STAGE, "missing", "wrist_wrench is recorded, but wrist_link does not say where: not used"),)
     w = _means(recorded, robot)
@@ -202,7 +202,7 @@ def weighed(
         found = weigh(R, np.array([w[label] for label in seen.label]), np.array(description.gravity))
     except NotEnoughData as error:
         return (Verdict(_STAGE, "missing", str(error)),)
-    return (_judged(found, drawn(urdf, description, link), link, len(seen)),)
+    return (_judged(found, drawn(lab, link), link, len(seen)),)
 
 
 def _turned(hand: HandModel, postures: Postures, link: str) -> np.ndarray:
@@ -244,3 +244,17 @@ def _judged(found: Hanging, expected: Hanging, link: str, n: int) -> Verdict:
 
 def _millimetres(x: np.ndarray, digits: int = 0) -> str:
     return "(" + ", ".join(f"{1e3 * v:.{digits}f}" for v in x) + ")"
+
+
+def _run(data: StageInput) -> StageResult:
+    """The load in the trials with the declared payload."""
+    model = data.model("model_2")
+    if model is None or data.postures is None:
+        return StageResult()
+    declared = {entry.id for entry in data.lab.description.trials if entry.payload is None}
+    trials = [trial for trial in data.trials if trial.id in declared]
+    hand = hand_of(model, data.lab.chain, data.lab.nominal_frames)
+    return StageResult(findings=weighed(data.lab, trials, data.clock("robot"), hand, data.postures))
+
+
+WRIST_LOAD = Stage("wrist_load", _run, lacks=lambda data: "", needs="geometry")

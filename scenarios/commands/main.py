@@ -115,6 +115,9 @@ def calibrate(
     suspension: Annotated[
         str | None, typer.Option(metavar="diagonal|full", help="Each wheel's springs; diagonal by default.")
     ] = None,
+    plan_next: Annotated[
+        bool, typer.Option("--next", help="Search for what to record next, too: record_next.yaml.")
+    ] = False,
 ) -> None:
     """Write an estimate from a dataset folder alone."""
     from scenarios import steps
@@ -123,7 +126,7 @@ def calibrate(
     chosen = None if stages is None else [stage.strip() for stage in stages.split(",")]
     with console.progress() as progress:
         options = steps.options(terms=terms, suspension=suspension)
-        estimate = steps.calibrate(dataset, out, chosen, progress, options)
+        estimate = steps.calibrate(dataset, out, chosen, progress, options, plan_next)
     console.show(console.verdicts(estimate.verdicts))
     typer.echo(f"\nEstimate: {out}")
     if not estimate.calibrated:

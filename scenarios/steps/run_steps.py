@@ -108,6 +108,7 @@ def calibrate(
     stages: Sequence[str] | None = None,
     progress: Progress = silent,
     options: "Options | None" = None,
+    plan_next: bool = False,
 ) -> "Estimate":
     """Write the estimate folder `out` from a dataset folder alone.
 
@@ -119,6 +120,7 @@ def calibrate(
         stages: Only these; None runs every stage.
         progress: Told how far it is.
         options: What is chosen; None: the defaults.
+        plan_next: Whether to search for what to record next.
 
     Raises:
         ScenarioError: `out` must not be overwritten, or a stage does not exist.
@@ -130,7 +132,7 @@ def calibrate(
     if unknown:
         raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
     with folder.replacing(out, folder.ESTIMATE) as new, one_blas_thread():
-        return _calibrate(Path(dataset), new, stages, options, progress)
+        return _calibrate(Path(dataset), new, stages, options, progress, plan_next)
 
 
 def options(**chosen: str | None) -> "Options":
@@ -196,13 +198,18 @@ def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
 
 
 def _calibrate(
-    dataset: Path, out: Path, stages: Sequence[str] | None, options: "Options | None", progress: Progress
+    dataset: Path,
+    out: Path,
+    stages: Sequence[str] | None,
+    options: "Options | None",
+    progress: Progress,
+    plan_next: bool = False,
 ) -> "Estimate":
     import calibration
 
     progress("calibrate", "", 0.0)
     estimate = calibration.calibrate(
-        calibration.load(dataset), stages, lambda at, fraction: progress("calibrate", at, fraction), options
+        calibration.load(dataset), stages, lambda at, share: progress("calibrate", at, share), options, plan_next
     )
     calibration.save_estimate(estimate, out)
     return estimate

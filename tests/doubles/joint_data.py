@@ -11,6 +11,7 @@ from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.joints.correction import InputModel, input_model
 from calibration.stages.joints.model import JointModel, exponents
 from tests.doubles import rigid_robot
@@ -25,13 +26,16 @@ def described() -> Description:
     return rigid_robot.described()
 
 
+LAB = Laboratory(mjcf.urdf(), described())
+
+
 def hand() -> HandModel:
     nominal = nominal_hand(chain_of(mjcf.urdf(), described()), np.zeros(12))
     return replace(nominal, offset=OFFSET)
 
 
 def inputs() -> InputModel:
-    return input_model(mjcf.urdf(), described(), hand())
+    return input_model(LAB, hand())
 
 
 def truth(joint: str, terms: Terms, degree: int, rho: float, seed: int) -> JointModel:

@@ -21,10 +21,8 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.numerics.time_delay import coarse_lag, fit_lag
 from calibration.recording.clock import Clock, shared_clock
-from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
-from calibration.robot.chain import Chain, chain_of
-from calibration.robot.floating_base import floating_model
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.clock_fit import TrialLag, allowance, fit_clock
 from calibration.stages.clocks.motions import Motion, plate_motions, robot_motions
 from calibration.stages.clocks.plate_moments import carriers, plate_axes
@@ -35,9 +33,7 @@ _LATE, _FAR = 2e-3, 5.0  # [s] and standard deviations by which a clock declared
 _log = logging.getLogger(__name__)
 
 
-def synchronise(
-    urdf: str, description: Description, trials: Sequence[Trial]
-) -> tuple[tuple[Clock, ...], tuple[Verdict, ...]]:
+def synchronise(lab: Laboratory, trials: Sequence[Trial]) -> tuple[tuple[Clock, ...], tuple[Verdict, ...]]:
     """Clocks of the instruments recorded in these trials, the robot's first.
 
     Raises:
@@ -46,10 +42,10 @@ def synchronise(
     with_robot, with_plate = ([t for t in trials if len(getattr(t, f"t_{name}"))] for name in ("robot", "plate"))
     robot, model, said = None, None, _missing("robot", "no encoder readings")
     if with_robot:
-        robot, model, said = _robot_clock(chain_of(urdf, description), description, with_robot)
+        robot, model, said = _robot_clock(lab, with_robot)
     plate, more = None, _missing("plate", "no force plate")
     if with_plate:
-        plate, more = _plate_clock(urdf, description, with_plate, robot, model)
+        plate, more = _plate_clock(lab, with_plate, robot, model)
     return tuple(c for c in (robot, plate) if c is not None), (*said, *more)
 
 
@@ -58,15 +54,13 @@ def _missing(instrument: str, why: str) -> tuple[Verdict, ...]:
     return (Verdict("clocks", "missing", f"{why}: no {instrument} clock, {lost}"),)
 
 
-def _robot_clock(
-    chain: Chain, description: Description, trials: Sequence[Trial]
-) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
+def _robot_clock(lab: Laboratory, trials: Sequence[Trial]) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
     """The robot's clock, and the provisional robot the plate's is told with."""
-    if "robot" not in description.mocap_clock:
-        return _estimated_robot_clock(chain, description, trials)
+    if "robot" not in lab.description.mocap_clock:
+        return _estimated_robot_clock(lab, trials)
     said: tuple[Verdict, ...] = (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
     try:
-        found = _estimated_robot_clock(chain, description, trials)[0]
+        found = _estimated_robot_clock(lab, trials)[0]
     except NotEnoughData:
         return shared_clock("robot"), None, said
     late = float(found.to_mocap(np.array([found.epoch]))[0]) - found.epoch
@@ -80,8 +74,9 @@ def _robot_clock(
 
 
 def _estimated_robot_clock(
-    chain: Chain, description: Description, trials: Sequence[Trial]
+    lab: Laboratory, trials: Sequence[Trial]
 ) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
+    chain, description = lab.chain, lab.description
     robot, verdicts = _clock("robot", robot_motions(description, chain, trials), 1)
     try:
         model = provisional(chain, description, trials, robot)
@@ -93,13 +88,14 @@ def _estimated_robot_clock(
 
 
 def _plate_clock(
-    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock | None, model: Provisional | None
+    lab: Laboratory, trials: Sequence[Trial], robot: Clock | None, model: Provisional | None
 ) -> tuple[Clock | None, tuple[Verdict, ...]]:
+    description = lab.description
     if "plate" in description.mocap_clock:
         return shared_clock("plate"), (Verdict("clocks", "ok", "plate: on the motion capture's clock"),)
     if robot is None:
         return None, _missing("plate", "the plate's clock is told from encoder readings, and there are none")
-    parts = carriers(floating_model(urdf, description), description, trials)
+    parts = carriers(lab.floating, description, trials)
     motions = list(plate_motions(parts, description, trials, robot, model))
     Q = plate_axes([m.pair for m in motions])
     try:

@@ -20,10 +20,10 @@ from calibration.inference.identifiability import Identifiability, identifiabili
 from calibration.inference.parameters import Model, Parameter, ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.numerics.lie import adjoint, from_vector, inverse, local_twist, to_vector
-from calibration.recording.schema import Description
-from calibration.robot.chain import Chain
-from calibration.robot.nominal_frames import AXES, PREFIX, arm_poses, frame_names, nominal_arm, nominal_frames
+from calibration.robot.laboratory import Laboratory
+from calibration.robot.nominal_frames import AXES, PREFIX, arm_poses, frame_names, nominal_arm
 from calibration.stages.frames.arm_tool_fit import ArmTool, fit_arm_tool, residuals
+from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
 STAGE = "arm_tool"
@@ -31,21 +31,18 @@ _CHI2 = 3.0  # squared whitened residual per degree of freedom from which the ar
 _STRAY = 60.0  # squared distance of a posture over their median from which it is said not to belong [-]
 
 
-def locate_arm(
-    chain: Chain, description: Description, postures: Postures, base_frame: Model | None
-) -> tuple[Model, tuple[Verdict, ...]]:
+def locate_arm(lab: Laboratory, postures: Postures, base_frame: Model | None) -> tuple[Model, tuple[Verdict, ...]]:
     """Model `arm_tool`: `frame.base.<body>`, `frame.base.arm` and `frame.tool.hand`.
 
     Args:
-        chain: Nominal robot.
-        description: Of the dataset.
+        lab: Nominal robot and setup.
         postures: Static ones.
         base_frame: Of stage `base_frame`; None: the base's marker body is where it is drawn, to its tolerance.
 
     Raises:
         NotEnoughData: The arm turns about one axis only.
     """
-    parameters = _parameters(chain, description)
+    chain, parameters = lab.chain, _parameters(lab)
     base, base_covariance, known = _base(parameters, base_frame)
     before = arm_poses(chain, postures.q)
     M = inverse(before) @ from_vector(base) @ postures.T_base_hand
@@ -71,8 +68,8 @@ def locate_arm(
     return model, tuple(_verdicts(found, M, A, stray, seen))
 
 
-def _parameters(chain: Chain, description: Description) -> ParameterSet:
-    frames, tol = nominal_frames(chain, description), description.tolerances
+def _parameters(lab: Laboratory) -> ParameterSet:
+    chain, frames, tol = lab.chain, lab.nominal_frames, lab.description.tolerances
     base, hand = frame_names()
     return ParameterSet(
         tuple(f"{prefix}.{axis}" for prefix in (base, PREFIX, hand) for axis in AXES),
@@ -158,3 +155,11 @@ def _verdicts(
             f"gauge: {18 - seen.rank} of 18 directions are not told apart. A base that stands shows T_base_B^-1 "
             "T_base_arm only; spins and drives (stage base_frame) split it",
         )
+
+
+def _run(data: StageInput) -> StageResult:
+    model, findings = locate_arm(data.lab, data.static, data.model("base_frame"))
+    return StageResult((model,), findings)
+
+
+ARM_TOOL = Stage(STAGE, _run, needs="base_frame")

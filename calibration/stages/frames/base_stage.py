@@ -11,11 +11,12 @@ import numpy as np
 
 from calibration.inference.parameters import Model, Parameter, Status
 from calibration.recording.schema import Description
-from calibration.robot.chain import Chain
-from calibration.robot.nominal_frames import AXES, frame_names, nominal_frames
+from calibration.robot.laboratory import Laboratory
+from calibration.robot.nominal_frames import AXES, frame_names
 from calibration.stages.frames.base_fit import BaseFrame, fit_base_frame
-from calibration.stages.frames.base_rests import Stations
+from calibration.stages.frames.base_rests import Stations, read_stations
 from calibration.stages.frames.heins_baseline import Printed, printed_base_frame
+from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
 STAGE = "base_frame"
@@ -24,13 +25,13 @@ _FEWEST = 4  # rests a spin or drive needs: two give its direction, the rest its
 _CHI2 = 4.0  # squared whitened residual per degree of freedom from which rests are said to differ [-]
 
 
-def locate_base(chain: Chain, description: Description, stations: Stations) -> tuple[Model | None, tuple[Verdict, ...]]:
+def locate_base(lab: Laboratory, stations: Stations) -> tuple[Model | None, tuple[Verdict, ...]]:
     """Model `base_frame` with `frame.base.<body>.*`; None where there is no spin to fit."""
     short = [i for k, i in enumerate(stations.ids) if (stations.trial == k).sum() < _FEWEST]
     if short or "spin" not in stations.kinds:
         message = f"at least {_FEWEST} rests are needed in {short}" if short else "no yaw spin: drives tell no centre"
         return None, (Verdict(STAGE, "missing", f"{message}; spin in steps over a turn, then drive straight"),)
-    nominal, floor = nominal_frames(chain, description)[:6], np.zeros(3)
+    description, nominal, floor = lab.description, lab.nominal_frames[:6], np.zeros(3)
     if description.plates:
         floor = np.array(description.plates[0].centre)
     free = np.array([True, True, bool(description.plates), True, True, "drive" in stations.kinds])
@@ -110,3 +111,13 @@ def _eccentricity(planar: np.ndarray) -> np.ndarray:
     A = np.concatenate([np.column_stack([k, -s, one, zero]), np.column_stack([s, k, zero, one])])
     found: np.ndarray = np.linalg.lstsq(A, -planar[:, :2].T.ravel(), rcond=None)[0][:2]
     return found
+
+
+def _run(data: StageInput) -> StageResult:
+    if not data.moves:
+        return StageResult(findings=(Verdict(STAGE, "missing", "no trial of kind spin: T_base_B stays nominal"),))
+    model, findings = locate_base(data.lab, read_stations(data.lab.description, data.moves))
+    return StageResult(() if model is None else (model,), findings)
+
+
+BASE_FRAME = Stage(STAGE, _run, lacks=lambda data: "")

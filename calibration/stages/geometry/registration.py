@@ -30,6 +30,7 @@ from calibration.robot.hand import HandModel, nominal_hand
 from calibration.stages.geometry.hand_residual import fit_weighted, linearised
 from calibration.stages.geometry.model_of_fit import model_of
 from calibration.stages.geometry.parameters import registration_parameters
+from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
 STAGE = "registration"
@@ -134,3 +135,12 @@ def fit_frames(model: HandModel, q: np.ndarray, T_measured: np.ndarray, descript
         if np.abs(step).max() < _STILL:
             break
     return model
+
+
+def _run(data: StageInput) -> StageResult:
+    postures = data.static if data.passing is None else data.static.joined(data.passing)
+    model, findings = register(data.lab.chain, data.lab.description, postures)
+    return StageResult((model,), findings)
+
+
+REGISTRATION = Stage(STAGE, _run)

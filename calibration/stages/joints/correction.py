@@ -20,10 +20,8 @@ import numpy as np
 
 from calibration.errors import NoSuchElement, ShapeError
 from calibration.numerics.signals import RATE, even, low_passed
-from calibration.recording.schema import Description
-from calibration.robot.chain import chain_of
-from calibration.robot.gravity import Loads, gravity_torques
 from calibration.robot.hand import HandModel
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.joints.model import JointModel
 
 _CUTOFF = 10.0  # [Hz] of the velocity; starts and stops last a tenth of a second
@@ -49,21 +47,21 @@ class InputModel:
     """The nominal robot that turns readings into inputs.
 
     Attributes:
-        loads: Bodies moved by the measured joints, with the declared payload.
-        measured: The joints of the columns of q.
+        lab: The robot with the declared payload.
         offset: (n_measured,) zeros of the motor-side readings [rad, m].
-        description: Of the dataset.
     """
 
-    loads: Loads
-    measured: tuple[str, ...]
+    lab: Laboratory
     offset: np.ndarray
-    description: Description
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """The joints of the columns of q."""
+        return self.lab.chain.measured
 
     def of_trial(self, trial_id: str) -> "InputModel":
         """The robot with the payload of one trial of the dataset; of another trial, the campaign's."""
-        entry = next((t for t in self.description.trials if t.id == trial_id), None)
-        return self if entry is None else replace(self, loads=self.loads.carrying(entry.payload))
+        return replace(self, lab=self.lab.of_trial(trial_id))
 
     def inputs(self, t: np.ndarray, q_motor: np.ndarray, velocity: np.ndarray | None = None) -> JointInputs:
         """Inputs at readings q_motor (n, n_measured) taken at t (n,) [s], every clock will do.
@@ -80,14 +78,14 @@ class InputModel:
             raise ShapeError("q_motor", q_motor.shape, (len(t), len(self.measured)))
         theta = q_motor - self.offset
         v = velocities(t, q_motor) if velocity is None else velocity
-        return JointInputs(theta, gravity_torques(self.loads, theta), v)
+        return JointInputs(theta, self.lab.gravity_torques(theta), v)
 
 
-def input_model(urdf: str, description: Description, hand: HandModel) -> InputModel:
-    """The input model of a dataset, with the zeros of a calibrated hand model."""
-    measured, offset = hand.chain.measured, np.zeros(len(hand.chain.measured))
+def input_model(lab: Laboratory, hand: HandModel) -> InputModel:
+    """The input model of a laboratory, with the zeros of a calibrated hand model."""
+    offset = np.zeros(len(hand.chain.measured))
     offset[hand.chain.columns] = hand.offset
-    return InputModel(chain_of(urdf, description).loads, measured, offset, description)
+    return InputModel(lab, offset)
 
 
 def velocities(t: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -19,15 +19,17 @@ from calibration.inference.parameters import Model, Parameter, Status
 from calibration.numerics.robust_covariance import ENOUGH
 from calibration.options import Terms
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import InputModel, JointModels, input_model
 from calibration.stages.joints.degree_selection import candidates, fit_joint, no_correction, worthwhile
 from calibration.stages.joints.hand_selection import nearest_hand
 from calibration.stages.joints.model import JointModel
 from calibration.stages.joints.samples import Samples, link_zeros, pooled, samples_of
 from calibration.stages.joints.separable_fit import RHO, limit_of
+from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
 from calibration.verdict import Verdict
 
 TERMS: Terms = "total"
@@ -36,19 +38,18 @@ STAGE = "joints"
 
 
 def fit_joint_models(
-    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, terms: Terms = TERMS
+    lab: Laboratory, trials: Sequence[Trial], robot: Clock, hand: HandModel, terms: Terms = TERMS
 ) -> tuple[JointModels, tuple[Verdict, ...]]:
     """The joint models, and what is to be said of them; without link encoders or rests, none.
 
     Args:
-        urdf: Nominal robot.
-        description: Of the dataset.
+        lab: Nominal robot and setup.
         trials: Calibration trials.
         robot: The robot's clock.
         hand: The calibrated geometry, whose zeros say what angle a reading means.
         terms: Which monomials a degree means.
     """
-    inputs = input_model(urdf, description, hand)
+    inputs, description = input_model(lab, hand), lab.description
     try:
         zero = link_zeros(trials, robot)
     except NotEnoughData as error:
@@ -188,3 +189,26 @@ def _status(name: str, rho: float) -> Status:
     """At a limit of its search rho is where the search ended, and at the lowest no flank is told apart."""
     limit = limit_of(rho)
     return "not_identifiable" if limit == "lowest" or (limit and name == "rho") else "estimated"
+
+
+def _run(data: StageInput) -> StageResult:
+    """Joint models beside the geometry; none where an earlier result was rejected."""
+    geometry, robot = data.model("model_2"), data.clock("robot")
+    if data.rejected or geometry is None:
+        return StageResult()
+    if robot is None:
+        raise NotEnoughData("no robot clock")
+    hand = hand_of(geometry, data.lab.chain, data.lab.nominal_frames)
+    found, findings = fit_joint_models(data.lab, data.trials, robot, hand, data.options.terms)
+    if not found.models:
+        return StageResult(findings=findings)
+    return StageResult((joints_model(geometry, found.models),), findings, found)
+
+
+def _lacks(data: StageInput) -> str:
+    if data.postures is not None and data.clock("robot") is None:
+        return "posture means have no link encoders; record motor and link readings continuously"
+    return has_postures(data)
+
+
+JOINTS = Stage(STAGE, _run, _lacks, needs="geometry")

@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
@@ -29,9 +28,7 @@ from calibration.numerics.signals import CUTOFF, RATE, even, low_passed
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
-from calibration.robot.chain import chain_of
-from calibration.robot.floating_base import floating_model
-from calibration.robot.nominal_frames import nominal_base_body
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.suspension.floor_wrench import Load, dynamics_load, plate_load
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 
@@ -125,22 +122,20 @@ def _tangent(rest: np.ndarray, load: Load) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Laboratory:
-    """What turns a trial into wrenches and displacements.
+class WrenchSources:
+    """The instruments that show the wrench on the floor.
 
     Attributes:
-        description: Of the dataset.
-        model: Nominal floating-base model.
-        T_base_B: (4, 4) the base's marker body on the base.
+        lab: The nominal robot and its setup.
         robot: Clock of the encoders, None where there are none.
         plate: Clock of the force plate, None where there is none.
+        T_base_B: (4, 4) the base's marker body on the base.
     """
 
-    description: Description
-    model: pin.Model
-    T_base_B: np.ndarray
+    lab: Laboratory
     robot: Clock | None
     plate: Clock | None
+    T_base_B: np.ndarray
 
     def plate_load(self, trial: Trial, T_lab_0: np.ndarray) -> Load:
         """The wrench the plate measured.
@@ -160,7 +155,7 @@ class Laboratory:
         """
         if self.robot is None or len(trial.t_robot) == 0:
             raise NotEnoughData(f"{trial.id}: no encoder readings on a known clock")
-        return dynamics_load(self.model, self.description, trial, self.robot, T_lab_0)
+        return dynamics_load(self.lab, trial, self.robot, T_lab_0)
 
 
 @dataclass(frozen=True)
@@ -187,25 +182,24 @@ class Sways:
 
 def laboratory(
     urdf: str, description: Description, robot: Clock | None, plate: Clock | None, T_base_B: np.ndarray | None = None
-) -> Laboratory:
-    """The laboratory of a dataset; the marker body where it is drawn, unless T_base_B says otherwise."""
-    if T_base_B is None:
-        T_base_B = nominal_base_body(chain_of(urdf, description), description)
-    return Laboratory(description, floating_model(urdf, description), T_base_B, robot, plate)
+) -> WrenchSources:
+    """Sources of the wrench in a dataset; the marker body at its nominal place, unless T_base_B says otherwise."""
+    lab = Laboratory(urdf, description)
+    return WrenchSources(lab, robot, plate, lab.T_base_B if T_base_B is None else T_base_B)
 
 
-def read_sways(lab: Laboratory, trials: Sequence[Trial]) -> Sways:
+def read_sways(wrenches: WrenchSources, trials: Sequence[Trial]) -> Sways:
     """Sways of the trials that show the base and its wrench, by every instrument the campaign has."""
     sources: dict[str, Callable[[Trial, np.ndarray], Load]] = {}
-    if lab.robot is not None and any(len(t.t_robot) for t in trials):
-        sources["dynamics"] = lab.dynamics_load
-    if lab.plate is not None and any(len(t.t_plate) for t in trials):
-        sources["plate"] = lab.plate_load
-    rows = []
+    if wrenches.robot is not None and any(len(t.t_robot) for t in trials):
+        sources["dynamics"] = wrenches.dynamics_load
+    if wrenches.plate is not None and any(len(t.t_plate) for t in trials):
+        sources["plate"] = wrenches.plate_load
+    rows, description = [], wrenches.lab.description
     for trial in trials:
         try:
-            rest = rest_of(lab.description, trial, lab.T_base_B)
-            rows.append([sway_of(lab.description, trial, rest, load(trial, rest.T_lab_0)) for load in sources.values()])
+            rest = rest_of(description, trial, wrenches.T_base_B)
+            rows.append([sway_of(description, trial, rest, load(trial, rest.T_lab_0)) for load in sources.values()])
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
     columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(sources)}

@@ -24,6 +24,7 @@ from calibration.numerics.wrench import in_frame
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
+from calibration.robot.laboratory import Laboratory
 
 _DECIMATED = 0.005  # [s] plate samples averaged together
 _MASS_SAMPLES = 20  # configurations the inertia is averaged over
@@ -63,10 +64,9 @@ def floor_load(t: np.ndarray, w: np.ndarray, T_lab_0: np.ndarray, centre: np.nda
     return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3), T_0_plate)
 
 
-def dynamics_load(
-    model: pin.Model, description: Description, trial: Trial, robot: Clock, T_lab_0: np.ndarray, cutoff: float = CUTOFF
-) -> Load:
-    """What a floating model (see `inverse_dynamics.floating_model`) does along q_motor, its base standing still."""
+def dynamics_load(lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarray, cutoff: float = CUTOFF) -> Load:
+    """What the nominal robot does along q_motor, its base standing still."""
+    model, description = lab.floating, lab.description
     order = [description.joint_names.index(name) for name in list(model.names)[2:]]
     q = low_passed(even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order]), cutoff)
     spline = CubicSpline(q.t, q.x)

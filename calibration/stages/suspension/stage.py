@@ -18,7 +18,9 @@ from calibration.inference.parameters import Combination, Model
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
-from calibration.stages.suspension.base_response import Laboratory, Sway, Sways, laboratory, read_sways
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.stage import Stage, StageInput, StageResult
+from calibration.stages.suspension.base_response import Sway, Sways, WrenchSources, read_sways
 from calibration.stages.suspension.checks import STAGE, moved_bases, wrong_plate
 from calibration.stages.suspension.cross_validation import HeldOut, held_out
 from calibration.stages.suspension.form_selection import (
@@ -50,8 +52,7 @@ class Form:
 
 
 def fit_suspension(
-    urdf: str,
-    description: Description,
+    lab: Laboratory,
     trials: Sequence[Trial],
     robot: Clock | None,
     plate: Clock | None,
@@ -62,9 +63,9 @@ def fit_suspension(
 
     T_base_B (4, 4) places the base's marker body on the base; nominal where it is not given.
     """
-    lab = laboratory(urdf, description, robot, plate, T_base_B)
-    sways = read_sways(lab, trials)
-    found = list(wrong_plate(description, *sways.forcings)) if sways.plate else []
+    sources = WrenchSources(lab, robot, plate, lab.T_base_B if T_base_B is None else T_base_B)
+    sways = read_sways(sources, trials)
+    found = list(wrong_plate(lab.description, *sways.forcings)) if sways.plate else []
     moved = moved_bases(sways.dynamics or sways.plate)
     told = ", ".join(f"{name} by {how}" for name, how in moved.items())
     if moved:
@@ -79,16 +80,16 @@ def fit_suspension(
         return None, tuple(found)
     if not sways.plate:
         found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
-    suspension, said = _fitted(lab, sways, form or Form())
+    suspension, said = _fitted(lab.description, sways, form or Form())
     return suspension, (*found, *said)
 
 
-def _fitted(lab: Laboratory, sways: Sways, form: Form) -> tuple[Suspension, list[Verdict]]:
+def _fitted(description: Description, sways: Sways, form: Form) -> tuple[Suspension, list[Verdict]]:
     used = sways.plate or sways.dynamics
-    springs = compliance_springs(lab.description, used, form.coupled)
+    springs = compliance_springs(description, used, form.coupled)
     said = []
-    if lab.description.wheels and sways.plate:
-        springs, verdict = _chosen(lab.description, used, form, springs)
+    if description.wheels and sways.plate:
+        springs, verdict = _chosen(description, used, form, springs)
         said.append(verdict)
     sources: list[tuple[Source, tuple[Sway, ...]]] = [("plate", sways.plate), ("dynamics", sways.dynamics)]
     tried = tuple((s, held_out(rows, springs.folds.__getitem__)) for s, rows in sources if rows)
@@ -154,3 +155,16 @@ def suspension_model(suspension: Suspension) -> Model:
     """Row `model_1`: the suspension's parameters; what has no sigma is not known."""
     sigma = np.nan_to_num([p.sigma for p in suspension.parameters], nan=0.0)
     return Model("model_1", suspension.parameters, suspension.combinations, np.diag(sigma**2))
+
+
+def _run(data: StageInput) -> StageResult:
+    form = Form(full=data.options.suspension == "full")
+    found, findings = fit_suspension(data.lab, data.trials, data.clock("robot"), data.clock("plate"), form=form)
+    return StageResult(() if found is None else (suspension_model(found),), findings, found)
+
+
+def _lacks(data: StageInput) -> str:
+    return "" if data.trials else "posture means show no motion; record base and plate continuously"
+
+
+SUSPENSION = Stage(STAGE, _run, _lacks)

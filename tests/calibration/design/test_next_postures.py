@@ -16,6 +16,7 @@ from calibration.numerics.lie import exp6
 from calibration.recording.experiment import read_plans
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.frames.base_stage import locate_base
 from calibration.stages.geometry.hand_residual import linearised
 from calibration.stages.geometry.parameters import geometry_parameters, play_start
@@ -28,6 +29,7 @@ from calibration.stages.suspension.wheels import KNOWN, jackknife
 from tests.doubles import rigid_robot, spinning_base
 
 DESCRIBED = rigid_robot.described()
+LAB = Laboratory(mjcf.urdf(), DESCRIBED)
 TRUTH = rigid_robot.defects(3)
 NOISE = 10.0  # of the markers, over the datasheet's
 
@@ -148,18 +150,18 @@ def test_a_missing_drive_is_asked_for_and_tells_what_it_should(chain):
     """Predicted from the spin alone; then driven."""
     rng = np.random.default_rng(0)
     spun = spinning_base.stations(*spinning_base.path(drives=0), spinning_base.SIGMA, rng)
-    model, _ = locate_base(chain, DESCRIBED, spun)
-    remedy, said = drive_next(chain, DESCRIBED, spun, model)
+    model, _ = locate_base(LAB, spun)
+    remedy, said = drive_next(LAB, spun, model)
     assert [m.kind for m in remedy.motions] == ["drive"] and said[0].verdict == "warning"
     heading = next(s for s in remedy.sigma if s.name.endswith("rz"))
     assert heading.before == pytest.approx(DESCRIBED.tolerances.body_rotation)
-    both, _ = locate_base(chain, DESCRIBED, spinning_base.stations(*spinning_base.path(), spinning_base.SIGMA, rng))
+    both, _ = locate_base(LAB, spinning_base.stations(*spinning_base.path(), spinning_base.SIGMA, rng))
     assert heading.after == pytest.approx(both.parameters[5].sigma, rel=0.4)
-    assert drive_next(chain, DESCRIBED, spinning_base.stations(*spinning_base.path()), both) == (None, ())
+    assert drive_next(LAB, spinning_base.stations(*spinning_base.path()), both) == (None, ())
 
 
 def test_no_motion_of_the_base_at_all_asks_for_both(chain):
-    remedy, _ = drive_next(chain, DESCRIBED, None, None)
+    remedy, _ = drive_next(LAB, None, None)
     assert [m.kind for m in remedy.motions] == ["spin", "drive"]
     assert {s.name[-2:] for s in remedy.sigma} >= {".x", ".y", "rz"}
     assert all(s.after < 0.1 * s.before for s in remedy.sigma if s.name[-2:] in (".x", ".y", "rz"))
@@ -167,7 +169,7 @@ def test_no_motion_of_the_base_at_all_asks_for_both(chain):
 
 def test_the_estimate_keeps_them_as_a_file(chain, suggested, tmp_path):
     names = RobotNames(chain.measured, chain.base_frame, chain.tool_frame)
-    remedies = (suggested[0], drive_next(chain, DESCRIBED, None, None)[0])
+    remedies = (suggested[0], drive_next(LAB, None, None)[0])
     estimate = Estimate("not_calibrated", (), (), (), "", mjcf.urdf(), names, remedies=remedies)
     save_estimate(estimate, tmp_path)
     assert read_plans(tmp_path / "record_next.yaml") == (chain.measured, remedies)

@@ -16,6 +16,7 @@ from calibration.recording.clock import shared_clock
 from calibration.recording.schema import Payload
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
+from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.wrist_load import Hanging, drawn, weigh, weighed
 from tests.doubles import rigid_robot
@@ -70,13 +71,13 @@ def test_postures_that_do_not_turn_the_sensor_against_gravity_are_refused():
 
 def test_the_drawing_is_all_mass_beyond_the_sensor_and_the_payload():
     description = rigid_robot.described()
-    none = drawn(mjcf.urdf(), description, LINK)
+    none = drawn(Laboratory(mjcf.urdf(), description), LINK)
     model = pin.buildModelFromXML(mjcf.urdf())
     masses = {"wrist_ft_tool_link": 0.1, "gripper_link": 0.60266}
     fingers = sum(model.inertias[model.getJointId(f"gripper_{s}_finger_joint")].mass for s in ("left", "right"))
     assert none.mass == pytest.approx(sum(masses.values()) + fingers, abs=1e-9)
     load = Payload(link="gripper_grasping_frame", mass=0.5, com=(0.0, 0.0, 0.0), tolerance=0.05)
-    more = drawn(mjcf.urdf(), description.model_copy(update={"payload": load}), LINK).less(none)
+    more = drawn(Laboratory(mjcf.urdf(), description.model_copy(update={"payload": load})), LINK).less(none)
     assert more.mass == pytest.approx(0.5)
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
@@ -98,7 +99,7 @@ def recorded(undeclared: float):
     truth = replace(rigid_robot.Truth(), robot=(0.0, 0.0))
     trial = rigid_robot.record(truth, motor, 0.0, rng, dwells)
     chain = chain_of(mjcf.urdf(), description)
-    nominal = drawn(mjcf.urdf(), description, LINK)
+    nominal = drawn(Laboratory(mjcf.urdf(), description), LINK)
     R = chain.poses(trial.q_motor, LINK)[:, :3, :3]
     at = np.array([0.0, 0.02, 0.15])
     m = nominal.mass + undeclared
@@ -115,8 +116,7 @@ def recorded(undeclared: float):
 def test_a_load_nobody_declared_is_told_with_what_to_declare(undeclared, verdict, words):
     description, trial, hand = recorded(undeclared)
     (said,) = weighed(
-        mjcf.urdf(),
-        description,
+        Laboratory(mjcf.urdf(), description),
         [trial],
         shared_clock("robot"),
         hand,
@@ -131,8 +131,7 @@ def test_a_wrist_without_a_link_or_a_static_posture_is_said_not_to_be_used():
     moving = replace(trial, dwell_start=np.zeros(0), dwell_stop=np.zeros(0), approach=np.zeros((0, 8)))
     for one, t, words in ((nameless, trial, "wrist_link"), (description, moving, "no static posture")):
         (said,) = weighed(
-            mjcf.urdf(),
-            one,
+            Laboratory(mjcf.urdf(), one),
             [t],
             shared_clock("robot"),
             hand,
@@ -142,8 +141,7 @@ def test_a_wrist_without_a_link_or_a_static_posture_is_said_not_to_be_used():
     silent = replace(trial, wrist_wrench=np.full((len(trial.t_robot), 6), np.nan))
     assert (
         weighed(
-            mjcf.urdf(),
-            description,
+            Laboratory(mjcf.urdf(), description),
             [silent],
             shared_clock("robot"),
             hand,
@@ -167,6 +165,6 @@ def test_what_a_finger_carries_is_weighed_once():
         f'<origin xyz="0 0 0.1"/>{limit}</joint>'
         for kind, (a, b) in zip(kinds, pairwise(masses), strict=True)
     )
-    found = drawn(f'<robot name="r">{links}{joints}</robot>', rigid_robot.described(), "sensor")
+    found = drawn(Laboratory(f'<robot name="r">{links}{joints}</robot>', rigid_robot.described()), "sensor")
     assert found.mass == pytest.approx(1.25)
     assert found.moment[2] == pytest.approx(1.0 * 0.11 + 0.2 * 0.21 + 0.05 * 0.31)

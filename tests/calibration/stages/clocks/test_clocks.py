@@ -9,6 +9,7 @@ from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE, Signal, body_rates, even, low_passed, play
 from calibration.numerics.time_delay import Lag, Pair, coarse_lag, fit_lag
 from calibration.recording.clock import Clock
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.clock_fit import TrialLag, fit_clock
 from calibration.stages.clocks.stage import synchronise
 from tests.doubles import geared_robot, rigid_robot
@@ -33,7 +34,7 @@ def pair(y, x, z=None, u=None):
 
 def test_the_plate_clock_is_told_by_masses_that_move(dataset, truth):
     trials = [trial for _, trial in dataset.trials("calibration")]
-    clocks, verdicts = synchronise(dataset.urdf, dataset.description, trials)
+    clocks, verdicts = synchronise(Laboratory(dataset.urdf, dataset.description), trials)
     assert [c.instrument for c in clocks] == ["robot", "plate"]
     t = np.linspace(12.0, 200.0, 5)
     assert np.sqrt((error_ms(clocks[1], truth.plate, t) ** 2).mean()) <= 1.0
@@ -47,7 +48,7 @@ def test_statics_and_swings_give_the_robot_clock_to_200_us_behind_gears_that_gra
         replace(geared_robot.record(truth, drives, postures, 12.0, rng, dwells=dwells), id="postures"),
         replace(geared_robot.record(truth, drives, geared_robot.swing(rng, 20.0), 100.0, rng), id="swing"),
     ]
-    clock = synchronise(mjcf.urdf(), rigid_robot.described(), trials)[0][0]
+    clock = synchronise(Laboratory(mjcf.urdf(), rigid_robot.described()), trials)[0][0]
     assert np.sqrt((error_ms(clock, truth.robot, np.linspace(12.0, 125.0, 5)) ** 2).mean()) <= 0.2
 
 
@@ -60,7 +61,7 @@ def sweeps(truth, n, seed=0):
 
 
 def test_a_campaign_of_sweeps_gives_the_robot_clock_to_300_us(truth):
-    clocks, verdicts = synchronise(mjcf.urdf(), rigid_robot.described(), sweeps(truth, 14))
+    clocks, verdicts = synchronise(Laboratory(mjcf.urdf(), rigid_robot.described()), sweeps(truth, 14))
     t = np.linspace(12.0, 12.0 + 60.0 * 14, 8)
     assert np.sqrt((error_ms(clocks[0], truth.robot, t) ** 2).mean()) <= 0.3
     assert "no force plate" in verdicts[-1].message
@@ -69,7 +70,7 @@ def test_a_campaign_of_sweeps_gives_the_robot_clock_to_300_us(truth):
 def test_one_trial_whose_clock_jumped_does_not_matter_and_is_named(truth):
     trials = sweeps(truth, 7)
     trials[3] = replace(trials[3], t_robot=trials[3].t_robot + 0.05)
-    clocks, verdicts = synchronise(mjcf.urdf(), rigid_robot.described(), trials)
+    clocks, verdicts = synchronise(Laboratory(mjcf.urdf(), rigid_robot.described()), trials)
     assert np.abs(error_ms(clocks[0], truth.robot, np.array([200.0]))).max() <= 0.5
     assert any(v.verdict == "warning" and "sweep3" in v.message for v in verdicts)
 
@@ -78,7 +79,7 @@ def test_a_robot_that_stands_still_has_no_clock(truth, caplog):
     still = np.repeat(rigid_robot.CENTRE[None], 4000, axis=0)
     trial = rigid_robot.record(truth, still, 12.0, np.random.default_rng(0))
     with caplog.at_level(logging.INFO), pytest.raises(NotEnoughData, match="arm motion"):
-        synchronise(mjcf.urdf(), rigid_robot.described(), [trial])
+        synchronise(Laboratory(mjcf.urdf(), rigid_robot.described()), [trial])
 
 
 @pytest.mark.parametrize("true_lag", [3.9, -0.0123, -7.0])

@@ -8,6 +8,7 @@ from scipy.stats import binom
 
 import mjcf
 from calibration.recording.clock import Clock
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.stage import synchronise
 from tests.doubles import geared_robot, rigid_robot
 
@@ -25,7 +26,7 @@ def found_clock(
     drives = geared_robot.gears(rng)
     motor, dwells = (geared_robot.swing(rng, seconds), None) if kind == "swing" else geared_robot.statics(rng, 20)
     trial = geared_robot.record(truth, drives, motor, 12.0, rng, JITTER, dwells)
-    clocks, _ = synchronise(URDF, DESCRIPTION, [trial])
+    clocks, _ = synchronise(Laboratory(URDF, DESCRIPTION), [trial])
     return clocks[0], truth, np.linspace(trial.t_mocap[0], trial.t_mocap[-1], 20)
 
 
@@ -75,7 +76,7 @@ def test_a_clock_said_to_be_shared_is_checked(latency):
     truth = replace(rigid_robot.defects(0), robot=(-latency, 0.0))
     trial = geared_robot.record(truth, geared_robot.gears(rng), geared_robot.swing(rng, 20.0), 12.0, rng)
     description = rigid_robot.described(mocap_clock=["robot"])
-    (clock,), verdicts = synchronise(URDF, description, [trial])
+    (clock,), verdicts = synchronise(Laboratory(URDF, description), [trial])
     assert (clock.offset, clock.drift) == (0.0, 0.0)
     told = [v.message for v in verdicts if v.verdict == "warning"]
     assert len(told) == (latency > 0.0)

@@ -13,6 +13,7 @@ from calibration.numerics.alignment import start
 from calibration.numerics.lie import exp6, from_vector, inverse, log6, to_vector
 from calibration.prediction.compensator import Compensator
 from calibration.robot.chain import chain_of
+from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import arm_poses, as_placements, first_joint, nominal_arm, placement_derivative
 from calibration.stages.frames.arm_tool_fit import fit_arm_tool, residuals
 from calibration.stages.frames.arm_tool_stage import locate_arm
@@ -23,6 +24,7 @@ N = 20
 X = exp6(np.array([0.3, -2.0, 0.1, 0.4, 2.5, 0.3]))
 Y = exp6(np.array([0.03, -0.2, 0.1, 0.4, -2.5, 0.3]))
 DESCRIBED = rigid_robot.described()
+LAB = Laboratory(mjcf.urdf(), DESCRIBED)
 BASE = spinning_base.TRUE
 DELTA = exp6(np.array([6e-3, -4e-3, 5e-3, 8e-3, -12e-3, 10e-3]))
 HAND = np.array([3e-3, 2e-3, -4e-3, 20e-3, -10e-3, 15e-3])
@@ -162,11 +164,11 @@ def postures(chain, q, rng=None, size=1e-6):
 
 @pytest.fixture(scope="module")
 def base_frame(chain):
-    return locate_base(chain, DESCRIBED, spinning_base.stations(*spinning_base.path()))[0]
+    return locate_base(LAB, spinning_base.stations(*spinning_base.path()))[0]
 
 
 def test_spins_split_what_a_standing_base_cannot(chain, q, base_frame):
-    model, said = locate_arm(chain, DESCRIBED, postures(chain, q), base_frame)
+    model, said = locate_arm(LAB, postures(chain, q), base_frame)
     values = np.array([p.value for p in model.parameters])
     np.testing.assert_allclose(values[:6], BASE, atol=1e-10)
     np.testing.assert_allclose(from_vector(values[6:12]), nominal_arm(chain) @ DELTA, atol=1e-10)
@@ -176,7 +178,7 @@ def test_spins_split_what_a_standing_base_cannot(chain, q, base_frame):
 
 
 def test_the_gauge_is_reported_where_the_base_only_stood(chain, q):
-    model, said = locate_arm(chain, DESCRIBED, postures(chain, q), None)
+    model, said = locate_arm(LAB, postures(chain, q), None)
     assert model.rank == 12
     status = {p.name: p.status for p in model.parameters}
     assert all(status[f"frame.tool.hand.{a}"] == "estimated" for a in ("x", "y", "z", "rx", "ry", "rz"))
@@ -192,10 +194,8 @@ def test_the_models_covariance_is_that_of_its_errors(chain, q, base_frame):
     z = []
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        spun = locate_base(
-            chain, DESCRIBED, spinning_base.stations(*spinning_base.path(3e-4, rng=rng), spinning_base.SIGMA, rng)
-        )[0]
-        model, _ = locate_arm(chain, DESCRIBED, postures(chain, q, rng, 3e-5), spun)
+        spun = locate_base(LAB, spinning_base.stations(*spinning_base.path(3e-4, rng=rng), spinning_base.SIGMA, rng))[0]
+        model, _ = locate_arm(LAB, postures(chain, q, rng, 3e-5), spun)
         e = np.array([p.value for p in model.parameters]) - true
         z.append(e / np.array([p.sigma for p in model.parameters]))
     freely = [0, 1, 5, 6, 7, 11, *range(12, 18)]  # height and tilt carry the standing base's tolerance, not drawn here
@@ -206,14 +206,14 @@ def test_the_models_covariance_is_that_of_its_errors(chain, q, base_frame):
 def test_an_arm_that_is_not_the_factorys_is_told(chain, q, base_frame):
     data = postures(chain, q)
     bent = postures(chain, q + 2e-3 * np.random.default_rng(0).normal(size=q.shape))
-    model, said = locate_arm(chain, DESCRIBED, replace(bent, q=data.q), base_frame)
+    model, said = locate_arm(LAB, replace(bent, q=data.q), base_frame)
     assert any(v.verdict == "warning" and "not as the factory drew it" in v.message for v in said)
     assert min(p.sigma for p in model.parameters[12:]) > 1e-4
 
 
 def test_the_hand_is_predicted_by_the_same_numbers(chain, q, base_frame):
     """Model, URDF and `Compensator` speak of one robot, and its uncertainty does not hang on the base's gauge."""
-    model, _ = locate_arm(chain, DESCRIBED, postures(chain, q), base_frame)
+    model, _ = locate_arm(LAB, postures(chain, q), base_frame)
     names = RobotNames(chain.measured, chain.base_frame, chain.tool_frame)
     robot = Compensator.of(Estimate("calibrated", (), (), (model,), "arm_tool", mjcf.urdf(), names))
     np.testing.assert_allclose(robot.hand.poses(q), postures(chain, q).T_base_hand, atol=1e-10)

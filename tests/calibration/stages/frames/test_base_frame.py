@@ -7,7 +7,7 @@ import pytest
 
 import mjcf
 from calibration.numerics.lie import from_vector, to_vector
-from calibration.robot.chain import chain_of
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.frames.base_fit import fit_base_frame, ties
 from calibration.stages.frames.base_rests import Common, Stations, residuals
 from calibration.stages.frames.base_stage import STANDING, locate_base
@@ -137,14 +137,12 @@ def test_an_offset_constant_in_the_world_gives_a_mean_and_no_centre():
 
 @pytest.fixture(scope="module")
 def robot():
-    described = rigid_robot.described()
-    return chain_of(mjcf.urdf(), described), described
+    return Laboratory(mjcf.urdf(), rigid_robot.described())
 
 
 def test_the_stage_names_what_it_found_and_what_it_took_on_trust(robot):
-    chain, described = robot
     data = replace(stations(*path()), ids=("round", "ahead"))
-    model, said = locate_base(chain, described, data)
+    model, said = locate_base(robot, data)
     assert [p.name for p in model.parameters] == [f"frame.base.base.{a}" for a in ("x", "y", "z", "rx", "ry", "rz")]
     assert {p.status for p in model.parameters} == {"estimated"}
     sigma = np.array([p.sigma for p in model.parameters])
@@ -154,15 +152,15 @@ def test_the_stage_names_what_it_found_and_what_it_took_on_trust(robot):
 
 
 def test_without_a_drive_the_heading_stays_as_drawn(robot):
-    model, said = locate_base(*robot, stations(*path(drives=0)))
+    model, said = locate_base(robot, stations(*path(drives=0)))
     heading = model.parameters[5]
     assert (heading.status, heading.value) == ("not_identifiable", heading.nominal)
     assert any(v.verdict == "warning" and "heading: no drive" in v.message for v in said)
 
 
 def test_without_a_plate_the_height_stays_as_drawn(robot):
-    chain, described = robot
-    model, said = locate_base(chain, described.model_copy(update={"plates": ()}), stations(*path()))
+    plateless = robot.description.model_copy(update={"plates": ()})
+    model, said = locate_base(replace(robot, description=plateless), stations(*path()))
     assert model.parameters[2].status == "not_identifiable"
     assert any("height" in v.message for v in said if v.verdict == "warning")
 
@@ -170,9 +168,9 @@ def test_without_a_plate_the_height_stays_as_drawn(robot):
 def test_a_spin_of_a_few_degrees_is_refused(robot):
     rng = np.random.default_rng(0)
     data = stations(*path(2e-4, rng=rng, span=0.15), SIGMA, rng)
-    assert [v.verdict for v in locate_base(*robot, data)[1]].count("refused") > 0
+    assert [v.verdict for v in locate_base(robot, data)[1]].count("refused") > 0
 
 
 def test_a_spin_of_three_rests_is_not_enough(robot):
-    model, said = locate_base(*robot, stations(*path(spins=3)))
+    model, said = locate_base(robot, stations(*path(spins=3)))
     assert model is None and said[0].verdict == "missing" and "spin" in said[0].message

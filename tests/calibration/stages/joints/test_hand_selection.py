@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import mjcf
 from calibration import Dataset, Estimate
 from calibration.evaluation import joint_regimes
 from calibration.evaluation.joint_regimes import on_repetitions, on_validation
@@ -74,7 +73,7 @@ def test_play_is_explained_in_motion_and_not_at_rest(monkeypatch: pytest.MonkeyP
     data = [joint_data.recorded(f"t{k}", q, lost_in_play(q)) for k, q in enumerate(moving)]
     rests = [joint_data.recorded(name, static[::5], lost_in_play(static[::5]), dwells) for name in ("a", "b")]
     calibration, validation = [*data[:-2], rests[0]], [*data[-2:], rests[1]]
-    models, _ = fit_joint_models(mjcf.urdf(), joint_data.described(), calibration, ROBOT, joint_data.hand())
+    models, _ = fit_joint_models(joint_data.LAB, calibration, ROBOT, joint_data.hand())
     found = {x.regime: x for x in on_repetitions(models, calibration, "total") if x.joint == "arm_6_joint"}
     found |= {x.regime: x for x in on_validation(models, validation, ROBOT) if x.joint == "arm_6_joint"}
     assert found["repetition"].cut > 0.6
@@ -96,7 +95,7 @@ def test_a_start_is_no_repetition_and_is_told_apart(monkeypatch: pytest.MonkeyPa
         data.append(joint_data.recorded(f"t{k}", q, y))
     still = np.repeat(rigid_robot.CENTRE[None], 400, axis=0)
     data.append(joint_data.recorded("rest", still, lost_in_play(still), np.array([[0.5, 3.5]])))
-    models, _ = fit_joint_models(mjcf.urdf(), joint_data.described(), data, ROBOT, joint_data.hand())
+    models, _ = fit_joint_models(joint_data.LAB, data, ROBOT, joint_data.hand())
     found = {x.regime: x for x in on_repetitions(models, data, "total") if x.joint == "arm_6_joint"}
     assert found["repetition"].cut > 0.6
     assert found["start_stop"].cut < 0.3
@@ -137,7 +136,7 @@ def test_regimes_leave_out_joints_that_are_not_excited(monkeypatch: pytest.Monke
         q = trial.q_motor.copy()
         q[:, ARM_7] = 0.1
         still.append(replace(trial, q_motor=q, q_link=q - joint_data.ZERO))
-    models, _ = fit_joint_models(mjcf.urdf(), joint_data.described(), still, ROBOT, joint_data.hand())
+    models, _ = fit_joint_models(joint_data.LAB, still, ROBOT, joint_data.hand())
     told = {x.joint for x in (*on_repetitions(models, still, "total"), *on_validation(models, still, ROBOT))}
     assert "arm_7_joint" not in told
     assert "torso_lift_joint" not in told

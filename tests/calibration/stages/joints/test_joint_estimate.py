@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mjcf
-from calibration import Dataset, Estimate, calibrate, load_estimate, pipeline, save_estimate
+from calibration import Dataset, Estimate, calibrate, load_estimate, save_estimate
 from calibration.options import Options
 from calibration.prediction.predictor import Predictor
 from calibration.recording.schema import Description
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.joints import stage
 from calibration.stages.joints.correction import JointModels, input_model
 from calibration.stages.joints.model import JointModel
 from calibration.stages.joints.separable_fit import RHO
@@ -45,7 +46,7 @@ def test_a_trial_s_own_payload_reaches_the_joint_models(dataset: Dataset) -> Non
     turned = {}
     for mass in (0.437, 2.0):
         description = loaded(dataset, mass)
-        inputs = input_model(dataset.urdf, description, hand)
+        inputs = input_model(Laboratory(dataset.urdf, description), hand)
         joints = JointModels(inputs, np.zeros(len(inputs.measured)), (yielding("arm_4_joint"),))
         predict = Predictor({"model_3": hand}, dataset.urdf, description, ROBOT, joints=joints)
         turned[mass] = predict.positions("model_3", "motor", trial)[:, ARM_4]
@@ -69,9 +70,7 @@ def test_a_rho_at_its_limit_is_not_identifiable(
     estimate: Estimate, rho: float, verdict: str, statuses: set[str]
 ) -> None:
     truth = joint_data.truth("arm_6_joint", "total", 1, rho, 2)
-    models, said = fit_joint_models(
-        mjcf.urdf(), joint_data.described(), joint_data.made([truth]), ROBOT, joint_data.hand()
-    )
+    models, said = fit_joint_models(joint_data.LAB, joint_data.made([truth]), ROBOT, joint_data.hand())
     model = joints_model(estimate.model("model_2"), models.models)
     found = {p.name: p for p in model.parameters if p.name.startswith("sigmoid.arm_6_joint")}
     of_rho = found.pop("sigmoid.arm_6_joint.rho")
@@ -96,7 +95,7 @@ def test_the_chosen_terms_are_used_and_recorded(
         asked.append(arguments[-1])
         return fit_joint_models(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(pipeline, "fit_joint_models", fit)
+    monkeypatch.setattr(stage, "fit_joint_models", fit)
     options = Options("printed", "full")
     estimate = calibrate(dataset, ["joints"], options=options)
     assert (asked, estimate.options) == (["printed"], options)

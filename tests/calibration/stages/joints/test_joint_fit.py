@@ -8,6 +8,7 @@ import pytest
 import mjcf
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.joints.correction import correct, input_model
 from calibration.stages.joints.degree_selection import candidates, fit_joint, worthwhile
 from calibration.stages.joints.model import JointModel
@@ -33,7 +34,7 @@ def trials(truths: list[JointModel]) -> list[Trial]:
 
 
 def fitted(trials: list[Trial]) -> tuple:
-    return fit_joint_models(mjcf.urdf(), joint_data.described(), trials, ROBOT, joint_data.hand())
+    return fit_joint_models(joint_data.LAB, trials, ROBOT, joint_data.hand())
 
 
 @pytest.fixture(scope="module")
@@ -211,7 +212,7 @@ def test_a_trial_carries_its_own_payload() -> None:
     data = rigid_robot.description([], payload={
         "link": "gripper_grasping_frame", "mass": 2.0, "com": [0.0, 0.0, 0.0], "tolerance": 0.1,
     })  # fmt: skip
-    heavy = input_model(mjcf.urdf(), Description.model_validate(data), joint_data.hand())
+    heavy = input_model(Laboratory(mjcf.urdf(), Description.model_validate(data)), joint_data.hand())
     q, still = rigid_robot.CENTRE[None] + OFFSET, np.zeros((1, 8))
     more = heavy.inputs(np.zeros(1), q, still).tau - light.inputs(np.zeros(1), q, still).tau
     chain = joint_data.hand().chain

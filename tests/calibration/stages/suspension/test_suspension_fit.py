@@ -9,6 +9,7 @@ from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import to_vector
 from calibration.prediction.base_pose import base_poses
 from calibration.recording.clock import Clock
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.modal_response import modes_of
 from calibration.stages.suspension.printed_fit import matrices
@@ -60,7 +61,7 @@ def trials(recorded):
 
 
 def fit(trials, plate=PLATE, form=None):
-    return fit_suspension(mjcf.urdf(), DESCRIPTION, trials, ROBOT, plate, None, form)
+    return fit_suspension(Laboratory(mjcf.urdf(), DESCRIPTION), trials, ROBOT, plate, None, form)
 
 
 @pytest.fixture(scope="module")
