@@ -37,11 +37,9 @@ def check(
         typer.Option("--min", metavar="ROW.METRIC=VALUE", help="Fail below this value; repeatable."),
     ] = None,
 ) -> None:
-    """Compare figures of an evaluation with limits; exit 1 where one is exceeded.
+    """Compare figures of an evaluation with limits; exit 1 beyond one.
 
     Metrics: mm (RMSE per component), norm, p95, max [mm], deg, skill; and coverage of 95 % intervals.
-
-    Example: tiago-twin check runs/demo --max model_2.mm=2.5 --max model_3:plate.deg=0.8 --min coverage=0.6
     """
     limits = [(text, 1.0) for text in highest or ()] + [(text, -1.0) for text in lowest or ()]
     if not limits:

@@ -104,6 +104,32 @@ def show_rows(rows: "Sequence[Row]", most: int = 5) -> None:
         errors.print(f"and {len(bad) - most} more; index.csv has them all", highlight=False)
 
 
+def summary(run: Path) -> list[str]:
+    """Return the end of a run in six lines: verdict, rows, worst finding, next step, report."""
+    from scenarios.report.results.formatting import cell
+    from scenarios.report.results.headline import headline
+    from scenarios.report.results.ladder import best_of_each
+    from scenarios.report.results.run_results import read
+    from scenarios.report.results.section import run_view
+
+    view = run_view(read(run))
+    found, rows = headline(view.results, view.steps), best_of_each(view.steps)
+    mm = (f"{s.model} {cell(s.main.position_rmse_component_mm)}" for s in rows)
+    deg = (f"{s.model} {cell(s.main.orientation_rmse_deg)}" for s in rows)
+    worst = [f"{n.level}, {n.stage}: {n.message}" for n in found.notices] or ["none"]
+    more = f" ({len(worst) - 1} more in the report)" if len(worst) > 1 else ""
+    following = [step.text for step in found.next_steps] or ["nothing more from these recordings"]
+    lines = (
+        f"{found.badge.capitalize()}. {found.sentence}",
+        f"RMSE per component [mm]: {', '.join(mm)}",
+        f"RMSE of orientation [deg]: {', '.join(deg)}",
+        f"Worst finding: {worst[0]}{more}",
+        f"Next: {following[0]}",
+        f"Report: {run / 'report.html'}",
+    )
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
+
+
 def ladder(results: Path) -> Table:
     """Return the table of a folder's evaluation: against the truth where score.json has it, else against mocap."""
     path = results / "score.json"
@@ -115,7 +141,7 @@ def ladder(results: Path) -> Table:
 def confirmation(results: Path) -> Table | None:
     """Return the table of another session's errors, or None where no other session was recorded."""
     rows = _rows(results / "evaluation.json", "confirmation")
-    return _errors("Another session, marker bodies registered anew, against mocap", rows) if rows else None
+    return _errors("Another session, marker frames fitted again, against mocap", rows) if rows else None
 
 
 def points(results: Path) -> Table | None:

@@ -18,7 +18,7 @@ def dataset(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Record N robots of a scenario; the same command goes on where it was stopped."""
+    """Simulate N sampled robots of a scenario; run again to resume."""
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import workers as engine

@@ -23,7 +23,7 @@ def design(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Choose the postures that calibrate best, and the side each joint comes from."""
+    """Choose calibration postures and approach directions."""
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.steps.design import design as designed
@@ -40,8 +40,8 @@ def design(  # noqa: PLR0913  an option each
         f"{len(against.random)} random sets"
     )
     typer.echo(
-        f"Sides: the joints' play would move it by {1e3 * plan.sides.one_sided.max():.2f} mm if every joint always "
-        f"came from below, by {1e3 * plan.sides.bias.max():.2f} mm as told in the file"
+        f"Approach: backlash would move the hand by {1e3 * plan.sides.one_sided.max():.2f} mm if every joint "
+        f"approached from below; {1e3 * plan.sides.bias.max():.2f} mm with the approach directions in the file"
     )
     if plan.tour.contact:
         typer.echo(f"Not reached by a straight move clear of the robot: postures {list(plan.tour.contact)} (from 0)")

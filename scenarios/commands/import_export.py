@@ -8,9 +8,10 @@ import typer
 
 def import_(
     kind: Annotated[Literal["c3d", "csv", "bag"], typer.Argument(metavar="FORMAT", help="Of the files.")],
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Each belongs to the trial of its name.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files are matched to trials by name.")],
     mapping: Annotated[
-        Path, typer.Option("--map", metavar="YAML", help="What the files do not say: docs/recording.md.")
+        Path,
+        typer.Option("--map", metavar="YAML", help="Mapping: frames, units, roles; see docs/recording.md."),
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")],
     add_to: Annotated[

@@ -20,6 +20,7 @@ from scenarios.commands import dataset as command_dataset
 from scenarios.commands import design as command_design
 from scenarios.commands import import_export, quicklook, video
 from scenarios.commands import reality as command_reality
+from scenarios.commands import show as command_show
 from scenarios.commands import study as command_study
 from scenarios.commands.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
 from scenarios.files.errors import ScenarioError
@@ -27,23 +28,43 @@ from scenarios.files.errors import ScenarioError
 WRONG_INPUT = 2
 TERMINATED = 128 + signal.SIGTERM
 
+
+def _example(arguments: str) -> str:
+    return f"Example: tiago-twin {arguments}"
+
+
 app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    help="A robot whose truth is known, measured, calibrated and judged.",
+    help="Simulate a TIAGo with known errors, calibrate it from its recordings, evaluate the result on unseen motion.",
+    epilog="Start: tiago-twin run short --quick",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"tiago-twin {version('tiago-twin')}")
+        raise typer.Exit
+
+
 @app.callback()
-def options(verbose: Annotated[bool, typer.Option("--verbose", help="Say more on stderr.")] = False) -> None:
+def options(
+    verbose: Annotated[bool, typer.Option("--verbose", help="Log more on stderr.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
     """Set up logging."""
     level = logging.INFO if verbose else logging.WARNING
     logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
 
 
-@app.command("list")
+@app.command("list", epilog=_example("list"))
 def list_scenarios() -> None:
     """List the scenarios."""
     from scenarios import steps
@@ -53,7 +74,7 @@ def list_scenarios() -> None:
         typer.echo(f"{name}  {steps.load(name).description}")
 
 
-@app.command()
+@app.command(epilog=_example("run humanoids2024 --seed 7 --set twin.arm.arm_6_joint.gap=0.012"))
 def run(
     scenario: ScenarioName,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="The run folder; runs/NAME unless given.")] = None,
@@ -72,14 +93,12 @@ def run(
     if (table := console.frames(out)) is not None:
         console.show(console.verdicts([v for v in result.estimate.verdicts if v.stage in ("base_frame", "arm_tool")]))
         console.show(table)
-    console.show(console.ladder(out))
-    for line in console.remarks(out):
-        typer.echo(line)
     console.show(console.confirmation(out))
-    typer.echo(f"\nReport: {out / 'report.html'}")
+    for line in console.summary(out):
+        typer.echo(line)
 
 
-@app.command()
+@app.command(epilog=_example("simulate short --quick --out runs/short"))
 def simulate(
     scenario: ScenarioName,
     out: Out,
@@ -104,7 +123,7 @@ def simulate(
     typer.echo(f"Dataset: {out / 'dataset'}\nTruth: {out / 'truth'}")
 
 
-@app.command()
+@app.command(epilog=_example("calibrate runs/short/dataset --out runs/short/estimate"))
 def calibrate(
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder, the twin's or a real one.")],
     out: Out,
@@ -134,14 +153,14 @@ def calibrate(
         raise typer.Exit(FAILED)
 
 
-@app.command()
+@app.command(epilog=_example("evaluate runs/short/estimate runs/short/dataset --out runs/evaluation"))
 def evaluate(
     estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE", help="An estimate folder or file.")],
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder.")],
     out: Out,
     truth: Annotated[Path | None, typer.Option(metavar="TRUTH", help="A truth folder: adds score.json.")] = None,
 ) -> None:
-    """Write the held-out error of an estimate."""
+    """Write the error of an estimate on unseen trials."""
     from scenarios import steps
     from scenarios.commands import console
 
@@ -154,7 +173,7 @@ def evaluate(
     console.show(console.confirmation(out))
 
 
-@app.command()
+@app.command(epilog=_example("report runs/short"))
 def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
     """Write report.html from what a run folder holds."""
     from scenarios import steps
@@ -165,15 +184,18 @@ def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
     typer.echo(f"Report: {page}")
 
 
-import_ = app.command("import")(import_export.import_)
-export = app.command()(import_export.export)
-dataset = app.command()(command_dataset.dataset)
-design = app.command()(command_design.design)
-study = app.command()(command_study.study)
-look = app.command()(quicklook.look)
-picture = app.command()(video.picture)
-reality = app.command()(command_reality.reality)
-check = app.command()(command_check.check)
+import_ = app.command("import", epilog=_example("import csv lab/*.csv --map lab.yaml --out dataset"))(
+    import_export.import_
+)
+export = app.command(epilog=_example("export urdf runs/short/estimate --out tiago.urdf"))(import_export.export)
+dataset = app.command(epilog=_example("dataset swing20 -n 10 --out runs/swing20"))(command_dataset.dataset)
+design = app.command(epilog=_example("design short -n 30 --out postures.yaml"))(command_design.design)
+study = app.command(epilog=_example("study coverage short -n 20 --out runs/coverage"))(command_study.study)
+look = app.command(epilog=_example("look runs/short/dataset --out runs/look"))(quicklook.look)
+picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"))(video.picture)
+reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"))(command_reality.reality)
+show = app.command(epilog=_example("show humanoids2024 gap"))(command_show.show)
+check = app.command(epilog=_example("check runs/short --max model_2.mm=2.5"))(command_check.check)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -11,14 +11,17 @@ FAILED = 1
 
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")]
-Seed = Annotated[
-    int | None, typer.Option(min=0, metavar="N", help="Root of all randomness, instead of the scenario's.")
-]
-Quick = Annotated[bool, typer.Option("--quick", help="The scenario's short variant.")]
+Seed = Annotated[int | None, typer.Option(min=0, metavar="N", help="Random seed; the scenario's unless given.")]
+Quick = Annotated[bool, typer.Option("--quick", help="A shorter campaign, at most 180 s of recordings.")]
 Overrides = Annotated[
-    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="A value instead of the scenario's; repeatable.")
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help="Override a scenario value; repeatable; see `show`.",
+    ),
 ]
-Workers = Annotated[int, typer.Option(min=0, metavar="K", help="Processes of our own; 0: this one.")]
+Workers = Annotated[int, typer.Option(min=0, metavar="K", help="Worker processes; 0: in this process.")]
 Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="A running dask scheduler instead.")]
 
 

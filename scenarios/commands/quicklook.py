@@ -13,7 +13,7 @@ def look(
     out: Out,
     trial: Annotated[list[str] | None, typer.Option(metavar="ID", help="Only this trial; repeatable.")] = None,
 ) -> None:
-    """Draw what was recorded: markers and gaps, wrench and centre of pressure, encoder differences."""
+    """Plot recordings, a page a trial: markers and gaps, wrench, encoder differences."""
     from scenarios.quicklook.page import look as draw
 
     for one in draw(dataset, out, trial or ()):

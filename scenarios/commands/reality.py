@@ -30,7 +30,7 @@ def reality(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Compare drawn robots with a real one: swings by the figures of its log, and its wrench replayed."""
+    """Compare sampled robots with a recording of a real one."""
     from scenarios import steps
     from scenarios.files import output_folder
     from scenarios.realism.compare import as_json, compare_replay, compare_swings

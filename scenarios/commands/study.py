@@ -29,7 +29,7 @@ def study(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Calibrate many robots and judge the method: its intervals, or how often it shows a gain."""
+    """Calibrate many robots: coverage of the intervals, or how often a gain shows."""
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import workers as engine

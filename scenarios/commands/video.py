@@ -27,7 +27,7 @@ def picture(  # noqa: PLR0913  an option each
     duration: Annotated[float, typer.Option(min=0.1, max=120.0, metavar="S", help="Of the clip.")] = 10.0,
     renderer: Annotated[Renderer, typer.Option(help="What draws.")] = Renderer.auto,
 ) -> None:
-    """Draw a trial of a simulated run, with its markers and the force on the plate."""
+    """Render a trial of a simulated run, with markers and plate force."""
     if clip is None and still is None:
         raise ScenarioError("nothing to write; name a file: --clip FILE.gif, --still FILE.png, or both")
 

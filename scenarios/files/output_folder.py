@@ -5,7 +5,7 @@ write, so that no file of the user's is ever lost. Whatever interrupts the work,
 the new files are removed and the old ones stay.
 """
 
-import secrets
+import os
 import shutil
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -119,7 +119,7 @@ def _beside(out: Path) -> Iterator[Path]:
     Parents that had to be made are removed too when nothing came into them.
     """
     made = [parent for parent in out.parents if not parent.exists()]
-    work = out.with_name(f".{out.name}.{secrets.token_hex(4)}.partial")
+    work = out.with_name(f".{out.name}.{os.urandom(4).hex()}.partial")
     try:
         try:
             (work / "new").mkdir(parents=True)

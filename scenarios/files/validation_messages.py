@@ -127,16 +127,19 @@ def _fields(adapter: TypeAdapter[Any], values: Any, above: Sequence[str], path: 
     node = values
     for step in above:
         node = node[step]
-    schemas = list(_members(root, root, node))
+    schemas = list(member_schemas(root, root, node))
     for step in path[len(above) :]:
         node = node[int(step)] if isinstance(node, list) else node[step]
         schemas = [
-            member for schema in schemas for inner in _inner(schema, step) for member in _members(inner, root, node)
+            member
+            for schema in schemas
+            for inner in inner_schemas(schema, step)
+            for member in member_schemas(inner, root, node)
         ]
     return sorted({name for schema in schemas for name in schema.get("properties", {})})
 
 
-def _inner(schema: Mapping[str, Any], step: str) -> Iterator[Mapping[str, Any]]:
+def inner_schemas(schema: Mapping[str, Any], step: str) -> Iterator[Mapping[str, Any]]:
     """Schemas of one field, or of one item, of what `schema` describes."""
     prefix = schema.get("prefixItems", [])
     if step in schema.get("properties", {}):
@@ -147,14 +150,14 @@ def _inner(schema: Mapping[str, Any], step: str) -> Iterator[Mapping[str, Any]]:
         yield from (schema[rest] for rest in ("items", "additionalProperties") if isinstance(schema.get(rest), Mapping))
 
 
-def _members(schema: Mapping[str, Any], root: Mapping[str, Any], node: Any) -> Iterator[Mapping[str, Any]]:
+def member_schemas(schema: Mapping[str, Any], root: Mapping[str, Any], node: Any) -> Iterator[Mapping[str, Any]]:
     """The schemas a schema stands for: references and unions resolved, members of another kind than `node` left out."""
     if "$ref" in schema:
-        yield from _members(root["$defs"][schema["$ref"].rsplit("/", 1)[-1]], root, node)
+        yield from member_schemas(root["$defs"][schema["$ref"].rsplit("/", 1)[-1]], root, node)
         return
     for union in ("anyOf", "oneOf", "allOf"):
         for member in schema.get(union, []):
-            yield from _members(member, root, node)
+            yield from member_schemas(member, root, node)
     kinds = {name: field["const"] for name, field in schema.get("properties", {}).items() if "const" in field}
     if isinstance(node, Mapping) and all(node.get(name, kind) == kind for name, kind in kinds.items()):
         yield schema

@@ -10,7 +10,6 @@ Importing this module is cheap: the engines are imported by the step that needs 
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -182,6 +181,8 @@ def report(run_folder: Path | str, progress: Progress = silent) -> Path:
 
 def versions() -> dict[str, str]:
     """Versions of what decides the figures of a run."""
+    from importlib.metadata import version
+
     return {"python": platform.python_version(), **{package: version(package) for package in PACKAGES}}
 
 

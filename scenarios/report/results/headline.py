@@ -149,7 +149,7 @@ def _notices(results: Results, steps: Sequence[Step]) -> tuple[Notice, ...]:
     found = (*(results.estimate.verdicts if results.estimate else ()), *results.evaluation.verdicts)
     notices = [Notice(v.verdict, v.stage, v.message) for v in found if v.verdict != "ok"]
     notices += _no_gain(steps, headline_model(results, steps))
-    return tuple(sorted(notices, key=lambda notice: ("refused", "missing", "warning").index(notice.level)))
+    return tuple(sorted(notices, key=lambda notice: ("refused", "warning", "missing").index(notice.level)))
 
 
 def _no_gain(steps: Sequence[Step], model: str) -> Iterator[Notice]:

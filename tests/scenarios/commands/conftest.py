@@ -9,7 +9,7 @@ import pytest
 import calibration
 import twin
 import twin.rendering
-from scenarios.commands import main
+from scenarios.commands import console, main
 from scenarios.files import registry
 from tests.scenarios.commands.stand_ins import YAML, Engines, Scenario
 
@@ -36,6 +36,8 @@ def engines(monkeypatch, tmp_path):
         package, _, leaf = module.__name__.rpartition(".")
         monkeypatch.setattr(importlib.import_module(package), leaf, module, raising=False)
     monkeypatch.setattr(twin.rendering, "picture", lambda config, seed, path: path.write_text("picture"))
+    end = ["Calibrated.", "Report: {}"]
+    monkeypatch.setattr(console, "summary", lambda run: [line.format(run / "report.html") for line in end])
     (tmp_path / "known").mkdir()
     (tmp_path / "known" / "small.yaml").write_text(YAML)
     monkeypatch.setattr(registry, "HERE", tmp_path / "known")

@@ -9,7 +9,9 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
+from calibration.verdict import Verdict
 from scenarios.commands import console
+from tests.doubles.run_folder import write_estimate, write_evaluation, write_score
 
 ROW = {
     "model": "nominal",
@@ -89,3 +91,16 @@ def test_what_an_evaluation_says_is_told(tmp_path):
     assert console.remarks(tmp_path) == ["base moved during xyz"]
     (tmp_path / "evaluation.json").write_text(json.dumps({"rows": []}))
     assert console.remarks(tmp_path) == []
+
+
+def test_a_run_ends_in_six_lines(tmp_path):
+    write_evaluation(tmp_path)
+    write_score(tmp_path)
+    write_estimate(tmp_path / "estimate", Verdict("geometry", "warning", "arm_3 never moved"))
+    lines = console.summary(tmp_path)
+    assert len(lines) == 6
+    assert lines[0].startswith("Calibrated. Error of the hand on unseen moving trials: ")
+    assert re.match(r"RMSE per component \[mm\]: nominal [\d.]+, .*model_2 [\d.]+", lines[1])
+    assert lines[3] == "Worst finding: warning, geometry: arm_3 never moved"
+    assert lines[4].startswith("Next: measure the base")
+    assert lines[5] == f"Report: {tmp_path / 'report.html'}"
