@@ -10,10 +10,12 @@ if TYPE_CHECKING:
     from calibration.errors import CalibrationError
     from calibration.estimate.estimate import Estimate
     from calibration.estimate.files import load_estimate, save_estimate
-    from calibration.evaluation.evaluate import Evaluation, evaluate
+    from calibration.evaluation.evaluate import evaluate
+    from calibration.evaluation.results import Evaluation
     from calibration.pipeline import calibrate
     from calibration.prediction.compensator import Compensator
-    from calibration.prediction.predictor import Prediction, predictions
+    from calibration.prediction.predicted_trial import Prediction
+    from calibration.prediction.predictor import predictions
     from calibration.recording.dataset import Dataset, load
 
 __all__ = [
@@ -35,10 +37,12 @@ _MODULES = {
     "errors": ("CalibrationError",),
     "estimate.estimate": ("Estimate",),
     "estimate.files": ("load_estimate", "save_estimate"),
-    "evaluation.evaluate": ("Evaluation", "evaluate"),
+    "evaluation.evaluate": ("evaluate",),
+    "evaluation.results": ("Evaluation",),
     "pipeline": ("calibrate",),
     "prediction.compensator": ("Compensator",),
-    "prediction.predictor": ("Prediction", "predictions"),
+    "prediction.predicted_trial": ("Prediction",),
+    "prediction.predictor": ("predictions",),
     "recording.dataset": ("Dataset", "load"),
 }
 

@@ -12,6 +12,7 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import TrialEntry
 from calibration.recording.trial import Trial
 from calibration.stages.joints.correction import JointModels
+from calibration.stages.joints.repetitions import on_repetitions
 from calibration.stages.stage import StageInput, StageResult
 from calibration.stages.suspension.model import Suspension
 from calibration.verdict import Verdict
@@ -39,8 +40,9 @@ class Context:
         if isinstance(result.quantity, Suspension):
             estimate = replace(estimate, suspension=result.quantity)
         elif isinstance(result.quantity, JointModels):
-            zero = tuple(map(float, result.quantity.zero))
-            estimate = replace(estimate, joint_models=result.quantity.models, link_zero=zero)
+            found, zero = result.quantity, tuple(map(float, result.quantity.zero))
+            regimes = on_repetitions(found, self.data.trials, self.data.options.terms)
+            estimate = replace(estimate, joint_models=found.models, link_zero=zero, regimes=regimes)
         return Context(replace(self.data, models=models), estimate).with_findings(*result.findings)
 
     def with_plan(self, plan: ExperimentPlan | None, findings: Sequence[Verdict]) -> "Context":

@@ -16,6 +16,7 @@ from calibration.verdict import Verdict
 
 if TYPE_CHECKING:
     from calibration.stages.joints.model import JointModel
+    from calibration.stages.joints.repetitions import RegimeQuality
     from calibration.stages.suspension.model import Suspension
 
 
@@ -46,6 +47,7 @@ class Estimate:
         options: What was chosen.
         laboratory: What dataset.json declares, without its trials; None where the source does not say.
         remedies: What to record next, for what the data do not tell.
+        regimes: Fit quality of the joint models on repetitions of their own motions.
     """
 
     status: Literal["calibrated", "not_calibrated"]
@@ -61,6 +63,7 @@ class Estimate:
     options: Options = field(default_factory=Options)
     laboratory: Description | None = None
     remedies: tuple[ExperimentPlan, ...] = ()
+    regimes: "tuple[RegimeQuality, ...]" = ()
 
     def model(self, name: str) -> Model:
         """The model of that name.

@@ -9,9 +9,12 @@ from pydantic import BaseModel, ConfigDict, Field
 from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.estimate.json_stage_models import (
     JointEntry,
+    RegimeEntry,
     SuspensionEntry,
     joint_entry,
     joint_model,
+    regime_entry,
+    regime_quality,
     suspension_entry,
     suspension_of,
 )
@@ -106,6 +109,7 @@ class EstimateFile(Entry):
     suspension: SuspensionEntry | None = None
     joint_models: tuple[JointEntry, ...] = ()
     link_zero: tuple[float | None, ...] = ()
+    regimes: tuple[RegimeEntry, ...] = ()
     options: Options = Field(default_factory=Options)
     laboratory: Description | None = None
 
@@ -138,6 +142,7 @@ def to_file(estimate: Estimate) -> EstimateFile:
         suspension=None if estimate.suspension is None else suspension_entry(estimate.suspension),
         joint_models=tuple(joint_entry(m) for m in estimate.joint_models),
         link_zero=tuple(_finite(z) for z in estimate.link_zero),
+        regimes=tuple(regime_entry(x) for x in estimate.regimes),
         options=estimate.options,
         laboratory=estimate.laboratory,
     )
@@ -159,6 +164,7 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
         tuple(float("nan") if z is None else z for z in file.link_zero),
         file.options,
         file.laboratory,
+        regimes=tuple(regime_quality(x) for x in file.regimes),
     )
 
 

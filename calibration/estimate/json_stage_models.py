@@ -1,5 +1,6 @@
 """The parts of estimate.json that are more than parameters: the suspension and the joint models, as they predict."""
 
+from dataclasses import asdict
 from typing import Literal
 
 import numpy as np
@@ -7,6 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 from calibration.options import Terms
 from calibration.stages.joints.model import JointModel, Quality
+from calibration.stages.joints.repetitions import Regime, RegimeQuality
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source, Suspension
 
@@ -33,6 +35,19 @@ class JointEntry(Part):
     domain: Rows
     zero: float
     quality: tuple[float, float, float, float]
+
+
+class RegimeEntry(Part):
+    """See `repetitions.RegimeQuality`."""
+
+    joint: str
+    regime: Regime
+    degree: int | None
+    n: int
+    before: float
+    after: float
+    r2: float
+    outside: float
 
 
 class HeldOutEntry(Part):
@@ -89,6 +104,16 @@ def joint_model(entry: JointEntry) -> JointModel:
         entry.zero,
         quality=Quality(*entry.quality),
     )
+
+
+def regime_entry(quality: RegimeQuality) -> RegimeEntry:
+    """The fit quality of a joint model in one regime as it is in the file."""
+    return RegimeEntry.model_validate(asdict(quality))
+
+
+def regime_quality(entry: RegimeEntry) -> RegimeQuality:
+    """The fit quality of a joint model in one regime as it was in the file."""
+    return RegimeQuality(**dict(entry))
 
 
 def suspension_entry(suspension: Suspension) -> SuspensionEntry:

@@ -1,10 +1,11 @@
 """Held-out errors of predictions."""
 
 from calibration.evaluation.comparison import compare
-from calibration.evaluation.evaluate import Evaluation, evaluate
+from calibration.evaluation.evaluate import evaluate
 from calibration.evaluation.ladder import Row, TrialErrors, Trials, ladder, row_entry, scored_errors
 from calibration.evaluation.marker_errors import PointRow, point_rows
 from calibration.evaluation.pose_errors import pose_errors
+from calibration.evaluation.results import Evaluation
 
 __all__ = [
     "Evaluation",

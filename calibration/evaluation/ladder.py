@@ -7,9 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from calibration.evaluation.pose_errors import PoseErrors, RowMetrics, dwell_means, row_metrics, turned
-from calibration.mocap.postures import dwell_windows
 from calibration.prediction.predictor import REFERENCE
-from calibration.recording.trial import Trial
 
 Trials = Literal["dynamic", "static", "all"]
 
@@ -51,11 +49,11 @@ class Row:
     metrics: RowMetrics
 
 
-def scored_errors(t: np.ndarray, errors: PoseErrors, trial: Trial, static: bool) -> PoseErrors:
-    """The errors at t (n,) [s, mocap clock] that count."""
+def scored_errors(t: np.ndarray, errors: PoseErrors, dwells: np.ndarray, static: bool) -> PoseErrors:
+    """The errors at t (n,) [s, mocap clock] that count; dwells (k, 2) [s] of a static trial."""
     if static:
-        return dwell_means(t, errors, dwell_windows(trial))
-    after = t > trial.t_mocap[0] + REFERENCE
+        return dwell_means(t, errors, dwells)
+    after = t > t[0] + REFERENCE
     return PoseErrors(errors.position[after], errors.rotation[after])
 
 

@@ -1,5 +1,6 @@
 """Held-out errors of single markers in posture means, and how many are within the band promised for any day."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +9,8 @@ from calibration.estimate.estimate import Estimate
 from calibration.mocap.cluster_pose import poses_of_means
 from calibration.numerics.lie import inverse
 from calibration.prediction.compensator import Compensator
-from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Role, TrialEntry
+from calibration.recording.schema import Description, TrialEntry
 from calibration.robot.hand_uncertainty import Session
 
 ALL = "all"
@@ -41,20 +41,22 @@ class PointRow:
     inside: float
 
 
-def point_rows(estimate: Estimate, dataset: Dataset, role: Role) -> tuple[PointRow, ...]:
-    """Rows of the main model for all trials of a role that hold posture means; none where the robot is not known."""
+def point_rows(
+    estimate: Estimate, description: Description, recorded: Iterable[tuple[TrialEntry, PostureMeans]]
+) -> tuple[PointRow, ...]:
+    """Rows of the main model for trials that hold posture means; none where the robot is not known."""
     if estimate.urdf is None or estimate.robot is None:
         return ()
     robot, found = Compensator.of(estimate), []
-    for entry, means in dataset.means(role):
-        found += _of_trial(robot, estimate.main, dataset, entry, means)
+    for entry, means in recorded:
+        found += _of_trial(robot, estimate.main, description, entry, means)
     return tuple(found)
 
 
 def _of_trial(
-    robot: Compensator, model: str, dataset: Dataset, entry: TrialEntry, means: PostureMeans
+    robot: Compensator, model: str, description: Description, entry: TrialEntry, means: PostureMeans
 ) -> list[PointRow]:
-    hand, T_B_lab = dataset.description.hand_body, inverse(poses_of_means(dataset.description.base_body, means).T)
+    hand, T_B_lab = description.hand_body, inverse(poses_of_means(description.base_body, means).T)
     seen = [m for m in hand.markers if m.name in means.marker]
     p = means.marker_position[:, [means.marker.index(m.name) for m in seen]]
     p = p @ np.swapaxes(T_B_lab[:, :3, :3], 1, 2) + T_B_lab[:, None, :3, 3]

@@ -1,21 +1,22 @@
-"""Predictions: the ladder's rows, the base's pose, the compensator."""
+"""Predictions: every row of the ladder, the base's pose, the compensator."""
 
 from calibration.estimate.rows import BASELINE, LADDER, NOMINAL, LadderRow
-from calibration.prediction.compensator import Compensator, HandPose
-from calibration.prediction.predictor import Prediction, Predictor, predictions
-from calibration.prediction.second_session import reregistered
+from calibration.prediction.compensator import Compensator
+from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction, read_predicted
+from calibration.prediction.predictor import predict
 from calibration.robot.hand_uncertainty import Session
 
 __all__ = [
     "BASELINE",
     "LADDER",
     "NOMINAL",
+    "BaseMotion",
     "Compensator",
-    "HandPose",
+    "JointSamples",
     "LadderRow",
+    "PredictedTrial",
     "Prediction",
-    "Predictor",
     "Session",
-    "predictions",
-    "reregistered",
+    "predict",
+    "read_predicted",
 ]

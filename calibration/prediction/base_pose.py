@@ -15,6 +15,7 @@ T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     x from the plate's wrench or from inve
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -24,9 +25,11 @@ from calibration.numerics.wrench import in_frame
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
-from calibration.stages.suspension.floor_wrench import floor_load
+from calibration.stages.suspension.floor_wrench import Load, floor_load
 from calibration.stages.suspension.model import Source, Suspension
-from calibration.stages.suspension.rest_frame import Rest, rest_of, upright
+from calibration.stages.suspension.rest_frame import Rest, rest_at, rest_of, upright
+
+_UPRIGHT = 1e-9  # [m/s2] gravity's components in two frames 0 that are one direction
 
 
 @dataclass(frozen=True)
@@ -126,6 +129,57 @@ class BaseState:
     moved: np.ndarray
 
 
+@dataclass(frozen=True)
+class BaseInTrial:
+    """The base in one trial as the suspension moves it; inverse dynamics runs once, whatever frame 0 is.
+
+    Its wrench depends on frame 0 by the direction of gravity alone, which is the same in every frame set upright.
+
+    Attributes:
+        suspension: Of the base.
+        wrenches: Instruments, and the nominal placement of the marker body.
+        trial: The trial.
+        T_lab_B: (4, 4) the marker body in the first second.
+    """
+
+    suspension: Suspension
+    wrenches: WrenchSources
+    trial: Trial
+    T_lab_B: np.ndarray
+
+    def rest(self, T_base_B: np.ndarray | None = None) -> Rest:
+        """Frame 0, the marker body placed at T_base_B (4, 4); where not given, at its nominal place."""
+        placed = self.wrenches.T_base_B if T_base_B is None else T_base_B
+        return rest_at(self.wrenches.lab.description, self.T_lab_B, placed)
+
+    def displacement(self, source: Source, rest: Rest) -> np.ndarray:
+        """Displacement (n, 6) [m, rad, frame 0] at `t_mocap`; outside the wrench's recording it stays.
+
+        Raises:
+            NotEnoughData: The wrench was not recorded.
+        """
+        if source == "plate":
+            return self._driven(self.wrenches.plate_load(self.trial, rest.T_lab_0), source)
+        down, x = self._by_dynamics
+        if np.allclose(self._down(rest), down, rtol=0.0, atol=_UPRIGHT):
+            return x
+        return self._driven(self.wrenches.dynamics_load(self.trial, rest.T_lab_0), source)
+
+    @cached_property
+    def _by_dynamics(self) -> tuple[np.ndarray, np.ndarray]:
+        """Gravity in frame 0 (3,), and the displacement it goes with."""
+        rest = self.rest()
+        return self._down(rest), self._driven(self.wrenches.dynamics_load(self.trial, rest.T_lab_0), "dynamics")
+
+    def _down(self, rest: Rest) -> np.ndarray:
+        return np.array(self.wrenches.lab.description.gravity) @ rest.T_lab_0[:3, :3]
+
+    def _driven(self, load: Load, source: Source) -> np.ndarray:
+        forcing = forcing_of(load, float(self.trial.t_mocap[0]))
+        x = self.suspension.displaced(forcing, source)
+        return np.stack([np.interp(self.trial.t_mocap, forcing.t, column) for column in x.T], axis=1)
+
+
 def base_poses(suspension: Suspension, lab: WrenchSources, trial: Trial, source: Source) -> np.ndarray:
     """T_lab_B (n, 4, 4) of the base's marker body at `t_mocap`; outside the wrench's recording it stays.
 
@@ -133,7 +187,5 @@ def base_poses(suspension: Suspension, lab: WrenchSources, trial: Trial, source:
         NotEnoughData: The wrench, or the base's markers of the first second, were not recorded.
     """
     rest = rest_of(lab.lab.description, trial, lab.T_base_B)
-    load = lab.plate_load(trial, rest.T_lab_0) if source == "plate" else lab.dynamics_load(trial, rest.T_lab_0)
-    forcing = forcing_of(load, float(trial.t_mocap[0]))
-    x = suspension.displaced(forcing, source)
-    return rest.poses(np.stack([np.interp(trial.t_mocap, forcing.t, column) for column in x.T], axis=1))
+    base = BaseInTrial(suspension, lab, trial, rest.T_lab_0 @ rest.T_0_B)
+    return rest.poses(base.displacement(source, rest))

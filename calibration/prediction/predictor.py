@@ -13,19 +13,22 @@ Of a trial nothing else is read: encoders, plate, base markers of its first seco
 `measured`), never hand or shoulder.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
+from typing import Literal
 
 import numpy as np
 
 from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.estimate.estimate import Estimate
-from calibration.estimate.rows import LADDER, Base, Encoder, LadderRow, row_of
+from calibration.estimate.rows import LADDER, NOMINAL, Base, Encoder, LadderRow, row_of
 from calibration.mocap.cluster_pose import poses_of, poses_of_means
-from calibration.mocap.labels import relabelled_trials
-from calibration.mocap.postures import readings_at
+from calibration.mocap.labels import relabelled_trial, relabelled_trials
+from calibration.mocap.postures import dwell_windows, readings_at
 from calibration.numerics.lie import from_vector, mean
-from calibration.prediction.base_pose import base_poses
+from calibration.prediction.base_pose import BaseInTrial
+from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction
 from calibration.recording.clock import Clock
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
@@ -37,35 +40,14 @@ from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.clocks.stage import synchronise
 from calibration.stages.geometry.model_of_fit import hand_of
-from calibration.stages.joints.correction import JointModels, correct, input_model
-from calibration.stages.joints.samples import aligned_link_readings
+from calibration.stages.joints.correction import Corrected, JointModels, correct, input_model
+from calibration.stages.joints.samples import aligned_link_readings, samples_of
 from calibration.stages.suspension.base_response import laboratory
-from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.model import Source, Suspension
+from calibration.stages.suspension.rest_frame import Rest
 
 REFERENCE = 1.0  # [s] of rest at the start of every trial
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Predicted hand poses of one trial.
-
-    Attributes:
-        model: Row of the ladder.
-        base: Where the base's motion comes from.
-        encoder: Which side of the gear was read.
-        trial_id: The trial.
-        kind: Its kind: static, sweep, swing, spin, drive.
-        t: (n,) [s, mocap clock].
-        T_lab_hand: (n, 4, 4), NaN where it cannot be predicted.
-    """
-
-    model: str
-    base: Base
-    encoder: Encoder
-    trial_id: str
-    kind: str
-    t: np.ndarray
-    T_lab_hand: np.ndarray
+Side = Literal["motor", "corrected", "link"]  # readings the geometry is asked with
 
 
 @dataclass(frozen=True)
@@ -90,18 +72,44 @@ class Predictor:
     suspension: Suspension | None = None
     joints: JointModels | None = None
 
-    def __call__(self, entry: TrialEntry, trial: Trial) -> Iterator[Prediction]:
+    def __call__(self, entry: TrialEntry, trial: Trial) -> PredictedTrial:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
-        measured = self._measured_base(entry, trial)
-        for row, hand, encoder in self._rows():
-            q = self.positions(row.name, encoder, trial)
-            known = np.isfinite(q).all(axis=1)
-            T_B_H = np.full((len(q), 4, 4), np.nan)
-            T_B_H[known] = hand.carrying(entry.payload).poses(q[known])
-            for base in row.bases:
-                T_lab_B = self._base(base, hand, entry, trial, measured)
-                if T_lab_B is not None:
-                    yield Prediction(row.name, base, encoder, entry.id, entry.kind, trial.t_mocap, T_lab_B @ T_B_H)
+        T_lab_B, corrected = self._measured_base(entry, trial), self._corrected(trial)
+        still = np.broadcast_to(mean(_start(T_lab_B, trial)), T_lab_B.shape)
+        base, hands = self._base(entry, trial, still[0]), {id(hand): hand for hand in self.models.values()}
+
+        @cache
+        def in_base(hand: int, side: Side) -> np.ndarray:
+            return _known_poses(hands[hand].carrying(entry.payload), self._positions(side, trial, corrected))
+
+        @cache
+        def displaced(source: Source, hand: int) -> tuple[Rest, np.ndarray] | None:
+            if base is None or (source == "plate" and (self.plate is None or len(trial.t_plate) == 0)):
+                return None
+            rest = base.rest(from_vector(hands[hand].base))
+            return rest, base.displacement(source, rest)
+
+        def moved(source: Base, hand: int) -> np.ndarray | None:
+            if source == "measured" or source == "fixed":
+                return T_lab_B if source == "measured" else still
+            found = displaced(source, hand)
+            return None if found is None else found[0].poses(found[1])
+
+        rows = tuple(
+            Prediction(row.name, source, encoder, entry.id, entry.kind, trial.t_mocap, T @ in_base(id(hand), side))
+            for row, hand, encoder in self._rows()
+            for side in (self._side(row, encoder),)
+            for source in row.bases
+            if (T := moved(source, id(hand))) is not None
+        )
+        motion = None
+        if base is not None and NOMINAL in self.models:
+            found = [(source, displaced(source, id(self.models[NOMINAL]))) for source, _ in base.suspension.held_out]
+            motion = _motion(T_lab_B, found)
+        samples = tuple(self._samples(trial)) if entry.kind != "static" else ()
+        return PredictedTrial(
+            entry.id, entry.kind, trial.t_mocap, rows, motion, samples, T_lab_B, dwell_windows(trial), corrected
+        )
 
     def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
         """Predictions of posture means, one a posture in `t`: the base measured or its markers' own frame, motor side.
@@ -122,14 +130,40 @@ class Predictor:
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is asked with, at the motion capture's times."""
+        side = self._side(row_of(name), encoder)
+        return self._positions(side, trial, self._corrected(trial) if side == "corrected" else None)
+
+    def _side(self, row: LadderRow, encoder: Encoder) -> Side:
+        if self.joints is None or (encoder == "motor" and not row.joints):
+            return "motor"
+        return "link" if encoder == "link" else "corrected"
+
+    def _positions(self, side: Side, trial: Trial, corrected: Corrected | None) -> np.ndarray:
         if self.robot is None or not len(trial.t_robot):
             raise NotEnoughData(f"{trial.id}: no joint readings on a known clock, so no hand pose can be predicted")
-        if encoder == "link" and self.joints is not None:
-            return readings_at(trial, self.robot, trial.t_mocap, aligned_link_readings(trial, self.joints.zero))
-        if row_of(name).joints and self.joints is not None:
-            corrected = correct(self.joints.of_trial(trial.id), trial.t_robot, trial.q_motor).q
-            return readings_at(trial, self.robot, trial.t_mocap, corrected)
-        return readings_at(trial, self.robot, trial.t_mocap, trial.q_motor)
+        readings = trial.q_motor
+        if side == "link" and self.joints is not None:
+            readings = aligned_link_readings(trial, self.joints.zero)
+        elif side == "corrected" and corrected is not None:
+            readings = corrected.q
+        return readings_at(trial, self.robot, trial.t_mocap, readings)
+
+    def _corrected(self, trial: Trial) -> Corrected | None:
+        if self.joints is None or not len(trial.t_robot):
+            return None
+        return correct(self.joints.of_trial(trial.id), trial.t_robot, trial.q_motor)
+
+    def _samples(self, trial: Trial) -> Iterator[JointSamples]:
+        """Samples of the joints that have a model and a link encoder."""
+        if self.joints is None:
+            return
+        names = self.joints.inputs.measured
+        of_joints = samples_of(self.joints.of_trial(trial.id).inputs, trial, self.joints.zero)
+        for model in self.joints.models:
+            s = of_joints[names.index(model.joint)]
+            if s is not None:
+                predicted = model.discrepancy(s.theta, s.tau, s.velocity)
+                yield JointSamples(model.joint, s.t, s.theta, s.velocity, s.y, predicted)
 
     def _measured_base(self, entry: TrialEntry, trial: Trial) -> np.ndarray:
         """T_lab_B (n, 4, 4), seen where the trial starts."""
@@ -139,19 +173,28 @@ class Predictor:
             raise NotEnoughData(f"{entry.id}: body {body!r} is not seen in the first second of the trial")
         return T_lab_B
 
-    def _base(
-        self, base: Base, hand: HandModel, entry: TrialEntry, trial: Trial, measured: np.ndarray
-    ) -> np.ndarray | None:
-        """T_lab_B (n, 4, 4), or None where that source is not there."""
-        if base == "measured":
-            return measured
-        if base == "fixed":
-            return np.broadcast_to(mean(_start(measured, trial)), measured.shape)
-        if self.suspension is None or (base == "plate" and (self.plate is None or len(trial.t_plate) == 0)):
+    def _base(self, entry: TrialEntry, trial: Trial, T_lab_B: np.ndarray) -> BaseInTrial | None:
+        """The base on its suspension, its marker body at rest at T_lab_B (4, 4)."""
+        if self.suspension is None:
             return None
-        description = self.description.loaded(entry)
-        lab = laboratory(self.urdf, description, self.robot, self.plate, from_vector(hand.base))
-        return base_poses(self.suspension, lab, trial, base)
+        lab = laboratory(self.urdf, self.description.loaded(entry), self.robot, self.plate)
+        return BaseInTrial(self.suspension, lab, trial, T_lab_B)
+
+
+def _known_poses(hand: HandModel, q: np.ndarray) -> np.ndarray:
+    """T_B_H (n, 4, 4) at q (n, n_joints), NaN where a reading is missing."""
+    T, known = np.full((len(q), 4, 4), np.nan), np.isfinite(q).all(axis=1)
+    T[known] = hand.poses(q[known])
+    return T
+
+
+def _motion(T_lab_B: np.ndarray, found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]]) -> BaseMotion | None:
+    """The base by the sources that were recorded; None where none was."""
+    there = [(source, *one) for source, one in found if one is not None]
+    if not there:
+        return None
+    rest = there[0][1]
+    return BaseMotion(rest.displacement(T_lab_B), tuple((source, x) for source, _, x in there), rest)
 
 
 def _start(T_lab_B: np.ndarray, trial: Trial) -> np.ndarray:
@@ -191,10 +234,20 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     return Predictor(models, dataset.urdf, description, robot, estimate.clock("plate"), estimate.suspension, joints)
 
 
+def predict(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[PredictedTrial]:
+    """Every trial of a role, read once and predicted by every row."""
+    prepared = predictor(estimate, dataset)
+    for entry in dataset.entries(role):
+        if dataset.has_means(entry):
+            means = dataset.read_means(entry)
+            yield PredictedTrial(
+                entry.id, entry.kind, np.arange(float(len(means))), tuple(prepared.of_means(entry, means))
+            )
+        else:
+            yield prepared(entry, relabelled_trial(dataset, entry))
+
+
 def predictions(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[Prediction]:
     """Predicted hand poses of all trials of a role, trial by trial, row by row."""
-    predict = predictor(estimate, dataset)
-    for entry, trial in relabelled_trials(dataset, role):
-        yield from predict(entry, trial)
-    for entry, means in dataset.means(role):
-        yield from predict.of_means(entry, means)
+    for trial in predict(estimate, dataset, role):
+        yield from trial.rows

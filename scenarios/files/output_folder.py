@@ -30,7 +30,7 @@ class Kind:
     entries: frozenset[str]
 
 
-EVALUATION = frozenset({"evaluation.json", "evaluation.nc", "score.json"})
+EVALUATION = frozenset({"evaluation.json", "evaluation.nc", "predictions", "score.json"})
 REPORT = frozenset({"report.html", "figures"})
 RUN = Kind("run", "scenario.yaml", frozenset({"scenario.yaml", "dataset", "truth", "estimate"}) | EVALUATION | REPORT)
 ESTIMATE = Kind(

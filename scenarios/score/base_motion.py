@@ -5,18 +5,15 @@
 R of the true base, and as predicted from the first second at rest and a wrench: no marker later than that, no noise.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calibration import Dataset, Estimate
-from calibration.mocap import relabelled_trial
-from calibration.prediction.base_pose import base_poses
-from calibration.stages.suspension import Source, Suspension, laboratory
-from twin import truth
+from calibration.prediction import PredictedTrial
+from calibration.stages.suspension import Source
+from twin.truth import TruthTrial
 
 
 @dataclass(frozen=True)
@@ -29,32 +26,21 @@ class BaseScore:
     pitch_r2: float
 
 
-def base_scores(estimate: Estimate, dataset: Dataset, truth_folder: Path) -> tuple[BaseScore, ...]:
+def base_scores(trials: Iterable[tuple[PredictedTrial, TruthTrial]]) -> tuple[BaseScore, ...]:
     """One for each source of the wrench that the suspension was tried with; none without a suspension or swings."""
-    suspension = estimate.suspension
-    swings = dataset.entries("validation", "swing")
-    if suspension is None or not swings:
-        return ()
-    data = estimate, dataset, truth_folder
-    return tuple(_score(source, list(_angles(suspension, source, *data))) for source, _ in suspension.held_out)
+    pairs: dict[Source, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for trial, true in trials:
+        base = trial.base
+        if trial.kind == "swing" and base is not None and base.rest is not None:
+            for source, x in base.predicted:
+                pairs.setdefault(source, []).append((_turned(true.base_pose), _turned(base.rest.poses(x))))
+    return tuple(_score(source, found) for source, found in pairs.items())
 
 
 def _score(source: Source, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> BaseScore:
     true, found = (np.concatenate(x) for x in zip(*pairs, strict=True))
     left = ((found - true) ** 2).sum(axis=0) / ((true - true.mean(axis=0)) ** 2).sum(axis=0)
     return BaseScore(source, len(true), *(float(1.0 - x) for x in left[:2]))
-
-
-def _angles(
-    suspension: Suspension, source: Source, estimate: Estimate, dataset: Dataset, truth_folder: Path
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """True and predicted rotation vectors (n, 3) [rad] since the start of each trial."""
-    for entry in dataset.entries("validation", "swing"):
-        description = dataset.description.loaded(entry)
-        lab = laboratory(dataset.urdf, description, estimate.clock("robot"), estimate.clock("plate"))
-        true = truth.read_trial(truth_folder / entry.file).base_pose
-        found = base_poses(suspension, lab, relabelled_trial(dataset, entry), source)
-        yield _turned(true), _turned(found)
 
 
 def _turned(T: np.ndarray) -> np.ndarray:

@@ -11,27 +11,24 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from calibration import Dataset, Estimate, Evaluation, predictions
+from calibration import Estimate, Evaluation
 from calibration.evaluation import Row, TrialErrors, ladder, pose_errors, row_entry, scored_errors
 from calibration.inference.parameters import Model
 from calibration.inference.parameters import Parameter as EstimatedParameter
-from calibration.mocap import poses_of, relabelled_trial
-from calibration.prediction import BASELINE
+from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
 from twin import truth
 from twin.truth import Parameter, TruthTrial
 
-if TYPE_CHECKING:
-    from calibration.recording import Trial
-
 Status = Literal["estimated", "combined", "not_identifiable", "not_estimated"]
 SPAN_95 = 1.959963984540054
 """Half width of a 95 % interval in standard deviations."""
+FLOOR = "floor"
 _ALIKE = 1e-9  # [-] share of the largest eigenvalue below which combinations repeat each other
 
 
@@ -107,17 +104,18 @@ class Score(ParameterScore):
         return super()._content() | {"rows": rows, "base": [asdict(b) for b in self.base]}
 
 
-def score(estimate: Estimate, dataset: Dataset, truth_folder: Path, evaluation: Evaluation) -> Score:
-    """Judge an estimate on the validation trials of a dataset whose truth is known.
+def score(estimate: Estimate, evaluation: Evaluation, truth_folder: Path) -> Score:
+    """Judge an estimate and the predictions that were evaluated by the truth.
 
     Raises:
         ScenarioError: The truth is missing or of other trials.
         NotCalibrated: The estimate must not be used.
     """
     judged = judge_parameters(estimate.model(estimate.main), _read_parameters(truth_folder / "truth.json"))
-    rows = tuple(ladder(list(_traces(estimate, dataset, truth_folder)), "truth"))
+    pairs = [(p, _read_trial(truth_folder / "trials" / f"{p.trial_id}.nc")) for p in evaluation.predicted]
+    rows = tuple(ladder(list(_errors(pairs, _true_base_body(truth_folder))), "truth"))
     parts: dict[str, Any] = {f.name: getattr(judged, f.name) for f in fields(judged)}
-    base = base_scores(estimate, dataset, truth_folder)
+    base = base_scores(pairs)
     return Score(**parts, rows=rows, skill=tuple(_skill(row, rows) for row in rows), base=base)
 
 
@@ -191,22 +189,19 @@ def _nees(errors: np.ndarray, covariance: np.ndarray) -> tuple[float, int]:
     return float((projected**2 / values[kept]).sum()), int(kept.sum())
 
 
-def _traces(estimate: Estimate, dataset: Dataset, truth_folder: Path) -> Iterator[TrialErrors]:
+def _errors(pairs: Iterable[tuple[PredictedTrial, TruthTrial]], T_base_body: np.ndarray) -> Iterator[TrialErrors]:
     """Errors of every prediction, and of the floor, against the true hand pose."""
-    recorded = {
-        e.id: (e, relabelled_trial(dataset, e), _read_trial(truth_folder / e.file))
-        for e in dataset.entries("validation")
-    }
-    for p in predictions(estimate, dataset):
-        entry, trial, true = recorded[p.trial_id]
-        errors = pose_errors(p.T_lab_hand, true.hand_pose)
-        scored = scored_errors(p.t, errors, trial, entry.kind == "static")
-        yield TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
-    T_base_body = _true_base_body(truth_folder)
-    for entry, trial, true in recorded.values():
-        errors = pose_errors(_floor(dataset, trial, true, T_base_body), true.hand_pose)
-        scored = scored_errors(trial.t_mocap, errors, trial, entry.kind == "static")
-        yield TrialErrors("floor", "measured", "link", entry.id, entry.kind, trial.t_mocap, errors, scored)
+    floors = []
+    for trial, true in pairs:
+        for p in (*trial.rows, _floor(trial, true, T_base_body)):
+            errors = pose_errors(p.T_lab_hand, true.hand_pose)
+            scored = scored_errors(p.t, errors, trial.dwells, p.kind == "static")
+            found = TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
+            if p.model == FLOOR:
+                floors.append(found)
+            else:
+                yield found
+    yield from floors
 
 
 def _read_trial(path: Path) -> TruthTrial:
@@ -219,17 +214,17 @@ def _true_base_body(truth_folder: Path) -> np.ndarray:
     return np.array(json.loads((truth_folder / "truth.json").read_text(encoding="utf-8"))["derived"]["T_base_base"])
 
 
-def _floor(dataset: Dataset, trial: "Trial", true: TruthTrial, T_base_body: np.ndarray) -> np.ndarray:
+def _floor(trial: PredictedTrial, true: TruthTrial, T_base_body: np.ndarray) -> Prediction:
     """T_lab_B measured, T_B_hand true (n, 4, 4)."""
     T_B_hand = np.linalg.solve(true.base_pose @ T_base_body, true.hand_pose)
-    return poses_of(dataset.description.base_body, trial).T @ T_B_hand
+    return Prediction(FLOOR, "measured", "link", trial.trial_id, trial.kind, trial.t, trial.T_lab_B @ T_B_hand)
 
 
 def _skill(row: Row, rows: tuple[Row, ...]) -> float | None:
     """1 at the floor, 0 at the registration-only baseline with the same source of base motion."""
     like = {r.model: r.metrics.position_rmse_component_mm for r in rows if (r.trials, r.base) == (row.trials, row.base)}
     floor = next(
-        (r.metrics.position_rmse_component_mm for r in rows if (r.model, r.trials) == ("floor", row.trials)), None
+        (r.metrics.position_rmse_component_mm for r in rows if (r.model, r.trials) == (FLOOR, row.trials)), None
     )
     start = like.get(BASELINE)
     if floor is None or start is None or start == floor:

@@ -226,6 +226,7 @@ def _evaluate(estimate: Path, dataset: Path, out: Path, progress: Progress) -> "
         lambda at, fraction: progress("evaluate", at, fraction),
     )
     evaluation.save(out)
+    evaluation.save_predictions(out)
     return evaluation
 
 
@@ -236,7 +237,7 @@ def _score(
     from scenarios.score.score import score
 
     progress("score", "", 0.0)
-    scored = score(calibration.load_estimate(estimate), calibration.load(dataset), truth, evaluation)
+    scored = score(calibration.load_estimate(estimate), evaluation, truth)
     scored.save(out)
     return scored
 

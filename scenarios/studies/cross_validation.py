@@ -54,7 +54,10 @@ def held_out(files: Sequence[Path], mapping: Path) -> HeldOut:
         import_files("csv", files, mapping, Path(folder) / "dataset")
         dataset = load(Path(folder) / "dataset")
         found = _estimate(dataset)
-        points = (p for m in found.models for p in point_rows(replace(found, main=m.name), dataset, "validation"))
+        recorded = tuple(dataset.means("validation"))
+        points = (
+            p for m in found.models for p in point_rows(replace(found, main=m.name), dataset.description, recorded)
+        )
         return HeldOut(tuple(points), found.verdicts)
 
 

@@ -27,7 +27,7 @@ def judged(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     dataset = calibration.load(work / "dataset")
     estimate = calibration.calibrate(dataset)
     evaluation = calibration.evaluate(estimate, dataset)
-    scored = score(estimate, dataset, work / "truth", evaluation)
+    scored = score(estimate, evaluation, work / "truth")
     evaluation.save(out)
     (out / "evaluation.nc").unlink(missing_ok=True)
     scored.save(out)

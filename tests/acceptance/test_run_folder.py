@@ -179,10 +179,10 @@ def swing(result, compensator):
     )  # fmt: skip
     rows = {
         (p.model, p.base): p.T_lab_hand
-        for p in replace(predict, robot=SAME, plate=SAME)(entry, same)
+        for p in replace(predict, robot=SAME, plate=SAME)(entry, same).rows
         if p.encoder == "motor"
     }
-    real = {(p.model, p.base): p.T_lab_hand[ok] for p in predict(entry, trial) if p.encoder == "motor"}
+    real = {(p.model, p.base): p.T_lab_hand[ok] for p in predict(entry, trial).rows if p.encoder == "motor"}
     T_lab_B = poses_of(dataset.description.base_body, same).T
     start = mean(T_lab_B[t <= t[0] + 1.0]) @ inverse(from_vector(compensator.hand.base))
     true = read_trial(result.folder / "truth" / entry.file).hand_pose[ok]

@@ -50,8 +50,7 @@ def ladders(runs, evaluations):
     """Their dynamic rows against the truth, by model, base and encoder."""
     found = []
     for seed, (folder, estimate), evaluation in zip(SEEDS, runs, evaluations, strict=True):
-        dataset = calibration.load(folder / "dataset")
-        judged = score(estimate, dataset, folder / "truth", evaluation)
+        judged = score(estimate, evaluation, folder / "truth")
         rows = {(r.model, r.base, r.encoder): r.metrics for r in judged.rows if r.trials == "dynamic"}
         found.append(rows)
         print(seed, *(f"{'/'.join(k)} {x.position_rmse_component_mm:.2f}" for k, x in rows.items()))
@@ -145,8 +144,8 @@ def nominal_error(config, seed: int) -> tuple[float, float]:
         if motion.role == "validation" and motion.kind == "swing":
             trial, true = measure(lab, motion, simulate(lab.twin, motion, lab.T_lab_base), 100.0)
             entry = TrialEntry(id=motion.id, role=motion.role, kind=motion.kind, motion="", file="", sha256="0" * 64)
-            p = next(p for p in predict(entry, trial) if p.base == "fixed")
-            errors = scored_errors(p.t, pose_errors(p.T_lab_hand, true.hand_pose), trial, False).complete
+            p = next(p for p in predict(entry, trial).rows if p.base == "fixed")
+            errors = scored_errors(p.t, pose_errors(p.T_lab_hand, true.hand_pose), np.zeros((0, 2)), False).complete
             position.append(errors.position)
             rotation.append(np.linalg.norm(errors.rotation, axis=1))
     return (

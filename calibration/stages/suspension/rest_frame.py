@@ -54,7 +54,11 @@ def rest_of(description: Description, trial: Trial, T_base_B: np.ndarray) -> Res
     T_lab_B = poses_of(body, trial).T[early]
     if not np.isfinite(T_lab_B).any():
         raise NotEnoughData(f"{trial.id}: body {body.name!r} is not seen in the first second of the trial")
-    T_lab_B = mean(T_lab_B)
+    return rest_at(description, mean(T_lab_B), T_base_B)
+
+
+def rest_at(description: Description, T_lab_B: np.ndarray, T_base_B: np.ndarray) -> Rest:
+    """Frame 0 where the base's marker body is at T_lab_B (4, 4) at rest."""
     T_lab_0 = upright(T_lab_B @ inverse(T_base_B), description)
     return Rest(T_lab_0, inverse(T_lab_0) @ T_lab_B)
 

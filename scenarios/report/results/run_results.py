@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 import calibration
+from calibration.prediction import PredictedTrial, read_predicted
 from calibration.recording import Description
 from scenarios.files.errors import ScenarioError
 from scenarios.report.results.recordings import Recorded, recorded
@@ -37,6 +38,7 @@ class Results:
         recorded: The trials, in the order of dataset.json.
         sha256: Of dataset.json.
         picture: PNG of the robot.
+        predicted: Base and joints of the held-out trials as they were predicted, by trial.
     """
 
     evaluation: Evaluation
@@ -50,6 +52,7 @@ class Results:
     recorded: tuple[Recorded, ...]
     sha256: str | None
     picture: bytes | None
+    predicted: dict[str, PredictedTrial]
 
     @property
     def description(self) -> Description | None:
@@ -84,6 +87,7 @@ def read(run: Path) -> Results:
         recorded=tuple(recorded(dataset / t.file, t) for t in trials),
         sha256=hashlib.sha256((dataset / "dataset.json").read_bytes()).hexdigest() if loaded else None,
         picture=picture.read_bytes() if picture.is_file() else None,
+        predicted={path.stem: read_predicted(path) for path in sorted((run / "predictions").glob("*.nc"))},
     )
 
 

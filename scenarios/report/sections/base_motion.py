@@ -13,14 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.errors import NotEnoughData
-from calibration.mocap import poses_of, relabelled_trial
-from calibration.numerics.lie import from_vector
+from calibration import prediction
 from calibration.numerics.signals import CUTOFF, even, low_passed
-from calibration.prediction.base_pose import base_poses
-from calibration.prediction.predictor import REFERENCE, Predictor, predictor
-from calibration.recording import Trial, TrialEntry
-from calibration.stages.suspension import Suspension, laboratory, rest_of
+from calibration.stages.suspension import Suspension
 from scenarios.plots.style import ESTIMATE, OTHER, drawing, figure
 from scenarios.plots.trace import Line, measured_beside
 from scenarios.report.results import suspension
@@ -30,6 +25,7 @@ from scenarios.report.results.section import Drawn, RunView
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 UNITS = ("mm", "mm", "mm", "mrad", "mrad", "mrad")
+_REFERENCE = 1.0  # [s] of rest at the start of every trial
 _UNIT = 1e3  # mm in a metre, mrad in a radian
 _LINES = {"plate": (ESTIMATE, 1.7), "dynamics": (OTHER, 0.7)}
 _HEIGHT = 5.2  # [inch] of the figure
@@ -74,7 +70,7 @@ class Sway:
     @property
     def scored(self) -> np.ndarray:
         """(n,) what counts."""
-        return np.asarray((self.t > REFERENCE) & np.isfinite(self.measured).all(axis=1))
+        return np.asarray((self.t > _REFERENCE) & np.isfinite(self.measured).all(axis=1))
 
     @property
     def middle(self) -> np.ndarray:
@@ -89,12 +85,12 @@ class Sway:
     @property
     def shifted(self) -> np.ndarray:
         """Where the base stands in the last second (6,) [mm, mrad]; it began at zero."""
-        return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - REFERENCE], axis=0))
+        return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - _REFERENCE], axis=0))
 
     @property
     def noise(self) -> np.ndarray:
         """Rms (6,) [mm, mrad] of the markers' noise, by the first second at rest."""
-        return np.asarray(np.nanstd(self.measured[self.t <= REFERENCE], axis=0))
+        return np.asarray(np.nanstd(self.measured[self.t <= _REFERENCE], axis=0))
 
     def left(self, predicted: Predicted) -> np.ndarray:
         """Rms (6,) [mm, mrad] that a prediction leaves."""
@@ -173,28 +169,23 @@ def sway(results: Results) -> tuple[Sway | None, str]:
     entry = next((e for e in dataset.entries("validation") if e.kind != "static"), None)
     if entry is None:
         return None, "no held-out trial moves"
-    try:
-        return _of_trial(predictor(estimate, dataset), estimate.suspension, entry, relabelled_trial(dataset, entry)), ""
-    except NotEnoughData as error:
-        return None, str(error)
+    trial = results.predicted.get(entry.id)
+    if trial is None:
+        return None, "no predictions are saved; evaluate again"
+    if trial.base is None or not trial.base.predicted:
+        return None, f"trial {entry.id} has no wrench of a source the suspension was tried with"
+    return _of_trial(trial.trial_id, trial.t, trial.base, estimate.suspension), ""
 
 
-def _of_trial(prepared: Predictor, suspension: Suspension, entry: TrialEntry, trial: Trial) -> Sway:
-    description, base = prepared.description.loaded(entry), from_vector(prepared.models["model_1"].base)
-    lab = laboratory(prepared.urdf, description, prepared.robot, prepared.plate, base)
-    rest = rest_of(description, trial, base)
-    smooth = low_passed(even(trial.t_mocap, rest.displacement(poses_of(description.base_body, trial).T)), CUTOFF)
+def _of_trial(trial: str, t: np.ndarray, base: prediction.BaseMotion, suspension: Suspension) -> Sway:
+    smooth = low_passed(even(t, base.measured), CUTOFF)
     measured = np.where(smooth.valid[:, None], _UNIT * smooth.x, np.nan)
-    alone = Sway(entry.id, smooth.t - trial.t_mocap[0], measured, ())
+    alone = Sway(trial, smooth.t - t[0], measured, ())
     predicted = []
-    for source, _ in suspension.held_out:
-        if source == "dynamics" or (prepared.plate is not None and len(trial.t_plate)):
-            at_mocap = _UNIT * rest.displacement(base_poses(suspension, lab, trial, source))
-            x = np.stack([np.interp(smooth.t, trial.t_mocap, column) for column in at_mocap.T], axis=1)
-            whole, middle = (_r2(measured, x, rows) for rows in (alone.scored, alone.middle))
-            predicted.append(Predicted(source, x, whole, middle, suspension.moves(source)))
-    if not predicted:
-        raise NotEnoughData(f"trial {entry.id} has no wrench of a source the suspension was tried with")
+    for source, at_mocap in base.predicted:
+        x = np.stack([np.interp(smooth.t, t, _UNIT * column) for column in at_mocap.T], axis=1)
+        whole, middle = (_r2(measured, x, rows) for rows in (alone.scored, alone.middle))
+        predicted.append(Predicted(source, x, whole, middle, suspension.moves(source)))
     return replace(alone, predicted=tuple(predicted))
 
 

@@ -15,10 +15,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from calibration.errors import NotEnoughData
-from calibration.prediction.predictor import predictor
-from calibration.recording import Trial
-from calibration.stages.joints import JointModel, JointModels, Samples, limit_of, pooled, samples_of
+from calibration.prediction import JointSamples
+from calibration.stages.joints import JointModel, limit_of
 from scenarios.plots.hysteresis import BACK, FORTH, Flank, hysteresis
 from scenarios.plots.style import drawing, figure
 from scenarios.report.results.formatting import fixed, significant
@@ -148,27 +146,19 @@ def loops(results: Results) -> tuple[tuple[Loop, ...], str]:
     entries = [e for e in moving if e.payload is None and PUSH not in e.motion] or moving
     if not entries:
         return (), "no held-out trial moves"
-    joints = predictor(estimate, dataset).joints
-    if joints is None:
-        return (), "no joint model was identified"
-    try:
-        return tuple(_loops(joints, [dataset.read(e) for e in entries])), ""
-    except NotEnoughData as error:
-        return (), str(error)
+    corrected = {model.joint: model.degree is not None for model in estimate.joint_models}
+    found = [joint for e in entries if e.id in results.predicted for joint in results.predicted[e.id].joints]
+    return tuple(_loops(found, corrected)), "" if found else "no predictions are saved; evaluate again"
 
 
-def _loops(joints: JointModels, trials: Sequence[Trial]) -> Iterator[Loop]:
-    of_trials = [samples_of(joints.of_trial(t.id).inputs, t, joints.zero) for t in trials]
-    for joint, column in zip(joints.inputs.measured, zip(*of_trials, strict=True), strict=True):
-        model = next((m for m in joints.models if m.joint == joint), None)
-        moving = [s.part(np.abs(s.velocity) > _MOVING) for s in column if s is not None]
-        if model is not None and any(map(len, moving)):
-            yield _loop(model, pooled(moving))
-
-
-def _loop(model: JointModel, s: Samples) -> Loop:
-    predicted = model.discrepancy(s.theta, s.tau, s.velocity)
-    return Loop(model.joint, model.degree is not None, s.t, s.theta, s.velocity, 1e3 * s.y, 1e3 * predicted)
+def _loops(found: Sequence[JointSamples], corrected: Mapping[str, bool]) -> Iterator[Loop]:
+    """A joint's samples of all trials, while it moves."""
+    for joint, corrects in corrected.items():
+        rows = [np.stack([s.t, s.theta, s.velocity, s.discrepancy, s.predicted]) for s in found if s.joint == joint]
+        both = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
+        t, theta, velocity, measured, model = both[:, np.abs(both[2]) > _MOVING]
+        if len(t):
+            yield Loop(joint, corrects, t, theta, velocity, 1e3 * measured, 1e3 * model)
 
 
 def drawn(found: Sequence[Loop]) -> Figure | None:

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from calibration.evaluation.comparison import compare, comparisons
-from calibration.evaluation.evaluate import no_better
 from calibration.evaluation.ladder import TrialErrors
 from calibration.evaluation.pose_errors import PoseErrors
+from calibration.evaluation.results import no_better
 
 
 def trace(model, base, error):

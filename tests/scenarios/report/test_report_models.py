@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 import mjcf
-from calibration import Estimate, Evaluation, save_estimate
-from calibration.evaluation.joint_regimes import Regime as CalibratedRegime
+from calibration import Estimate, Evaluation, load, load_estimate, save_estimate
 from calibration.evaluation.ladder import TrialErrors, ladder
 from calibration.evaluation.pose_errors import PoseErrors
 from calibration.inference.parameters import Combination, Model, Parameter
+from calibration.prediction import predict
 from calibration.recording.clock import Clock
 from calibration.stages.joints.correction import input_model
+from calibration.stages.joints.repetitions import Regime as CalibratedRegime
 from calibration.stages.joints.stage import joints_model
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Suspension
@@ -100,6 +101,13 @@ def write_dataset(folder, trials, **changes):
     rigid_robot.write(folder, trials, wheels=[w.model_dump() for w in WHEELS], **changes)
 
 
+def write_predictions(run):
+    shutil.rmtree(run / "predictions", ignore_errors=True)
+    (run / "predictions").mkdir()
+    for trial in predict(load_estimate(run / "estimate"), load(run / "dataset")):
+        trial.save(run / "predictions")
+
+
 @pytest.fixture(scope="module")
 def recording():
     trial, x = record("xyz", [2, 3], np.random.default_rng(5))
@@ -111,6 +119,7 @@ def whole(tmp_path_factory, recording):
     run = tmp_path_factory.mktemp("run") / "small"
     write_dataset(run / "dataset", [("xyz", "validation", "swing", recording[0])])
     save_estimate(known_estimate(), run / "estimate")
+    write_predictions(run)
     rows = [
         TrialErrors("model_2", b, "motor", "xyz", "swing", np.arange(50.0), *2 * [small_errors()])
         for b in ("fixed", "plate")
@@ -292,6 +301,7 @@ def test_trials_are_apart_where_payload_or_push_differ(run, recording):
     content = json.loads((run / "dataset/dataset.json").read_text())
     content["trials"][1]["payload"] = 2.0
     (run / "dataset/dataset.json").write_text(json.dumps(content))
+    write_predictions(run)
     errors = [
         {"trial": n, "model": "model_2", "base": b, "encoder": "motor", "n": 5}
         | {"position_rmse_component_mm": mm, "orientation_rmse_deg": 0.5}
@@ -346,6 +356,7 @@ def test_without_plate_or_link_encoders_the_page_says_so(run, recording):
     joints = [{"name": j, "encoders": ["motor"], "rate": 100.0} for j in rigid_robot.JOINTS]
     trial = rigid_robot.without_plate(recording[0])
     write_dataset(run / "dataset", [("xyz", "validation", "swing", trial)], joints=joints, plates=[])
+    write_predictions(run)
     write(run)
     assert "The joints' hysteresis is not drawn: no joint has a link-side encoder." in text_of(run)
     assert (

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from calibration import Dataset, Estimate
-from calibration.evaluation import joint_regimes
-from calibration.evaluation.joint_regimes import on_repetitions, on_validation
+from calibration.evaluation.joint_regimes import on_validation
 from calibration.mocap.postures import passed_rows
 from calibration.numerics.signals import play
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.joints import repetitions
 from calibration.stages.joints.correction import JointModels
 from calibration.stages.joints.degree_selection import Candidate
 from calibration.stages.joints.hand_selection import nearest_hand
+from calibration.stages.joints.repetitions import on_repetitions
 from calibration.stages.joints.samples import Samples
 from calibration.stages.joints.stage import fit_joint_models
 from tests.doubles import joint_data, rigid_robot
@@ -66,7 +67,7 @@ def test_without_markers_the_lowest_degree_worth_trying_is_taken() -> None:
 
 
 def test_play_is_explained_in_motion_and_not_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joint_regimes, "RICHEST", 2)
+    monkeypatch.setattr(repetitions, "RICHEST", 2)
     rng = np.random.default_rng(2)
     moving = [*joint_data.motions(0), *joint_data.motions(9, 2)]
     static, dwells = rigid_robot.through(rng.uniform(-1.0, 1.0, (12, 8)) * 0.4 + rigid_robot.CENTRE)
@@ -86,7 +87,7 @@ def test_play_is_explained_in_motion_and_not_at_rest(monkeypatch: pytest.MonkeyP
 
 def test_a_start_is_no_repetition_and_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """The gear is thrown from flank to flank for a second after each start, by nothing the model is asked with."""
-    monkeypatch.setattr(joint_regimes, "RICHEST", 1)
+    monkeypatch.setattr(repetitions, "RICHEST", 1)
     data = []
     for k, q in enumerate(joint_data.motions(0)):
         y = lost_in_play(q)
@@ -111,7 +112,7 @@ def test_a_start_is_no_repetition_and_is_told_apart(monkeypatch: pytest.MonkeyPa
 def test_a_joint_is_excited_on_both_flanks_and_above_the_noise(
     monkeypatch: pytest.MonkeyPatch, change: str, told: bool
 ) -> None:
-    monkeypatch.setattr(joint_regimes, "RICHEST", 1)
+    monkeypatch.setattr(repetitions, "RICHEST", 1)
     data = []
     for k, q in enumerate(joint_data.motions(0)):
         if change == "one way":
@@ -130,7 +131,7 @@ def lost_in_play(q: np.ndarray) -> np.ndarray:
 
 
 def test_regimes_leave_out_joints_that_are_not_excited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joint_regimes, "RICHEST", 1)
+    monkeypatch.setattr(repetitions, "RICHEST", 1)
     still = []
     for trial in joint_data.made([]):
         q = trial.q_motor.copy()

@@ -1,0 +1,172 @@
+"""What is predicted of one trial: the hand by every row, and the base and the readings that the rows are products of.
+
+predictions/<trial>.nc     t                                       [s, mocap clock]
+                           rows/<model>/<base>/<encoder>           position [m, lab], quaternion_wxyz of the hand
+                           base                                    displacement [m, rad, frame 0]: measured, by source
+                           joints/<joint>                          theta, velocity, discrepancy, predicted [rad, rad/s]
+"""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from calibration.estimate.rows import Base, Encoder
+from calibration.recording import netcdf
+from calibration.stages.joints.correction import Corrected
+from calibration.stages.suspension.model import Source
+from calibration.stages.suspension.rest_frame import Rest
+
+_OPEN = "make it again with evaluate"
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted hand poses of one trial.
+
+    Attributes:
+        model: Row of the ladder.
+        base: Where the base's motion comes from.
+        encoder: Which side of the gear was read.
+        trial_id: The trial.
+        kind: Its kind: static, sweep, swing, spin, drive.
+        t: (n,) [s, mocap clock].
+        T_lab_hand: (n, 4, 4), NaN where it cannot be predicted.
+    """
+
+    model: str
+    base: Base
+    encoder: Encoder
+    trial_id: str
+    kind: str
+    t: np.ndarray
+    T_lab_hand: np.ndarray
+
+
+@dataclass(frozen=True)
+class BaseMotion:
+    """The base of one trial, measured and as the suspension predicts it, its marker body at the nominal place.
+
+    Attributes:
+        measured: (n, 6) displacement [m, rad, frame 0], NaN where the markers are not seen.
+        predicted: Displacement (n, 6) by source of the wrench.
+        rest: Frame 0; None where it was read from a file.
+    """
+
+    measured: np.ndarray
+    predicted: tuple[tuple[Source, np.ndarray], ...]
+    rest: Rest | None = None
+
+
+@dataclass(frozen=True)
+class JointSamples:
+    """Samples of one joint and its model, all (n,).
+
+    Attributes:
+        joint: Its name.
+        t: [s, robot clock].
+        theta: [rad].
+        velocity: Motor side [rad/s].
+        discrepancy: Motor minus link reading, the zero removed [rad].
+        predicted: By the joint's model [rad].
+    """
+
+    joint: str
+    t: np.ndarray
+    theta: np.ndarray
+    velocity: np.ndarray
+    discrepancy: np.ndarray
+    predicted: np.ndarray
+
+
+@dataclass(frozen=True)
+class PredictedTrial:
+    """Every row's prediction of one trial, and what they are made of, each once.
+
+    Attributes:
+        trial_id: The trial.
+        kind: Its kind; empty where the trial was read from a file.
+        t: (n,) [s, mocap clock]; of posture means their numbers.
+        rows: Of the ladder; none where the trial was read from a file.
+        base: None without a suspension.
+        joints: Joints with a model and a link encoder, of a trial that moves.
+        T_lab_B: (n, 4, 4) the base's marker body as measured; empty where the trial was read from a file.
+        dwells: (k, 2) start and stop of the dwells of a static trial [s].
+        corrected: Motor readings less the joint models, None without them.
+    """
+
+    trial_id: str
+    kind: str
+    t: np.ndarray
+    rows: tuple[Prediction, ...] = ()
+    base: BaseMotion | None = None
+    joints: tuple[JointSamples, ...] = ()
+    T_lab_B: np.ndarray = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    dwells: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    corrected: Corrected | None = None
+
+    def save(self, folder: Path) -> None:
+        """Write <trial>.nc into a folder that is there."""
+        path = folder / f"{self.trial_id}.nc"
+        part = path.with_name(path.name + ".part")
+        with netcdf.created(part) as file:
+            file.title = "predicted hand poses in the lab, displacement of the base, deflection of the joints"
+            netcdf.add_dimensions(file, {"t": len(self.t), "axis": 3, "quaternion": 4, "twist": 6})
+            netcdf.write_variable(file, "t", self.t, ("t",), "f8", {"units": "s", "clock": "mocap"})
+            for row in self.rows:
+                _write_row(file.createGroup(f"rows/{row.model}/{row.base}/{row.encoder}"), row.T_lab_hand)
+            if self.base is not None:
+                group = file.createGroup("base")
+                for name, x in (("measured", self.base.measured), *self.base.predicted):
+                    netcdf.write_variable(group, name, x, ("t", "twist"), "f4", {"units": "m, rad", "frame": "0"})
+            for joint in self.joints:
+                _write_joint(file.createGroup(f"joints/{joint.joint}"), joint)
+        os.replace(part, path)
+
+
+def _write_row(group: netcdf.Group, T: np.ndarray) -> None:
+    known = np.isfinite(T).all(axis=(1, 2))
+    wxyz = np.full((len(T), 4), np.nan)
+    wxyz[known] = Rotation.from_matrix(T[known, :3, :3]).as_quat(canonical=True, scalar_first=True)
+    netcdf.write_variable(group, "position", T[:, :3, 3], ("t", "axis"), "f4", {"units": "m", "frame": "lab"})
+    netcdf.write_variable(group, "quaternion_wxyz", wxyz, ("t", "quaternion"), "f4", {"units": "-", "frame": "lab"})
+
+
+_JOINT = (("t", "s"), ("theta", "rad"), ("velocity", "rad/s"), ("discrepancy", "rad"), ("predicted", "rad"))
+
+
+def _write_joint(group: netcdf.Group, joint: JointSamples) -> None:
+    netcdf.add_dimensions(group, {"sample": len(joint.t)})
+    for name, units in _JOINT:
+        netcdf.write_variable(group, name, getattr(joint, name), ("sample",), "f8", {"units": units})
+
+
+def read_predicted(path: Path | str) -> PredictedTrial:
+    """Base and joints of a saved trial.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    path = Path(path)
+    with netcdf.opened(path, _OPEN) as file:
+        return PredictedTrial(
+            path.stem, "", netcdf.array(file, "t"), base=_read_base(file), joints=tuple(_joints(file))
+        )
+
+
+def _read_base(file: netcdf.Group) -> BaseMotion | None:
+    if "base" not in file.groups:
+        return None
+    group = file.groups["base"]
+    sources: tuple[Source, ...] = ("plate", "dynamics")
+    predicted = tuple((source, netcdf.array(group, source)) for source in sources if source in group.variables)
+    return BaseMotion(netcdf.array(group, "measured"), predicted)
+
+
+def _joints(file: netcdf.Group) -> Iterator[JointSamples]:
+    if "joints" in file.groups:
+        for name, group in file.groups["joints"].groups.items():
+            yield JointSamples(name, *(netcdf.array(group, field) for field, _ in _JOINT))
