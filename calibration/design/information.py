@@ -101,7 +101,7 @@ def prospect(
 
     Args:
         model: The robot as far as it is known.
-        parameters: What is to be found, with tolerances; the first of `HandModel.theta`.
+        parameters: What is to be found, with tolerances.
         description: Markers and their noise.
         play: (k,) random error of each joint's reading [rad, m].
         q: Candidates.
@@ -109,11 +109,11 @@ def prospect(
         known: (p, p) covariance of the scaled parameters by what is recorded already; V is the identity then.
     """
     p = len(parameters)
-    found = model.poses_and_derivatives(q, n_parameters=p)
+    found = model.poses_and_derivatives(q, names=parameters.names)
     W, J, J_joint = _whitened(found, description, play)
     A = (W @ J) * parameters.scale
     V = told_directions(A) if known is None else np.eye(p)
-    P = model.poses_and_derivatives(at, n_parameters=p).J[:, :3] * parameters.scale @ V
+    P = model.poses_and_derivatives(at, names=parameters.names).J[:, :3] * parameters.scale @ V
     C = np.eye(V.shape[1]) if known is None else known
     none = np.zeros((*A.shape[:2], 0)), np.zeros((*P.shape[:2], 0))
     return Prospect(q, A @ V, P, V, parameters.scale, W @ J_joint, C, *none)
@@ -164,24 +164,22 @@ class Departures:
 
     bending: np.ndarray
 
-    def effects(self, model: HandModel, q: np.ndarray, found: HandPoses) -> np.ndarray:
-        """Local twists of the hand (n, 6, k) at readings q (n, n_measured), for each z = 1; `found` at q."""
-        chain, (n, k) = model.chain, (len(q), len(self.bending))
-        turns = found.J[:, :, 12 : 12 + 6 * k].reshape(n, 6, k, 6)[:, :, :, 3:]
-        return np.asarray(np.einsum("ndkj,nkj->ndk", turns, self.bending[:, None] * chain.gravity_moments(q)))
+    def effects(self, model: HandModel, q: np.ndarray) -> np.ndarray:
+        """Local twists of the hand (n, 6, k) at readings q (n, n_measured), for each z = 1."""
+        turns = model.kinematics(q, np.zeros((len(q), len(self.bending)))).J_frame[:, :, 1:, 3:]
+        return np.asarray(np.einsum("ndkj,nkj->ndk", turns, self.bending[:, None] * model.chain.gravity_moments(q)))
 
 
 def departing(
     told: Prospect, model: HandModel, description: Description, play: np.ndarray, departures: Departures, at: np.ndarray
 ) -> Prospect:
     """A prospect of the hand at postures `at`, with nuisances that its fit does not ask for."""
-    p = 12 + 7 * len(play)
-    found, there = (model.poses_and_derivatives(x, n_parameters=p) for x in (told.q, at))
+    found = model.poses_and_derivatives(told.q, names=())
     W, *_ = _whitened(found, description, play)
-    G = departures.effects(model, told.q, found)
+    G = departures.effects(model, told.q)
     if W.shape[1] == 3:
         G = moved(found.T[:, :3, :3], G, description.hand_body.point)
-    return replace(told, H=W @ G, Z=departures.effects(model, at, there)[:, :3])
+    return replace(told, H=W @ G, Z=departures.effects(model, at)[:, :3])
 
 
 def departures_of(chain: Chain, q: np.ndarray) -> Departures:

@@ -33,11 +33,13 @@ from calibration.mocap.postures import Postures
 from calibration.recording.experiment import ExperimentPlan, Sigma
 from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
-from calibration.robot.hand import HandModel, nominal_hand
-from calibration.stages.geometry.guards import APART, distinct, fewest, joint_lengths
-from calibration.stages.geometry.hand_residual import Errors, hand_problem
+from calibration.robot.hand import HandModel
+from calibration.robot.nominal_frames import nominal_frames
+from calibration.robot.parameter_block import joint_lengths
+from calibration.stages.geometry.guards import APART, distinct, fewest
+from calibration.stages.geometry.hand_residual import NoiseModel, hand_problem
 from calibration.stages.geometry.model_of_fit import hand_of
-from calibration.stages.geometry.parameters import geometry_parameters, play_floor, play_start
+from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
 from calibration.verdict import Verdict
 
 STAGE, FILE = "geometry", "record_next.yaml"
@@ -103,15 +105,16 @@ def _known(
 ) -> Known:
     """From a fit, or from the datasheet where it must not be relied on."""
     parameters = geometry_parameters(chain, description)
-    hand, p = nominal_hand(chain, parameters.nominal[:12]), len(parameters)
+    frames, p = nominal_frames(chain, description), len(parameters)
+    hand = hand_model(chain, frames)
     names = [x.name for x in model.parameters]
     rows = [names.index(name) for name in parameters.names]
-    play = np.maximum(play_start(chain, description), play_floor(chain, description))
+    play = np.maximum(reading_sigma(chain, description), reading_floor(chain, description))
     if refused:
         theta = np.array([model.parameters[row].value for row in rows])
         play = believed_play(hand, parameters, postures, theta, play)
     else:
-        hand = hand_of(model, chain, parameters.nominal[:12])
+        hand = hand_of(model, chain, frames)
         play = model.play if len(model.play) else play
     description = _as_measured(description, postures)
     low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits())
@@ -167,9 +170,9 @@ def believed_play(
     hand: HandModel, parameters: ParameterSet, postures: Postures, theta: np.ndarray, play: np.ndarray
 ) -> np.ndarray:
     """(k,) [rad, m] from postures, a robot near theta (p,) and the datasheet's `play` (k,)."""
-    problem = hand_problem(hand, parameters, postures, Errors(play, _LEAST * play, np.zeros(0)))
+    problem = hand_problem(hand, parameters, postures, NoiseModel(play, _LEAST * play, np.zeros(0)))
     at, f = problem.linearise(theta), problem.widths.prior
-    noise, factors = problem.sources(at), np.geomspace(_LEAST, 1.0, _POINTS)
+    noise, factors = problem.noise, np.geomspace(_LEAST, 1.0, _POINTS)
     values = [evidence(at, noise, problem.prior, Widths(np.append(x * play, 1.0), f)).value for x in factors]
     likely = np.exp(np.min(values) - np.array(values))
     return np.asarray(play * np.sqrt(likely @ factors**2 / likely.sum()))

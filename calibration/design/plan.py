@@ -20,8 +20,9 @@ from calibration.inference.parameters import ParameterSet
 from calibration.recording.experiment import ExperimentPlan, Posture, Sigma
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of
-from calibration.robot.hand import HandModel, nominal_hand
-from calibration.stages.geometry.parameters import backlash_parameters, play_floor, play_start
+from calibration.robot.hand import HandModel
+from calibration.robot.nominal_frames import nominal_frames
+from calibration.stages.geometry.parameters import full_parameters, hand_model, reading_floor, reading_sigma
 
 _ANYWHERE = 200  # postures from which largest torques are told
 _RANDOM = 100  # sets of random postures the design is compared with
@@ -96,12 +97,12 @@ def nominal_task(urdf: str, description: Description, rng: np.random.Generator, 
         work: Draws postures like those the robot works in.
     """
     chain = chain_of(urdf, description)
-    play = np.maximum(play_start(chain, description), play_floor(chain, description))
+    play = np.maximum(reading_sigma(chain, description), reading_floor(chain, description))
     room = room_of(shapes_of(urdf, chain, description), description, rng)
     anywhere = room.sample(_ANYWHERE, rng)
-    parameters = backlash_parameters(chain, description, chain.gravity_torques(anywhere))
+    parameters = full_parameters(chain, description, chain.gravity_torques(anywhere))
     departures = departures_of(chain, anywhere)
-    hand = nominal_hand(chain, parameters.nominal[:12])
+    hand = hand_model(chain, nominal_frames(chain, description))
     return Task(room, hand, parameters, play, departures=departures, work=work)
 
 

@@ -12,15 +12,17 @@ References: MacKay, Neural Computation 1992; Hollerbach, Khalil, Gautier, Spring
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import lapack
 
-from calibration.inference.marginal_likelihood import Linearised, Noise, Widths, inverse_and_log_det, moved_by, refined
+from calibration.inference.marginal_likelihood import Widths, inverse_and_log_det, moved_by, refined
 from calibration.inference.noise_selection import needed
-from calibration.inference.parameters import Prior
+from calibration.inference.parameters import ParameterSet, Prior
+from calibration.inference.residual import Linearised, Noise, Residual, stacked, stacked_noise
 
 _OUTER = 15
 _PROMISE = 1e-3  # the last Gauss-Newton step promises a smaller decrease of the cost [-], the one after it 1e-7
@@ -34,21 +36,48 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be fitted.
+    """What is to be fitted: residuals stacked, and the priors of all parameters they depend on.
 
     Attributes:
-        linearise: Residuals and derivatives at theta (p,).
-        sources: Sources of noise of a linearised problem.
-        prior: Of the parameters.
-        widths: Start values.
-        stated: The random errors are stated beforehand, by a datasheet: all of them are believed, none dropped.
+        residuals: Each depends on some of the parameters, found by name; random errors of one name are one group.
+        parameters: Priors.
+        stated: The random errors are stated beforehand, by a datasheet: none is dropped.
+        start: Hyperparameters to begin with; those of `noise` and prior factors of 1 where not given.
     """
 
-    linearise: Callable[[np.ndarray], Linearised]
-    sources: Callable[[Linearised], Noise]
-    prior: Prior
-    widths: Widths
+    residuals: tuple[Residual, ...]
+    parameters: ParameterSet
     stated: bool = False
+    start: Widths | None = None
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Of the parameters."""
+        return self.parameters.prior
+
+    @cached_property
+    def noise(self) -> Noise:
+        """Groups of random errors of all residuals."""
+        if self._single:
+            return self.residuals[0].noise
+        return stacked_noise([r.noise for r in self.residuals], self.linearise(self.prior.nominal).r.shape[1])
+
+    @property
+    def widths(self) -> Widths:
+        """Hyperparameters to begin with."""
+        return self.start or Widths(self.noise.start, np.ones(self.prior.n_groups))
+
+    def linearise(self, theta: np.ndarray) -> Linearised:
+        """Residuals and derivatives at theta (p,)."""
+        if self._single:
+            return self.residuals[0].linearise(theta)
+        columns = [np.array([self.parameters.names.index(name) for name in r.names]) for r in self.residuals]
+        parts = [r.linearise(theta[mine]) for r, mine in zip(self.residuals, columns, strict=True)]
+        return stacked(parts, columns, theta)
+
+    @property
+    def _single(self) -> bool:
+        return len(self.residuals) == 1 and self.residuals[0].names == self.parameters.names
 
 
 @dataclass(frozen=True)
@@ -57,7 +86,7 @@ class Fit:
 
     Attributes:
         at: The problem at the solution.
-        noise: Sources of random errors there.
+        noise: Groups of random errors.
         widths: Sizes of the random errors and factors on the priors.
         covariance: (p, p) of theta.
         whitener: (n, d, d) W with W' W = C^-1.
@@ -76,15 +105,9 @@ class Fit:
         """Estimated parameters (p,)."""
         return self.at.theta
 
-    @property
-    def play(self) -> np.ndarray:
-        """(k,) random reading error of each joint, standard deviation [rad, m]."""
-        return self.widths.noise[: self.at.J_joint.shape[2]]
-
-    @property
-    def hand_error(self) -> np.ndarray:
-        """Random errors of the hand's position [m] and rotation [rad], (2,), (1,) or (0,) as they were asked for."""
-        return self.widths.noise[self.at.J_joint.shape[2] : -1]
+    def noise_sigma(self, names: Iterable[str]) -> np.ndarray:
+        """Standard deviations of random errors by name, those there are none of left out [rad, m]."""
+        return np.array([self.widths.noise[self.noise.names.index(n)] for n in names if n in self.noise.names])
 
     @property
     def J_white(self) -> np.ndarray:
@@ -123,33 +146,31 @@ def solve(
         hasty: Be content with widths to a tenth and theta to a sigma, as a start for all postures.
     """
     same, promise = (_HASTY, _HASTY_PROMISE) if hasty else (_SAME, _PROMISE)
-    widths, noise = problem.widths, problem.sources(at)
+    widths, noise, at = problem.widths, problem.noise, replace(at, weight=np.ones(len(at.r)))
     some = spread(len(at.r), at.r.shape[1], _MANY)
     change, free = np.inf, None
     for _ in range(_OUTER):
         settled = change < same
         old = widths
         if not settled and (hasty or problem.stated):
-            widths, _ = refined(at.rows(some), noise.rows(some), problem.prior, widths, same)
+            widths, _ = refined(at.rows(some), noise, problem.prior, widths, same)
         elif not settled:
-            free, widths = needed(at.rows(some), noise.rows(some), problem.prior, widths, free, same)
-        W = noise.whitener(widths.noise)
+            free, widths = needed(at.rows(some), noise, problem.prior, widths, free, same)
+        W = noise.whitener(at, widths.noise)
         step = _step(problem.prior, at, W, widths)
         if not settled:
             change = max(moved_by(old.noise, widths.noise, 10.0 * noise.floor), moved_by(old.prior, widths.prior, 0.0))
         if weigh is not None and not settled:
-            noise, before = (
-                replace(noise, weight=weigh(distances(at.moved(step.change), noise, widths, step.covariance))),
-                noise,
-            )
-            change = max(change, float(np.abs(noise.weight - before.weight).max()))
+            weight = weigh(distances(at.moved(step.change), noise, widths, step.covariance))
+            change = max(change, float(np.abs(weight - at.weight).max()))
+            at = replace(at, weight=weight)
         still = step.promise < promise
         if still and change < same:
             return Fit(at.moved(step.change), noise, widths, step.covariance, W, True)
         lower = at if still else _descended(problem, at, W, widths, step)
         if lower is None:
             break
-        at, noise = lower, replace(problem.sources(lower), weight=noise.weight)
+        at = replace(lower, weight=at.weight)
     return Fit(at, noise, widths, step.covariance, W, False)
 
 
@@ -163,13 +184,13 @@ def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarr
 
     r' (I - w M)^-1 (I - w M + M)^-1 r,     M = W J covariance J' W'
     """
-    root, (n, d, p) = noise.roots(widths.noise), at.J.shape
+    root, (n, d, p) = noise.roots(at.B, widths.noise), at.J.shape
     r = (root @ at.r[..., None])[..., 0]
     if n * d > _LEVERAGE * p:
         return (r**2).sum(axis=1)
     A = root @ at.J
     M, eye = A @ covariance @ np.swapaxes(A, 1, 2), np.eye(d)
-    left = eye - noise.weight[:, None, None] * M
+    left = eye - at.weight[:, None, None] * M
     # Rounding may leave a posture that is nowhere else in the data a negative share.
     inner = np.linalg.solve(left, np.linalg.solve(left + M, r[..., None]))[..., 0]
     return np.abs((r * inner).sum(axis=1))

@@ -7,8 +7,6 @@ theta is integrated out. Each source of noise b_m (n, d) has the variance v of i
 the hand's position, of its rotation, of the markers. Variances take Fisher scoring steps down to a floor, prior
 factors f MacKay's fixed point, held near 1 as by `_HELD` parameters that deviate by exactly their tolerance.
 References: MacKay, Neural Computation 1992; Patterson, Thompson, Biometrika 1971 (restricted likelihood).
-
-A calibration problem at one value of its parameters, and what is believed of them beforehand.
 """
 
 from dataclasses import dataclass
@@ -17,6 +15,7 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from calibration.inference.parameters import Prior
+from calibration.inference.residual import Linearised, Noise
 
 _HELD = 20.0
 _STEPS = 30
@@ -36,38 +35,6 @@ class Widths:
 
     noise: np.ndarray
     prior: np.ndarray
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Sources of random errors of the residuals.
-
-    Attributes:
-        B: (n, d, m) one source a column.
-        group: (m,) which variance it has.
-        floor: (g,) smallest standard deviation of each group.
-        free: (g,) whether the evidence may change it.
-        weight: (n,) of each posture [-].
-    """
-
-    B: np.ndarray
-    group: np.ndarray
-    floor: np.ndarray
-    free: np.ndarray
-    weight: np.ndarray
-
-    def rows(self, chosen: np.ndarray) -> "Noise":
-        """The sources of some postures."""
-        return Noise(self.B[chosen], self.group, self.floor, self.free, self.weight[chosen])
-
-    def roots(self, noise: np.ndarray) -> np.ndarray:
-        """W (n, d, d) with W' W = C^-1, weights not counted."""
-        C = (self.B * noise[self.group] ** 2) @ np.swapaxes(self.B, 1, 2)
-        return np.linalg.inv(np.linalg.cholesky(C))
-
-    def whitener(self, noise: np.ndarray) -> np.ndarray:
-        """W (n, d, d) with W' W = w C^-1."""
-        return np.sqrt(self.weight)[:, None, None] * self.roots(noise)
 
 
 @dataclass(frozen=True)
@@ -137,31 +104,6 @@ def times_upper(A: np.ndarray, R: np.ndarray) -> np.ndarray:
     return blas.dtrmm(1.0, R, A.T, trans_a=1).T
 
 
-@dataclass(frozen=True)
-class Linearised:
-    """Residuals of n postures with d components each.
-
-    Attributes:
-        theta: (p,).
-        r: (n, d) residuals [m, rad].
-        J: (n, d, p) their derivatives.
-        J_joint: (n, d, k) by joint position.
-    """
-
-    theta: np.ndarray
-    r: np.ndarray
-    J: np.ndarray
-    J_joint: np.ndarray
-
-    def rows(self, chosen: np.ndarray) -> "Linearised":
-        """Some of the postures."""
-        return Linearised(self.theta, self.r[chosen], self.J[chosen], self.J_joint[chosen])
-
-    def moved(self, change: np.ndarray) -> "Linearised":
-        """The same linear problem at theta + change."""
-        return Linearised(self.theta + change, self.r + self.J @ change, self.J, self.J_joint)
-
-
 def refined(
     at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: float, free: np.ndarray | None = None
 ) -> tuple[Widths, Evidence]:
@@ -193,9 +135,9 @@ def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evid
 
     Both are zero for groups that are not free.
     """
-    root, scale = noise.roots(widths.noise), prior.scale
+    root, scale = noise.roots(at.B, widths.noise), prior.scale
     n, d, p = at.J.shape
-    some = np.sqrt(noise.weight)[:, None]
+    some = np.sqrt(at.weight)[:, None]
     A = (root @ at.J) * (some[..., None] * scale)
     r = (root @ at.r[..., None])[..., 0] * some
     flat, precision = A.reshape(n * d, p), prior.precision(widths.prior) * scale**2
@@ -204,7 +146,7 @@ def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evid
     step = spread @ (spread.T @ (flat.T @ r.ravel() + precision * off))
     rest, off = r - (flat @ step).reshape(n, d), off - step
     free = noise.free[noise.group]
-    K, known = root @ noise.B[:, :, free], times_upper(flat, spread).reshape(n, d, p)
+    K, known = root @ at.B[:, :, free], times_upper(flat, spread).reshape(n, d, p)
     trace = (K * (K - known @ (np.swapaxes(known, 1, 2) @ K))).sum(axis=(0, 1))
     slope = 0.5 * (trace - ((K * rest[..., None]).sum(axis=1) ** 2).sum(axis=0))
     together = 0.5 * ((np.swapaxes(K, 1, 2) @ K) ** 2).sum(axis=0)

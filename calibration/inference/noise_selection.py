@@ -18,8 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.inference.marginal_likelihood import Evidence, Linearised, Noise, Widths, refined
+from calibration.inference.marginal_likelihood import Evidence, Widths, refined
 from calibration.inference.parameters import Prior
+from calibration.inference.residual import Linearised, Noise
 
 _WORTH = 1e-2  # least gain of a change
 _DOUBT = 2.0  # a group is dropped on trial though this much seems lost
@@ -68,9 +69,8 @@ def needed(
     if free is not None:
         start = question.answered(free, widths)
     else:
-        of_the_hand = noise.free & (np.arange(len(noise.free)) >= at.J_joint.shape[2])
-        hand, everything = (question.answered(some, widths) for some in (of_the_hand, noise.free))
-        start = min(hand, _thinned(question, everything), key=lambda found: found.cost)
+        common, everything = (question.answered(some, widths) for some in (noise.free & noise.common, noise.free))
+        start = min(common, _thinned(question, everything), key=lambda found: found.cost)
     best = _searched(question, start)
     return best.free, best.widths
 

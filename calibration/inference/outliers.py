@@ -18,7 +18,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from calibration.inference.map_estimate import Fit, Problem, distances, solve, spread
-from calibration.inference.marginal_likelihood import Linearised
+from calibration.inference.residual import Linearised
 
 _NU = 4.0
 _ROUGHLY = 2.0  # times the limit, for what few postures say of all
@@ -74,12 +74,12 @@ def _agreed(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.
     few = everything if mask.all() else problem(mask)
     found = solve(few, few.linearise(theta), lambda distance: (_NU + d) / (_NU + distance), hasty=True)
     weight = np.zeros(n)
-    weight[some] = found.noise.weight
+    weight[some] = found.at.weight
     at, distance = _judged(everything, found, weight)
     kept = _near(distance, _ROUGHLY * limit)
     for _ in range(_ROUNDS):
         good = everything if kept.all() else problem(kept)
-        found = solve(replace(good, widths=found.widths), at.rows(kept))
+        found = solve(replace(good, start=found.widths), at.rows(kept))
         if kept.all():
             distance = distances(found.at, found.noise, found.widths, found.covariance)
         else:
@@ -97,6 +97,5 @@ def _near(distance: np.ndarray, limit: float) -> np.ndarray:
 
 def _judged(problem: Problem, found: Fit, weight: np.ndarray) -> tuple[Linearised, np.ndarray]:
     """The problem at what was found, and the squared distance (n,) of every posture."""
-    at = problem.linearise(found.theta)
-    noise = replace(problem.sources(at), weight=weight)
-    return at, distances(at, noise, found.widths, found.covariance)
+    at = replace(problem.linearise(found.theta), weight=weight)
+    return at, distances(at, problem.noise, found.widths, found.covariance)

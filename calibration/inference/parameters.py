@@ -1,5 +1,6 @@
 """Parameters with their priors, and models as tables of estimated parameters."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -124,14 +125,15 @@ class ParameterSet:
         units: `m` or `rad`, length p.
         nominal: (p,) datasheet values.
         tolerance: (p,) standard deviations of the prior; inf where there is none.
-        group: (p,) parameters whose tolerances share a factor that the data decide, -1: as they stand; None: all stand.
+        group: Label of the parameters whose tolerances share a factor that the data decide, length p; "": fixed
+            tolerance. Empty where all are fixed.
     """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
     nominal: np.ndarray
     tolerance: np.ndarray
-    group: np.ndarray | None = None
+    group: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.names)
@@ -143,8 +145,19 @@ class ParameterSet:
 
     @property
     def groups(self) -> np.ndarray:
-        """(p,) group of each, -1 where its tolerance stands."""
-        return np.full(len(self), -1) if self.group is None else self.group
+        """(p,) number of each one's group in the order of first appearance, -1 where its tolerance is fixed."""
+        labels = [label for label in dict.fromkeys(self.group) if label]
+        return np.array([labels.index(label) if label else -1 for label in self.group or ("",) * len(self)])
+
+    def indices(self, names: Iterable[str]) -> list[int]:
+        """Positions of those of these parameters that are in the set."""
+        return [self.names.index(name) for name in names if name in self.names]
+
+    def joined(self, other: "ParameterSet") -> "ParameterSet":
+        """These parameters, then the other ones."""
+        groups = [s.group or ("",) * len(s) for s in (self, other)]
+        nominal, tolerance = (np.append(getattr(self, x), getattr(other, x)) for x in ("nominal", "tolerance"))
+        return ParameterSet(self.names + other.names, self.units + other.units, nominal, tolerance, sum(groups, ()))
 
     @property
     def scale(self) -> np.ndarray:

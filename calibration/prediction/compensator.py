@@ -23,13 +23,12 @@ from calibration.inference.parameters import Model
 from calibration.numerics.lie import from_vector
 from calibration.prediction.base_pose import BaseState, LoadedBase, loaded_base
 from calibration.recording.schema import Description
-from calibration.robot.chain import Chain, chain_of_frames
+from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
 from calibration.stages.geometry.model_of_fit import hand_of
-from calibration.stages.geometry.parameters import parameter_names
 from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
 from calibration.stages.suspension.model import Suspension
 
@@ -57,7 +56,8 @@ class Compensator:
 
     Attributes:
         hand: The calibrated robot.
-        covariance: (p, p) of its first p parameters, in the order of `HandModel.theta`; the others are known.
+        names: Parameters that are not certain, length p.
+        covariance: (p, p) of them.
         play: (k,) random reading error of each joint [rad, m].
         hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; (1,) of the position, (0,) none.
         joints: Joint models, None where the estimate has none.
@@ -66,6 +66,7 @@ class Compensator:
     """
 
     hand: HandModel
+    names: tuple[str, ...]
     covariance: np.ndarray
     play: np.ndarray
     hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -76,7 +77,7 @@ class Compensator:
     @property
     def spread(self) -> Spread:
         """What it is not sure of."""
-        return Spread(self.covariance, self.play, self.hand_error)
+        return Spread(self.names, self.covariance, self.play, self.hand_error)
 
     @classmethod
     def load(cls, folder: Path | str, payload: float | None = None) -> "Compensator":
@@ -109,7 +110,7 @@ class Compensator:
         if estimate.joint_models and laboratory is not None:
             inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
-        return cls(hand, _covariance(chain, model), play, model.hand_error, joints, estimate.suspension, laboratory)
+        return cls(hand, *_covariance(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)
 
     def predict(
         self,
@@ -190,7 +191,7 @@ class Compensator:
             corrected = correct(self.joints, t, q, velocity)
             q, columns = corrected.q, self.hand.chain.columns
             variance = np.where(corrected.modelled[columns], corrected.variance[:, columns], variance)
-        found = self.hand.poses_and_derivatives(q, n_parameters=len(self.covariance))
+        found = self.hand.poses_and_derivatives(q, names=self.names)
         T_base_hand = from_vector(self.hand.base) @ found.T
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
@@ -215,18 +216,17 @@ def _in_lab(
     return HandPose(T if moved is None else moved @ T, covariance)
 
 
-def _covariance(chain: Chain, model: Model) -> np.ndarray:
-    """Of a model's parameters (p, p), in the order of `HandModel.theta`, as far as one is not known."""
-    names, known = parameter_names(chain), [p.name for p in model.parameters]
+def _covariance(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarray]:
+    """Parameters of the hand that a model estimates, and their covariance (p, p)."""
+    known, chain = [p.name for p in model.parameters], hand.nominal
+    arm = [known.index(f"{PREFIX}.{axis}") for axis in AXES if f"{PREFIX}.x" in known]
+    placement = [f"geometry.{first_joint(chain)}.{axis}" for axis in AXES if arm]
+    names = tuple(name for name in hand.names if name in known or name in placement)
     G = np.array([[float(name == other) for other in known] for name in names])
-    if f"{PREFIX}.x" in known:
-        arm = [known.index(f"{PREFIX}.{axis}") for axis in AXES]
-        first = names.index(f"geometry.{first_joint(chain)}.x")
+    if arm:
         vector = np.array([model.parameters[i].value for i in arm])
-        G[first : first + 6, arm] = placement_derivative(chain, vector)
-    C = np.asarray(G @ model.covariance @ G.T)
-    p = len(C) if C[12 + 7 * len(chain.joints) :].any() else 12 + 7 * len(chain.joints)
-    return C[:p, :p]
+        G[np.ix_([names.index(name) for name in placement], arm)] = placement_derivative(chain, vector)
+    return names, np.asarray(G @ model.covariance @ G.T)
 
 
 def _velocities(t: np.ndarray, q: np.ndarray) -> np.ndarray | None:

@@ -30,6 +30,7 @@ from calibration.prediction.predictor import Predictor
 from calibration.recording.dataset import Dataset
 from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial
+from calibration.robot.blocks import Frames
 from calibration.robot.hand import HandModel
 from calibration.stages.geometry.registration import fit_frames, frame_weights
 
@@ -96,13 +97,15 @@ def registered_anew(robot: Compensator, q: np.ndarray, T_measured: np.ndarray, d
 
 def _covariance(robot: Compensator, hand: HandModel, q: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """(p, p) of frames and all that stays, postures weighed by `weight` (6,)."""
-    n, p = len(q), len(robot.covariance)
-    found = hand.poses_and_derivatives(q, n_parameters=p)
+    n, p = len(q), len(robot.names)
+    found = hand.poses_and_derivatives(q, names=robot.names)
+    frames = np.isin(robot.names, hand.block(Frames).names)
     J = (weight[:, None] * found.J).reshape(6 * n, p)
-    L = np.linalg.pinv(J[:, :12])
-    A = np.vstack([-L @ J[:, 12:], np.eye(p - 12)])
-    S = robot.spread.random_errors(found.J_joint)
-    each = (L.reshape(12, n, 6) * weight).transpose(1, 0, 2)
-    covariance = A @ robot.covariance[12:, 12:] @ A.T
-    covariance[:12, :12] += (each @ S @ each.transpose(0, 2, 1)).sum(axis=0)
+    L = np.linalg.pinv(J[:, frames])
+    A = np.eye(p)[:, ~frames]
+    A[frames] = -L @ J[:, ~frames]
+    each = (L.reshape(-1, n, 6) * weight).transpose(1, 0, 2)
+    covariance = A @ robot.covariance[np.ix_(~frames, ~frames)] @ A.T
+    random = (each @ robot.spread.random_errors(found.J_joint) @ each.transpose(0, 2, 1)).sum(axis=0)
+    covariance[np.ix_(frames, frames)] += random
     return np.asarray(covariance)

@@ -1,28 +1,22 @@
 """Pose of the hand body in the base body, as a function of the readings and of all parameters.
 
-    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - offset - compliance tau - gap/2 tanh(tau / tau_0), xi)  T_tool_H
+    T_B_H(q, theta) = T_base_B^-1  T_base_tool(q - sum_b e_b(q, tau), xi)  T_tool_H
 
-tau(q) is the nominal gravity torque at the readings: what the motors must exert at rest, [N.m, N]. Compliance is
-linear in it; backlash of width `gap` is preloaded by gravity to one side, smoothed by tanh where gravity is weak.
-Derivatives are local twists of the hand:
-
-    d/d(T_tool_H)   L(T_tool_H)                        d/d(xi)      Ad(T_H_tool) J_placement
-    d/d(T_base_B)   -Ad(T_H_B) L(T_base_B)             d/d(offset)  -Ad(T_H_tool) J_joint
-
-by compliance as by offset times tau, by gap as by offset times tanh(tau / tau_0) / 2,
-with L = diag(R', Jr(phi)) from (dp, dphi) to the local twist of a frame given as translation and rotation vector.
+e_b is what parameter block b adds to the readings (`blocks`), tau(q) the nominal gravity torque at the readings: what
+the motors must exert at rest [N.m, N]. Parameters are identified by name; derivatives are local twists of the hand.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from calibration.numerics.lie import adjoint, from_vector, inverse, local_twist
+from calibration.numerics.lie import adjoint, from_vector, inverse
+from calibration.robot.blocks import AT_REST, BacklashPreload, Compliance, EncoderZeros, Frames
 from calibration.robot.chain import Chain
 from calibration.robot.kinematics import Path
-
-_PRELOADS = 0.3  # tau_0 [N.m, N]
+from calibration.robot.parameter_block import HandKinematics, ParameterBlock
 
 
 @dataclass(frozen=True)
@@ -31,7 +25,7 @@ class HandPoses:
 
     Attributes:
         T: (n, 4, 4) T_B_H.
-        J: (n, 6, p) by the parameters, in the order of `HandModel.theta`.
+        J: (n, 6, p) by the parameters asked for.
         J_joint: (n, 6, k) by joint position.
     """
 
@@ -42,46 +36,88 @@ class HandPoses:
 
 @dataclass(frozen=True)
 class HandModel:
-    """The chain with values for its parameters.
+    """A nominal chain with blocks of parameters that have values.
 
     Attributes:
-        chain: Nominal chain with the placement twists of theta applied.
-        offset: (k,) zero of each joint's motor-side reading [rad, m].
-        base: (6,) translation and rotation vector of T_base_B [m, rad].
-        hand: (6,) of T_tool_H [m, rad].
-        compliance: (k,) of each gear under its gravity torque [rad/(N.m), m/N].
-        gap: (k,) width of each joint's backlash [rad, m].
+        nominal: The nominal robot.
+        blocks: Marker frames first.
     """
 
-    chain: Chain
-    offset: np.ndarray
-    base: np.ndarray
-    hand: np.ndarray
-    compliance: np.ndarray
-    gap: np.ndarray
+    nominal: Chain
+    blocks: tuple[ParameterBlock, ...]
 
-    def with_theta(self, theta: np.ndarray) -> "HandModel":
-        """The model with the first of theta changed: 12 frames, 12 + 7 k with placements and offsets, and so on."""
-        k, theta = len(self.offset), np.append(theta, self.theta[len(theta) :])
-        chain = self.chain.with_placements(theta[12 : 12 + 6 * k].reshape(k, 6))
-        offset, compliance, gap = theta[12 + 6 * k :].reshape(3, k)
-        return HandModel(chain, offset, theta[:6], theta[6:12], compliance, gap)
+    @cached_property
+    def chain(self) -> Chain:
+        """The chain with the joint placements of the blocks."""
+        chain = self.nominal
+        for block in self.blocks:
+            chain = block.placed(chain)
+        return chain
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters."""
+        return tuple(name for block in self.blocks for name in block.names)
 
     @property
     def theta(self) -> np.ndarray:
-        """All parameters, (12 + 9 k,)."""
-        return np.concatenate([self.base, self.hand, self.chain.xi.ravel(), self.offset, self.compliance, self.gap])
+        """Values of all parameters, in the order of `names`."""
+        return np.concatenate([block.values for block in self.blocks])
+
+    def with_theta(self, theta: np.ndarray, names: Sequence[str] | None = None) -> "HandModel":
+        """The model with other values of the named parameters, of all where no name is given."""
+        values = dict(zip(self.names if names is None else names, theta, strict=True))
+        blocks = []
+        for block in self.blocks:
+            new = [values.get(name, x) for name, x in zip(block.names, block.values, strict=True)]
+            blocks.append(replace(block, values=np.array(new)))
+        return replace(self, blocks=tuple(blocks))
+
+    def with_values(self, **values: np.ndarray) -> "HandModel":
+        """The model with other values of whole blocks, by the properties below: base, hand, offset, compliance, gap."""
+        frames = np.concatenate([values.get("base", self.base), values.get("hand", self.hand)])
+        new: dict[type[ParameterBlock], np.ndarray] = {Frames: frames}
+        new |= {kind: values[name] for name, kind in _READINGS.items() if name in values}
+        blocks = tuple(replace(b, values=np.asarray(new.get(type(b), b.values))) for b in self.blocks)
+        return replace(self, blocks=blocks)
+
+    def block(self, kind: type[ParameterBlock]) -> ParameterBlock:
+        """The block of a kind."""
+        return next(b for b in self.blocks if isinstance(b, kind))
+
+    @property
+    def base(self) -> np.ndarray:
+        """Translation and rotation vector (6,) of T_base_B [m, rad]."""
+        return self.block(Frames).values[:6]
+
+    @property
+    def hand(self) -> np.ndarray:
+        """Translation and rotation vector (6,) of T_tool_H [m, rad]."""
+        return self.block(Frames).values[6:]
+
+    @property
+    def offset(self) -> np.ndarray:
+        """(k,) zero of each joint's motor-side reading [rad, m]."""
+        return self.block(EncoderZeros).values
+
+    @property
+    def compliance(self) -> np.ndarray:
+        """(k,) of each gear under its gravity torque [rad/(N.m), m/N]."""
+        return self.block(Compliance).values
+
+    @property
+    def gap(self) -> np.ndarray:
+        """(k,) width of each joint's backlash [rad, m]."""
+        return self.block(BacklashPreload).values
 
     def carrying(self, mass: float | None) -> "HandModel":
         """The model with another mass [kg] of its payload; itself where None."""
-        return self if mass is None else replace(self, chain=self.chain.carrying(mass))
+        return self if mass is None else replace(self, nominal=self.nominal.carrying(mass))
 
     def angles(self, q: np.ndarray) -> np.ndarray:
         """Joint positions (n, n_measured) behind readings q."""
-        out = np.array(q, dtype=float)
-        out[:, self.chain.columns] -= self.offset
-        if self.compliance.any() or self.gap.any():
-            out[:, self.chain.columns] -= self._deflection(self.chain.gravity_torques(q))
+        out, columns = np.array(q, dtype=float), self.nominal.columns
+        out[:, columns] -= self._reading_error(q[:, columns], self._torques(q, ()))
         return out
 
     def in_base_frame(self, q: np.ndarray) -> np.ndarray:
@@ -97,38 +133,43 @@ class HandModel:
         return adjoint(inverse(from_vector(self.hand))) @ self.chain.joint_jacobians(self.angles(q))
 
     def poses_and_derivatives(
-        self, q: np.ndarray, tau: np.ndarray | None = None, n_parameters: int | None = None
+        self, q: np.ndarray, tau: np.ndarray | None = None, names: Sequence[str] | None = None
     ) -> HandPoses:
         """T_B_H and its derivatives at readings q (n, n_measured).
 
         Args:
             q: Readings [rad, m].
             tau: (n, k) the chain's gravity torques at q, where they are known already.
-            n_parameters: How many of theta to differentiate by; all where not given.
+            names: Parameters to differentiate by; all where not given.
         """
-        k = len(self.offset)
-        p = 12 + 9 * k if n_parameters is None else n_parameters
-        if tau is None:
-            yields = self.compliance.any() or self.gap.any() or p > 12 + 7 * k
-            tau = self.chain.gravity_torques(q) if yields else np.zeros((len(q), k))
-        placed = self._path.placed(q[:, self.chain.columns] - self.offset - self._deflection(tau))
-        twists = self.chain.twists.copy()
-        twists[0, :, :6] = -local_twist(self.base)
-        found, J = placed.end_twists(twists), np.empty((len(q), 6, p))
-        J_joint = found[:, :, 1:, 6]
-        J[:, :, :6], J[:, :, 6:12] = found[:, :, 0, :6], local_twist(self.hand)
-        if p > 12:
-            J[:, :, 12 : 12 + 6 * k] = found[:, :, 1:, :6].reshape(len(q), 6, 6 * k)
-            J[:, :, 12 + 6 * k : 12 + 7 * k] = -J_joint
-        if p > 12 + 7 * k:
-            J[:, :, 12 + 7 * k : 12 + 8 * k] = -tau[:, None, :] * J_joint
-        if p > 12 + 8 * k:
-            J[:, :, 12 + 8 * k :] = -preload_side(tau)[:, None, :] * J_joint
-        return HandPoses(placed.T, J, J_joint)
+        names = self.names if names is None else tuple(names)
+        asked = set(names)
+        blocks = [block for block in self.blocks if not asked.isdisjoint(block.names)]
+        at = self.kinematics(q, self._torques(q, blocks) if tau is None else tau)
+        found = tuple(name for block in blocks for name in block.names)
+        J = np.concatenate([block.jacobian(at) for block in blocks], axis=2) if blocks else np.zeros((len(q), 6, 0))
+        if found != names:
+            J = J[:, :, [found.index(name) for name in names]]
+        return HandPoses(at.T, J, at.J_joint)
 
-    def _deflection(self, tau: np.ndarray) -> np.ndarray:
-        """Reading minus angle (n, k) [rad, m] by compliance and backlash under gravity torques tau (n, k)."""
-        return self.compliance * tau + self.gap * preload_side(tau)
+    def kinematics(self, q: np.ndarray, tau: np.ndarray) -> HandKinematics:
+        """What the blocks' derivatives are made of, at readings q (n, n_measured) and gravity torques tau (n, k)."""
+        readings = q[:, self.nominal.columns]
+        placed = self._path.placed(readings - self._reading_error(readings, tau))
+        twists = np.zeros((len(self.nominal.joints) + 1, 6, 7))
+        twists[:, :, :6], twists[1:, :, 6] = np.eye(6), self.nominal.drawn.twists
+        J = placed.end_twists(twists)
+        return HandKinematics(readings, tau, placed.T, J[..., :6], J[:, :, 1:, 6])
+
+    def _torques(self, q: np.ndarray, asked: Sequence[ParameterBlock]) -> np.ndarray:
+        """Gravity torques (n, k) at readings q; zero where no block of a loaded gear is asked for or has a value."""
+        if any(block.loaded and (block in asked or block.values.any()) for block in self.blocks):
+            return self.nominal.gravity_torques(q)
+        return np.zeros((len(q), len(self.nominal.joints)))
+
+    def _reading_error(self, q: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """Reading minus angle (n, k) [rad, m] by all blocks."""
+        return np.asarray(sum(block.reading_error(q, tau) for block in self.blocks) + np.zeros_like(q))
 
     @cached_property
     def _path(self) -> Path:
@@ -138,12 +179,9 @@ class HandModel:
         return replace(self.chain.path, fixed=fixed)
 
 
-def nominal_hand(chain: Chain, frames: np.ndarray) -> HandModel:
-    """The datasheet's robot with marker frames (12,) [m, rad]."""
-    k = len(chain.joints)
-    return HandModel(chain, np.zeros(k), frames[:6], frames[6:], np.zeros(k), np.zeros(k))
+_READINGS: dict[str, type[ParameterBlock]] = {"offset": EncoderZeros, "compliance": Compliance, "gap": BacklashPreload}
 
 
-def preload_side(tau: np.ndarray) -> np.ndarray:
-    """tanh(tau / tau_0) / 2: where in its backlash gravity torques tau [N.m, N] preload a gear, -1/2 to 1/2 [-]."""
-    return np.asarray(0.5 * np.tanh(tau / _PRELOADS))
+def nominal_hand(chain: Chain, frames: np.ndarray, kinds: Sequence[type[ParameterBlock]] = AT_REST) -> HandModel:
+    """The datasheet's robot with marker frames (12,) [m, rad] and blocks of these kinds."""
+    return HandModel(chain, tuple(kind.nominal(chain, frames) for kind in kinds))

@@ -44,11 +44,13 @@ class Spread:
     """What a calibrated robot is not sure of.
 
     Attributes:
-        theta: (p, p) covariance of the first p parameters of `HandModel.theta`.
+        names: Of the parameters that are not certain, length p.
+        theta: (p, p) their covariance.
         reading: (k,) random errors of the joints' readings, standard deviations [rad, m].
         hand: (2,) of the hand's position [m] and rotation [rad]; (1,) of the position; (0,) none.
     """
 
+    names: tuple[str, ...]
     theta: np.ndarray
     reading: np.ndarray
     hand: np.ndarray
@@ -89,7 +91,7 @@ def predicted_points(
     hand: HandModel, spread: Spread, markers: np.ndarray, q: np.ndarray, session: Session | None = None
 ) -> Predicted:
     """Markers (m, 3) [m] of the hand's body at readings q (n, n_measured), in another session where one is given."""
-    found = hand.poses_and_derivatives(np.asarray(q, dtype=float), n_parameters=len(spread.theta))
+    found = hand.poses_and_derivatives(np.asarray(q, dtype=float), names=spread.names)
     S = found.J @ spread.theta @ np.swapaxes(found.J, 1, 2) + spread.random_errors(found.J_joint)
     if session is not None:
         eye = np.broadcast_to(np.eye(6), S.shape)

@@ -16,8 +16,9 @@ from calibration.numerics.lie import adjoint, exp6, inverse
 from calibration.recording import Description
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
+from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.model_of_fit import hand_of
-from calibration.stages.geometry.parameters import geometry_parameters, play_start
+from calibration.stages.geometry.parameters import geometry_parameters, reading_sigma
 from calibration.stages.geometry.registration import register
 from calibration.stages.geometry.stage import calibrate_geometry
 from scenarios.datasets.run_spec import Magnitude
@@ -43,11 +44,11 @@ def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     rng, campaign = generator(scenario.seed, "matched"), scenario.twin.campaign
     description, n = describe_dataset(scenario.twin, ()), campaign.calibration_postures
     chain = chain_of(mjcf.urdf(), description)
-    parameters = geometry_parameters(chain, description)
+    parameters, frames = geometry_parameters(chain, description), nominal_frames(chain, description)
     theta = parameters.nominal + parameters.tolerance * rng.normal(size=len(parameters))
-    true = nominal_hand(chain, parameters.nominal[:12]).with_theta(theta)
+    true = nominal_hand(chain, frames).with_theta(theta, parameters.names)
     readings = rng.permutation(sample_postures(mjcf.model(), n + _NEW, rng))
-    moved = readings[:n] + play_start(chain, description) * rng.normal(size=(n, len(chain.joints)))
+    moved = readings[:n] + reading_sigma(chain, description) * rng.normal(size=(n, len(chain.joints)))
     samples = campaign.dwell * scenario.twin.instruments.mocap_rate
     seen = _measured(description, readings[:n], true.poses(moved), samples, rng)
     model, verdicts = calibrate_geometry(chain, description, seen)
@@ -56,7 +57,7 @@ def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     judged = judge_parameters(model, map(Parameter, parameters.names, parameters.units, theta.tolist()))
     judged.save(out)
     rows = {"registration": register(chain, description, seen)[0], "model_2": model}
-    errors = {name: _errors(hand_of(m, chain, parameters.nominal[:12]), true, readings[n:]) for name, m in rows.items()}
+    errors = {name: _errors(hand_of(m, chain, frames), true, readings[n:]) for name, m in rows.items()}
     gain = stats.ttest_rel(errors["registration"], errors["model_2"], alternative="greater").pvalue
     return (
         Magnitude("coverage_95", judged.coverage_95),

@@ -1,7 +1,5 @@
 """Trials whose link readings the printed equations made: what must come back exactly is known."""
 
-from dataclasses import replace
-
 import numpy as np
 
 import mjcf
@@ -31,7 +29,7 @@ LAB = Laboratory(mjcf.urdf(), described())
 
 def hand() -> HandModel:
     nominal = nominal_hand(chain_of(mjcf.urdf(), described()), np.zeros(12))
-    return replace(nominal, offset=OFFSET)
+    return nominal.with_values(offset=OFFSET)
 
 
 def inputs() -> InputModel:

@@ -25,13 +25,20 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
-from calibration.robot.hand import HandModel, nominal_hand
+from calibration.robot.hand import HandModel
+from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.clocks.clock_fit import TrialLag, fit_clock
 from calibration.stages.clocks.lag_covariance import lag_and_drift, without_nuisances
 from calibration.stages.clocks.plate_moments import JointMotion
 from calibration.stages.clocks.pose_samples import Samples, read_samples
 from calibration.stages.geometry.hand_residual import fit
-from calibration.stages.geometry.parameters import geometry_parameters, play_floor, play_start
+from calibration.stages.geometry.parameters import (
+    geometry_parameters,
+    hand_model,
+    reading_floor,
+    reading_names,
+    reading_sigma,
+)
 
 _SPACING, _PASSED = 0.5, 250  # [s] between postures passed through, at least; so many of them, about
 _MOVES = 0.05  # [rad, m] a joint must move to count as moving
@@ -46,12 +53,14 @@ class Provisional:
 
     Attributes:
         hand: Calibrated on the static postures.
-        root: (p, p) Cholesky factor of its parameters' covariance.
+        names: Of the parameters it was calibrated in, length p.
+        root: (p, p) Cholesky factor of their covariance.
         play: (k,) random reading error of each joint [rad, m].
         largest: (k,) largest gravity torque of each joint in the campaign [N.m, N].
     """
 
     hand: HandModel
+    names: tuple[str, ...]
     root: np.ndarray
     play: np.ndarray
     largest: np.ndarray
@@ -64,17 +73,16 @@ def provisional(chain: Chain, description: Description, trials: Sequence[Trial],
         NotEnoughData: Base and hand are not seen together, or a fit that does not converge.
     """
     parameters = geometry_parameters(chain, description)
-    nominal = nominal_hand(chain, parameters.nominal[:12])
+    nominal = hand_model(chain, nominal_frames(chain, description))
     postures = _postures(description, trials, robot)
-    start, floor = play_start(chain, description), play_floor(chain, description)
+    start, floor = reading_sigma(chain, description), reading_floor(chain, description)
     found = fit(nominal, parameters, postures, start, floor)
     if not found.converged:
         raise NotEnoughData("the provisional geometry did not converge")
-    hand = nominal.with_theta(found.theta)
+    hand = nominal.with_theta(found.theta, parameters.names)
     some = np.concatenate([trial.q_motor[:: max(1, len(trial.t_robot) // 200)] for trial in trials])
-    return Provisional(
-        hand, np.linalg.cholesky(found.covariance), found.play, np.abs(_gravity_torques(hand, some)).max(axis=0)
-    )
+    play, largest = found.noise_sigma(reading_names(chain)), np.abs(_gravity_torques(hand, some)).max(axis=0)
+    return Provisional(hand, parameters.names, np.linalg.cholesky(found.covariance), play, largest)
 
 
 def _postures(description: Description, trials: Sequence[Trial], robot: Clock) -> Postures:
@@ -122,7 +130,7 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     speaks = held & (np.ptp(np.where(held, q, _median(q, held)), axis=0) > _MOVES)
     if not speaks.any():
         raise NotEnoughData("no joint moves that gravity holds on one flank")
-    at = hand.poses_and_derivatives(x.q, tau, len(robot.root))
+    at = hand.poses_and_derivatives(x.q, tau, robot.names)
     moved = at.J_joint * np.where(held, robot.play, np.maximum(robot.play, _FREE))[:, None]
     W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
     J = W @ at.J_joint

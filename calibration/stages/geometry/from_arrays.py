@@ -7,7 +7,7 @@ errors and the priors' widths (`evidence`). Postures that no error of the robot 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,22 +18,18 @@ from calibration.inference.outliers import robust_fit
 from calibration.inference.parameters import ParameterSet
 from calibration.mocap.cluster_shape import Cluster, cluster, in_line
 from calibration.mocap.postures import Postures
-from calibration.numerics.alignment import Start, registration_start
+from calibration.numerics.alignment import registration_start
 from calibration.numerics.lie import compose
+from calibration.recording.schema import Tolerances
+from calibration.robot.blocks import BacklashPreload, Frames
 from calibration.robot.chain import Chain, chain_of_frames
-from calibration.robot.hand import HandModel, nominal_hand
+from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
+from calibration.robot.parameter_block import Known, joint_lengths, parameters_of
 from calibration.stages.geometry.gear_deflection import with_gears_averaged
-from calibration.stages.geometry.guards import joint_lengths, unusable_data, unusable_fit
-from calibration.stages.geometry.hand_residual import Errors, hand_problem
-from calibration.stages.geometry.parameters import (
-    COMPLIANCES,
-    DEFLECTION,
-    ZEROS,
-    gear_tolerances,
-    parameter_names,
-    placement_groups,
-)
+from calibration.stages.geometry.guards import unusable_data, unusable_fit
+from calibration.stages.geometry.hand_residual import HAND_NAMES, NoiseModel, hand_problem
+from calibration.stages.geometry.parameters import hand_model, reading_names
 from calibration.verdict import Verdict
 
 _STAGE = "geometry"
@@ -59,7 +55,7 @@ class Widths:
     translation: float = 4e-3
     rotation: float = 8e-3
     offset: float = 4e-2
-    deflection: float = DEFLECTION
+    deflection: float = 3e-2
     reading: float = 2e-3
     position: float = 5e-4
     orientation: float = 1e-3
@@ -94,7 +90,8 @@ class GeometryFit:
 
     def predict_with_covariance(self, q: np.ndarray, session: Session | None = None) -> Predicted:
         """The same with covariance, of this session, or of any other one where `session` is given."""
-        spread = Spread(self.fit.covariance, self.fit.play, self.fit.hand_error)
+        reading = self.fit.noise_sigma(reading_names(self.hand.nominal))
+        spread = Spread(self.parameters.names, self.fit.covariance, reading, self.fit.noise_sigma(HAND_NAMES))
         return predicted_points(self.hand, spread, self.markers, q, session)
 
 
@@ -137,10 +134,10 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     if refused := list(unusable_data(chain, postures.q, start, 6 if oriented else 3)):
         raise NotCalibrated(refused)
     tau = chain.gravity_torques(postures.q)
-    parameters = _parameters(chain, start, widths, tau, oriented)
-    nominal, reading = nominal_hand(chain, start.frames), widths.reading * joint_lengths(chain)
+    nominal, reading = hand_model(chain, start.frames), widths.reading * joint_lengths(chain)
+    parameters = _parameters(nominal, widths, tau, oriented)
     pose = np.array([widths.position, widths.orientation][: 1 + oriented])
-    errors = Errors(reading, 1e-2 * reading, pose)
+    errors = NoiseModel(reading, 1e-2 * reading, pose)
     found = robust_fit(
         lambda some: hand_problem(nominal, parameters, postures.rows(some), errors, tau[some]),
         len(postures),
@@ -149,12 +146,14 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     )
     some = spread(len(found.fit.at.r), 3 + 3 * oriented, _SPREAD)
     known = identifiability(found.fit.rows_white(some), parameters)
-    if refused := list(unusable_fit(chain, parameters, found, known, len(postures))):
+    if refused := list(unusable_fit(nominal, parameters, found, known, len(postures))):
         raise NotCalibrated(refused)
-    fit = with_gears_averaged(found.fit, parameters)
+    fit = with_gears_averaged(found.fit, parameters, nominal)
     left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~found.kept].tolist()}))
     verdicts = _verdicts(left_out, len(q), known, parameters)
-    return GeometryFit(nominal.with_theta(fit.theta), parameters, fit, markers, left_out, verdicts, known)
+    return GeometryFit(
+        nominal.with_theta(fit.theta, parameters.names), parameters, fit, markers, left_out, verdicts, known
+    )
 
 
 def _verdicts(
@@ -184,20 +183,22 @@ def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarra
     return Postures(q[usable], body.T[usable], covariance, np.zeros(int(usable.sum()))), body.xyz, usable
 
 
-def _parameters(chain: Chain, start: Start, widths: Widths, tau: np.ndarray, oriented: bool) -> ParameterSet:
+def _parameters(hand: HandModel, widths: Widths, tau: np.ndarray, oriented: bool) -> ParameterSet:
     """Everything, frames without a prior; what a single point cannot tell of the hand's rotation stays at zero."""
-    k, lengths = len(chain.joints), joint_lengths(chain)
-    gears = gear_tolerances(chain, tau, widths.deflection)
-    frames = np.full(12, np.inf)
-    frames[9:] = np.inf if oriented else _FIXED
-    placement = [widths.translation] * 3 + [widths.rotation] * 3
-    slides = [chain.is_prismatic(name) for name in chain.joints]
-    return ParameterSet(
-        parameter_names(chain)[: 12 + 8 * k],
-        ("m", "m", "m", "rad", "rad", "rad") * (2 + k)
-        + tuple("m" if s else "rad" for s in slides)
-        + tuple("m/N" if s else "rad/(N.m)" for s in slides),
-        np.concatenate([start.frames, np.zeros(8 * k)]),
-        np.concatenate([frames, placement * k, widths.offset * lengths, gears]),
-        np.concatenate([np.full(12, -1), placement_groups(k), np.full(k, ZEROS), np.full(k, COMPLIANCES)]),
+    tolerances = Tolerances(
+        joint_translation=widths.translation,
+        joint_rotation=widths.rotation,
+        encoder_offset=widths.offset,
+        joint_play=widths.reading,
+        body_translation=1.0,
+        body_rotation=1.0,
+        link_mass=1.0,
+        link_com=1.0,
     )
+    blocks = [block for block in hand.blocks if not isinstance(block, BacklashPreload)]
+    found = parameters_of(blocks, Known(hand.nominal, tolerances, tau, widths.deflection))
+    tolerance = found.tolerance.copy()
+    frames = found.indices(hand.block(Frames).names)
+    tolerance[frames] = np.inf
+    tolerance[frames[9:]] = np.inf if oriented else _FIXED
+    return replace(found, tolerance=tolerance)

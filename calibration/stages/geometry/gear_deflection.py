@@ -22,12 +22,20 @@ from calibration.inference.outliers import RobustFit
 from calibration.inference.parameters import Model, ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.recording.schema import Description
+from calibration.robot.blocks import BacklashPreload, Compliance
 from calibration.robot.chain import Chain
-from calibration.robot.hand import preload_side
+from calibration.robot.hand import HandModel
+from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.guards import unusable_fit
-from calibration.stages.geometry.hand_residual import Errors
+from calibration.stages.geometry.hand_residual import HandResidual, NoiseModel
 from calibration.stages.geometry.model_of_fit import model_of
-from calibration.stages.geometry.parameters import COMPLIANCES, backlash_parameters, gear_parameters, play_start
+from calibration.stages.geometry.parameters import (
+    averaged_names,
+    compliance_parameters,
+    full_parameters,
+    hand_model,
+    reading_sigma,
+)
 from calibration.stages.geometry.stage import STAGE, fit_robustly, left_out
 from calibration.verdict import Verdict
 
@@ -38,44 +46,47 @@ _STRONG = np.log(20.0)  # evidence called strong by Kass and Raftery, JASA 1995
 def calibrate_gears(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
     """The model `full`; a verdict `refused` says that it must not be used."""
     tau = chain.gravity_torques(postures.q)
-    parameters = gear_parameters(chain, description, tau)
-    play = play_start(chain, description)
-    errors = Errors(play, 1e-2 * play, _HAND[: postures.components // 3])
-    found = fit_robustly(chain, parameters, postures, errors)
+    parameters, more = (make(chain, description, tau) for make in (compliance_parameters, full_parameters))
+    hand, reading = hand_model(chain, nominal_frames(chain, description)), reading_sigma(chain, description)
+    errors = NoiseModel(reading, 1e-2 * reading, _HAND[: postures.components // 3])
+    found = fit_robustly(hand, parameters, postures, errors)
     known = identifiability(found.fit.J_white, parameters)
-    refused = [Verdict(STAGE, "refused", m) for m in unusable_fit(chain, parameters, found, known, len(postures))]
-    if not refused and _evidence_for_backlash(found, tau, 2.0 * play) > -_STRONG:
-        more = backlash_parameters(chain, description, tau)
-        again = fit_robustly(chain, more, postures, errors)
+    refused = [Verdict(STAGE, "refused", m) for m in unusable_fit(hand, parameters, found, known, len(postures))]
+    if not refused and _evidence_for_backlash(found, hand, more, postures) > -_STRONG:
+        again = fit_robustly(hand, more, postures, errors)
         if again.fit.converged:
             parameters, found = more, again
-    model = model_of("full", chain, parameters, with_gears_averaged(found.fit, parameters))
+    model = model_of("full", chain, parameters, with_gears_averaged(found.fit, parameters, hand))
     if refused:
         return model, tuple(refused)
-    return model, (*left_out(postures, found), *_told(model))
+    return model, (*left_out(postures, found), *_findings(model, hand))
 
 
-def _evidence_for_backlash(found: RobustFit, tau: np.ndarray, width: np.ndarray) -> float:
-    """Log Bayes factor of preloaded backlash with prior widths (k,), at gravity torques tau (n, k) of the postures."""
-    J = -preload_side(tau[found.kept])[:, None, :] * found.fit.at.J_joint
-    return log_bayes_factor(found.fit, J, width)
+def _evidence_for_backlash(found: RobustFit, hand: HandModel, more: ParameterSet, postures: Postures) -> float:
+    """Log Bayes factor of the backlash of `more` parameters over a fit without."""
+    new = [i for i, name in enumerate(more.names) if name in hand.block(BacklashPreload).names]
+    theta = more.nominal.copy()
+    theta[[i for i in range(len(more)) if i not in new]] = found.fit.theta
+    none = NoiseModel(np.zeros(0), np.zeros(0), np.zeros(0))
+    at = HandResidual(hand, more.names, postures.rows(found.kept), none).linearise(theta)
+    return log_bayes_factor(found.fit, at.J[:, :, new], more.tolerance[new])
 
 
-def _told(model: Model) -> Iterator[Verdict]:
+def _findings(model: Model, hand: HandModel) -> Iterator[Verdict]:
     """What of the gears stands out."""
-    for kind, ending, what, unit in (
-        ("gear.", ".compliance", "gears compliant under gravity", "mrad/(N.m)"),
-        ("backlash.", ".gap", "backlash preloaded by gravity", "mrad"),
+    for kind, what, unit in (
+        (Compliance, "gears compliant under gravity", "mrad/(N.m)"),
+        (BacklashPreload, "backlash preloaded by gravity", "mrad"),
     ):
-        mine = [p for p in model.parameters if p.name.startswith(kind) and p.name.endswith(ending)]
+        mine = [p for p in model.parameters if p.name in hand.block(kind).names]
         told = ", ".join(f"{p.name} {1e3 * p.value:+.1f} {unit}" for p in mine if abs(p.value) > 2.0 * p.sigma)
         if mine:
             yield Verdict(STAGE, "ok", f"{what}: {told or 'none'}")
 
 
-def with_gears_averaged(fit: Fit, parameters: ParameterSet) -> Fit:
+def with_gears_averaged(fit: Fit, parameters: ParameterSet, hand: HandModel) -> Fit:
     """The fit with theta and covariance averaged; `at`'s residuals and derivatives stay those of all gears giving."""
-    asked = np.flatnonzero(parameters.groups >= COMPLIANCES)
+    asked = np.array(parameters.indices(averaged_names(hand)))
     width = np.sqrt(parameters.prior.factor(fit.widths.prior)[asked]) * parameters.tolerance[asked]
     found = averaged(fit.theta, fit.covariance, asked, width)
     return replace(fit, at=replace(fit.at, theta=found.theta), covariance=found.covariance)

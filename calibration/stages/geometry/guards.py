@@ -12,13 +12,16 @@ from calibration.inference.outliers import RobustFit
 from calibration.inference.parameters import ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.numerics.alignment import Start
+from calibration.robot.blocks import EncoderZeros
 from calibration.robot.chain import Chain
-from calibration.robot.nominal_frames import METRES_PER_RAD
+from calibration.robot.hand import HandModel
+from calibration.robot.parameter_block import joint_lengths
+from calibration.stages.geometry.hand_residual import HAND_NAMES
+from calibration.stages.geometry.parameters import reading_names
 
 _SCALE = 1.2  # believable ratio of the robot's size to the measured one, or its inverse [-]
 APART = 0.05  # [rad, a tenth of it in m] postures closer than this in every joint are one
 _CONDITION_OF_COMPLIANCES = 1e6  # scaled [-]
-_OFFSET_OF_COMPLIANCES = 0.5  # largest believable zero of a reading [rad, a tenth of it in m]
 _FACTOR = 6.0  # largest believable ratio of a prior's width to what it began with [-]
 _READING = 0.03  # largest believable random error of a reading [rad, a tenth of it in m]
 MANY_ODD = 0.25  # share of postures that may be wrong
@@ -38,11 +41,6 @@ def distinct(q: np.ndarray, apart: np.ndarray, enough: int = sys.maxsize) -> int
         if all((np.abs(row - other) > apart).any() for other in kept):
             kept.append(row)
     return len(kept)
-
-
-def joint_lengths(chain: Chain) -> np.ndarray:
-    """(k,) what a radian's worth is for each joint: 1 rad, or a tenth of it in metres where it slides."""
-    return np.array([METRES_PER_RAD if chain.is_prismatic(name) else 1.0 for name in chain.joints])
 
 
 def fewest(chain: Chain, components: int) -> int:
@@ -67,10 +65,10 @@ def unusable_data(chain: Chain, q: np.ndarray, start: Start, components: int) ->
 
 
 def unusable_fit(
-    chain: Chain, parameters: ParameterSet, found: RobustFit, known: Identifiability, n: int
+    hand: HandModel, parameters: ParameterSet, found: RobustFit, known: Identifiability, n: int
 ) -> Iterator[str]:
     """Why the values cannot be true."""
-    fit, k, lengths = found.fit, len(chain.joints), joint_lengths(chain)
+    fit = found.fit
     if not fit.converged:
         yield "the fit did not converge: model and data do not belong together"
     if not known.clear or known.condition > _CONDITION_OF_COMPLIANCES:
@@ -78,19 +76,27 @@ def unusable_fit(
             f"the postures do not excite the model (rank {known.rank}, gap {known.gap:.0f}, condition "
             f"{known.condition:.1e}); spread them over all joints' ranges"
         )
-    offset = fit.theta[12 + 6 * k : 12 + 7 * k]
-    for i in np.flatnonzero(np.abs(offset) > _OFFSET_OF_COMPLIANCES * lengths):
-        yield f"{parameters.names[12 + 6 * k + i]} = {offset[i]:.3g} is beyond belief; readings of another joint?"
-    for i in np.flatnonzero(fit.play > _READING * lengths):
-        yield f"readings of {chain.joints[i]} scatter by {fit.play[i]:.2g}; units, order of the joints, tool frame?"
-    for (what, limit), s in zip(_HAND, fit.widths.noise[k:-1], strict=False):
-        if s > limit:
-            yield f"the hand's {what} scatters by {s:.2g}: the model does not explain it; frames, orientations?"
+    yield from _implausible_values(hand, parameters, fit)
     if fit.widths.prior.max(initial=0.0) > _FACTOR**2:
         yield f"the robot departs from its drawing {np.sqrt(fit.widths.prior.max()):.0f} times as far as robots do"
     wrong = n - int(found.kept.sum())
     if wrong > MANY_ODD * n:
         yield f"{wrong} of {n} postures contradict the others; more than mistakes of some rows"
+
+
+def _implausible_values(hand: HandModel, parameters: ParameterSet, fit: Fit) -> Iterator[str]:
+    """Zeros and random errors beyond what robots have."""
+    joints, lengths = hand.nominal.joints, joint_lengths(hand.nominal)
+    zeros = hand.block(EncoderZeros).names
+    for name, offset, length in zip(zeros, fit.theta[parameters.indices(zeros)], lengths, strict=True):
+        if abs(offset) > _OFFSET * length:
+            yield f"{name} = {offset:.3g} is beyond belief; readings of another joint?"
+    for joint, s, length in zip(joints, fit.noise_sigma(reading_names(hand.nominal)), lengths, strict=True):
+        if s > _READING * length:
+            yield f"readings of {joint} scatter by {s:.2g}; units, order of the joints, tool frame?"
+    for (what, limit), s in zip(_HAND, fit.noise_sigma(HAND_NAMES), strict=False):
+        if s > limit:
+            yield f"the hand's {what} scatters by {s:.2g}: the model does not explain it; frames, orientations?"
 
 
 def spans(chain: Chain, postures: Postures) -> np.ndarray:
@@ -107,16 +113,16 @@ def too_little(known: Identifiability, limit: float) -> Iterator[str]:
         )
 
 
-def implausible(parameters: ParameterSet, found: Fit, play: np.ndarray, chain: Chain) -> Iterator[str]:
+def implausible(parameters: ParameterSet, found: Fit, play: np.ndarray, hand: HandModel) -> Iterator[str]:
     """Why the values cannot be true."""
     if not found.converged:
         yield "the fit did not converge: model and data do not belong together"
-    p, k = len(parameters), len(chain.joints)
-    off = np.abs(found.theta - parameters.nominal)
-    limit = np.append(_TOLERANCES * parameters.tolerance[: p - k], _OFFSET * joint_lengths(chain))
+    off, limit = np.abs(found.theta - parameters.nominal), _TOLERANCES * parameters.tolerance
+    limit[parameters.indices(hand.block(EncoderZeros).names)] = _OFFSET * joint_lengths(hand.nominal)
     for i in np.flatnonzero(off > limit):
         yield f"{parameters.names[i]} = {found.theta[i]:.3g} {parameters.units[i]} is beyond belief ({limit[i]:.2g})"
-    for name, s, limit_s in zip(chain.joints, found.play, _TOLERANCES * play, strict=True):
+    reading = found.noise_sigma(reading_names(hand.nominal))
+    for name, s, limit_s in zip(hand.nominal.joints, reading, _TOLERANCES * play, strict=True):
         if s > limit_s:
             yield f"readings of {name} scatter by {s:.2g}, datasheet play is {limit_s / _TOLERANCES:.2g}; units, order?"
     chi2 = float((found.r_white**2).sum()) / max(1, found.r_white.size - 36)

@@ -25,6 +25,7 @@ from calibration.numerics.alignment import registration_start
 from calibration.numerics.lie import inverse
 from calibration.numerics.robust_covariance import block_covariance
 from calibration.recording.schema import Description
+from calibration.robot.blocks import Frames
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel, nominal_hand
 from calibration.stages.geometry.hand_residual import fit_weighted, linearised
@@ -91,7 +92,7 @@ def _without_strays(
     """The fit of the postures that agree, each residual times W (d, d), and which (n,) they are."""
 
     def distance(theta: np.ndarray) -> np.ndarray:
-        return np.asarray(((linearised(hand, theta, postures).r @ W) ** 2).sum(axis=1))
+        return np.asarray(((linearised(hand, theta, postures, parameters.names).r @ W) ** 2).sum(axis=1))
 
     def near(distance: np.ndarray) -> np.ndarray:
         return distance <= max(_STRAY * float(np.median(distance)), _NEAR)
@@ -123,7 +124,7 @@ def fit_frames(model: HandModel, q: np.ndarray, T_measured: np.ndarray, descript
     if len(q) < 2:
         raise NotEnoughData(f"{len(q)} registration postures of the confirmation session show base and hand; make more")
     for _ in range(_STEPS):
-        found = model.poses_and_derivatives(q, n_parameters=12)
+        found = model.poses_and_derivatives(q, names=model.block(Frames).names)
         r = np.array([pin.log6(pin.SE3(E)).vector for E in inverse(T_measured) @ found.T])
         J = (weight[:, None] * found.J).reshape(-1, 12)
         if np.linalg.matrix_rank(J, rtol=1e-6) < 12:
@@ -131,7 +132,8 @@ def fit_frames(model: HandModel, q: np.ndarray, T_measured: np.ndarray, descript
                 f"the {len(q)} registration postures of the confirmation session turn the hand about one direction only"
             )
         step = np.linalg.lstsq(J, -(weight * r).ravel(), rcond=None)[0]
-        model = replace(model, base=model.base + step[:6], hand=model.hand + step[6:])
+        frames = model.block(Frames)
+        model = model.with_theta(frames.values + step, frames.names)
         if np.abs(step).max() < _STILL:
             break
     return model

@@ -20,7 +20,8 @@ from calibration.mocap.postures import Postures
 from calibration.numerics.alignment import registration_start
 from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
-from calibration.robot.hand import nominal_hand
+from calibration.robot.hand import HandModel
+from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.guards import (
     APART,
     CONDITION,
@@ -30,9 +31,9 @@ from calibration.stages.geometry.guards import (
     too_little,
     unusable_data,
 )
-from calibration.stages.geometry.hand_residual import Errors, hand_problem
+from calibration.stages.geometry.hand_residual import NoiseModel, hand_problem
 from calibration.stages.geometry.model_of_fit import model_of
-from calibration.stages.geometry.parameters import geometry_parameters, play_floor, play_start
+from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
 from calibration.verdict import Verdict
 
 STAGE = "geometry"
@@ -40,10 +41,10 @@ STAGE = "geometry"
 
 def calibrate_geometry(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
     """The geometric model; a verdict `refused` says that it must not be used."""
-    parameters = geometry_parameters(chain, description)
-    start, floor = play_start(chain, description), play_floor(chain, description)
-    errors = Errors(np.maximum(start, floor), floor, np.zeros(0), stated=True)
-    robust = fit_robustly(chain, parameters, postures, errors)
+    parameters, hand = geometry_parameters(chain, description), hand_model(chain, nominal_frames(chain, description))
+    start, floor = reading_sigma(chain, description), reading_floor(chain, description)
+    errors = NoiseModel(np.maximum(start, floor), floor, np.zeros(0), stated=True)
+    robust = fit_robustly(hand, parameters, postures, errors)
     found = robust.fit
     known = identifiability(found.J_white, parameters)
     oriented = postures.components == 6
@@ -51,7 +52,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     refused = [*unusable_data(chain, postures.q, frames, postures.components)]
     refused = refused or [
         *too_little(known, CONDITION[postures.components]),
-        *implausible(parameters, found, start, chain),
+        *implausible(parameters, found, start, hand),
     ]
     verdicts = [Verdict(STAGE, "refused", message) for message in refused]
     verdicts += left_out(postures, robust)
@@ -70,12 +71,12 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     return model_of("model_2", chain, parameters, found), tuple(verdicts)
 
 
-def fit_robustly(chain: Chain, parameters: ParameterSet, postures: Postures, errors: Errors) -> RobustFit:
+def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:
     """The fit of the postures that agree, from nominal values; none whose markers do not have their body's shape."""
-    nominal, n = nominal_hand(chain, parameters.nominal[:12]), len(postures)
+    n = len(postures)
     rigid = np.flatnonzero(of_one_shape(postures.misfit))
     found = robust_fit(
-        lambda some: hand_problem(nominal, parameters, postures.rows(rigid[some]), errors),
+        lambda some: hand_problem(hand, parameters, postures.rows(rigid[some]), errors),
         len(rigid),
         postures.components,
         parameters.nominal,

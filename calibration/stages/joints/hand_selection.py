@@ -42,7 +42,7 @@ def nearest_hand(
     if not seen:
         return {joint: found[0] for joint, found in options.items() if found}
     raw = passing_postures(description, seen, robot, _SPACING)
-    at = linearised(hand, hand.theta, raw)
+    at = linearised(hand, hand.theta, raw, hand.names)
     size = np.sqrt((at.r.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
     W = np.repeat(1.0 / np.maximum(size, np.finfo(float).tiny), 3)
     moved: dict[tuple[str, int], np.ndarray] = {}
@@ -51,7 +51,7 @@ def nearest_hand(
         d = _predicted(description, seen, robot, raw, samples, present)
         for joint in present:
             column = hand.chain.joints.index(joint)
-            moved[joint, layer] = W * at.J_joint[:, :, column] * d[:, [hand.chain.measured.index(joint)]]
+            moved[joint, layer] = W * at.B[:, :, column] * d[:, [hand.chain.measured.index(joint)]]
     return {joint: options[joint][layer] for joint, layer in _descend(W * at.r, moved)}
 
 

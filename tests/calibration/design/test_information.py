@@ -1,7 +1,5 @@
 """Nuisances of a design: their effect on the hand, the pull on a fit that does not ask for them, the rules' updates."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,9 +8,10 @@ import mjcf
 from calibration.design.exchange import _RULES, _Steps
 from calibration.design.information import departing, departures_of, prospect
 from calibration.numerics.lie import log6
+from calibration.robot.blocks import Placements
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
-from calibration.stages.geometry.parameters import geometry_parameters, play_start
+from calibration.stages.geometry.parameters import geometry_parameters, reading_sigma
 from scenarios import load
 from twin.campaign import describe_dataset
 
@@ -20,7 +19,7 @@ DESCRIBED = describe_dataset(load("humanoids2024").twin, ())
 CHAIN = chain_of(mjcf.urdf(), DESCRIBED)
 PARAMETERS = geometry_parameters(CHAIN, DESCRIBED)
 HAND = nominal_hand(CHAIN, PARAMETERS.nominal[:12])
-PLAY = play_start(CHAIN, DESCRIBED)
+PLAY = reading_sigma(CHAIN, DESCRIBED)
 Q = np.random.default_rng(0).uniform(*(np.clip(x, -2.0, 2.0) for x in CHAIN.limits()), size=(40, len(CHAIN.measured)))
 DEPARTURES = departures_of(CHAIN, Q)
 
@@ -41,12 +40,12 @@ def test_moments_are_those_of_inverse_dynamics_across_the_axis():
 @pytest.mark.parametrize("z", range(8))
 def test_a_nuisance_moves_the_hand_as_the_robot_would(z):
     q, step = Q[:6], 1e-3
-    G = DEPARTURES.effects(HAND, q, HAND.poses_and_derivatives(q, n_parameters=len(PARAMETERS)))[:, :, z]
+    G = DEPARTURES.effects(HAND, q)[:, :, z]
     M, T0 = CHAIN.gravity_moments(q), HAND.poses(q)
     for k in range(len(q)):
         xi = np.zeros((8, 6))
         xi[z, 3:] = step * DEPARTURES.bending[z] * M[k, z]
-        T1 = replace(HAND, chain=CHAIN.with_placements(xi)).poses(q[k : k + 1])
+        T1 = HAND.with_theta(xi.ravel(), HAND.block(Placements).names).poses(q[k : k + 1])
         moved = log6(np.linalg.inv(T0[k : k + 1]) @ T1)[0] / step
         np.testing.assert_allclose(G[k], moved, atol=1e-6)
 

@@ -19,7 +19,7 @@ from calibration.robot.hand import nominal_hand
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.frames.base_stage import locate_base
 from calibration.stages.geometry.hand_residual import linearised
-from calibration.stages.geometry.parameters import geometry_parameters, play_start
+from calibration.stages.geometry.parameters import geometry_parameters, reading_sigma
 from calibration.stages.geometry.stage import calibrate_geometry
 from calibration.stages.joints.model import JointModel, Quality
 from calibration.stages.joints.separable_fit import RHO, Problem, search
@@ -115,7 +115,7 @@ def test_a_refused_fit_ends_with_postures_too(chain, n, widest):
 @pytest.mark.parametrize("size", [0.0, 0.5, 1.0])
 def test_play_is_believed_as_the_postures_tell(chain, size):
     """Ten postures of six robots: a factor of the datasheet's play; the markers' noise is worth 0.04 of it."""
-    parameters, datasheet, found = geometry_parameters(chain, DESCRIBED), play_start(chain, DESCRIBED), []
+    parameters, datasheet, found = geometry_parameters(chain, DESCRIBED), reading_sigma(chain, DESCRIBED), []
     for seed in range(6):
         rng = np.random.default_rng(seed)
         q = rigid_robot.near_postures(rng, 10)
@@ -140,7 +140,7 @@ def test_what_is_predicted_of_a_dwell_is_its_derivative(chain):
     hand = nominal_hand(chain, parameters.nominal[:12])
     q = rigid_robot.near_postures(np.random.default_rng(0), 5)
     exact = replace(rigid_robot.postures(rigid_robot.Truth(), q), covariance=dwell_noise(hand.poses(q), DESCRIBED))
-    J = linearised(hand, parameters.nominal, exact).J
+    J = linearised(hand, parameters.nominal, exact, parameters.names).J
     W = np.linalg.inv(np.linalg.cholesky(exact.covariance))
     told = prospect(hand, parameters, DESCRIBED, np.zeros(8), q, q[:1], np.eye(len(parameters)))
     np.testing.assert_allclose(told.B, W @ J * parameters.scale, rtol=1e-6, atol=1e-5)

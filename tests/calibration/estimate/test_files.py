@@ -43,7 +43,9 @@ def test_zeros_read_back_from_master_calibration_close_the_loop(estimate, chain,
 
 
 def test_zeros_of_an_elastic_robot_carry_its_compliance(chain, tmp_path):
-    elastic = replace(nominal_hand(chain, np.zeros(12)), offset=0.01 * np.arange(8.0), compliance=1e-4 * np.arange(8.0))
+    elastic = nominal_hand(chain, np.zeros(12)).with_values(
+        offset=0.01 * np.arange(8.0), compliance=1e-4 * np.arange(8.0)
+    )
     (tmp_path / "master_calibration.yaml").write_text(zeros_text(elastic))
     zeros = read_zeros(tmp_path / "master_calibration.yaml")
     q = rigid_robot.random_angles(np.random.default_rng(0), 5)

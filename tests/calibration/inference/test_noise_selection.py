@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from calibration.inference.marginal_likelihood import Linearised, Noise, Widths, refined
+from calibration.inference.marginal_likelihood import Widths, refined
 from calibration.inference.noise_selection import needed
 from calibration.inference.parameters import Prior
+from calibration.inference.residual import Linearised, Noise
+from calibration.stages.geometry.hand_residual import HAND_NAMES
+from calibration.stages.geometry.parameters import reading_names
 from tests.calibration.stages.geometry.test_from_arrays import FEW, fitted, markers
 from tests.doubles import rigid_robot
 
@@ -21,9 +24,10 @@ def problem(seed, sizes, n=N, joints=0):
     r = 0.1 * rng.normal(size=(n, 2)) + np.einsum("nij,j,nj->ni", B, sizes, rng.normal(size=(n, 3)))
     everything = np.concatenate([B, np.broadcast_to(np.eye(2), (n, 2, 2))], axis=2)
     floor, free = np.array([FLOOR, FLOOR, FLOOR, 0.1]), np.array([True, True, True, False])
-    noise = Noise(everything, np.array([0, 1, 2, 3, 3]), floor, free, np.ones(n))
+    names, start = ("a", "b", "c", "known"), np.full(4, 0.1)
+    noise = Noise(names, np.array([0, 1, 2, 3, 3]), start, floor, free, np.arange(4) >= joints)
     prior = Prior(np.zeros(2), np.full(2, np.inf), np.full(2, -1))
-    return Linearised(np.zeros(2), r, J, B[:, :, :joints]), noise, prior, Widths(np.full(4, 0.1), np.zeros(0))
+    return Linearised(np.zeros(2), r, J, everything), noise, prior, Widths(np.full(4, 0.1), np.zeros(0))
 
 
 def test_errors_that_are_there_stay_and_others_go():
@@ -62,7 +66,8 @@ def test_the_noise_of_a_single_marker_is_not_taken_for_play_of_joints():
     for seed in range(10):
         q = rigid_robot.random_angles(np.random.default_rng([seed, 3]), 30)
         truth = rigid_robot.defects(seed)
-        found.append(fitted(q + truth.offset, markers(truth, q, 3e-4, seed, FEW)).fit)
-    play, noise = np.array([f.play for f in found]), np.array([f.hand_error[0] for f in found])
+        found.append(fitted(q + truth.offset, markers(truth, q, 3e-4, seed, FEW)))
+    play = np.array([f.fit.noise_sigma(reading_names(f.hand.nominal)) for f in found])
+    noise = np.array([f.fit.noise_sigma(HAND_NAMES[:1]) for f in found])
     assert (play[:, 1:] < 1e-3).all()
     assert ((noise > 2e-4) & (noise < 4e-4)).all()

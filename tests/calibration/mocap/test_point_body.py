@@ -43,14 +43,14 @@ def test_two_drawn_markers_are_their_mean(postures):
     assert FEW.is_point and postures.components == 3
     np.testing.assert_allclose(postures.point, np.mean([m.xyz for m in FEW.markers], axis=0))
     assert np.linalg.norm(FEW.point) > 0.01
-    at = linearised(HAND, PARAMETERS.nominal, postures)
+    at = linearised(HAND, PARAMETERS.nominal, postures, PARAMETERS.names)
     np.testing.assert_allclose(at.r, 0.0, atol=1e-12)
     assert np.linalg.eigvalsh(postures.covariance).min() > 0.99e-8 / 2.0
 
 
 def test_its_derivatives_are_those_of_its_place(postures):
-    at, step = linearised(HAND, PARAMETERS.nominal, postures), 1e-6
+    at, step = linearised(HAND, PARAMETERS.nominal, postures, PARAMETERS.names), 1e-6
     for k in range(len(PARAMETERS)):
         d = step * (np.arange(len(PARAMETERS)) == k)
-        more, less = (linearised(HAND, PARAMETERS.nominal + s * d, postures).r for s in (1.0, -1.0))
+        more, less = (linearised(HAND, PARAMETERS.nominal + s * d, postures, PARAMETERS.names).r for s in (1.0, -1.0))
         np.testing.assert_allclose(at.J[:, :, k], (more - less) / (2.0 * step), atol=1e-7)

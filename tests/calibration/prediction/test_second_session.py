@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -33,12 +31,12 @@ def postures(n, n_joints, seed=1):
 
 def test_remounted_markers_are_found_where_they_are(hand, description):
     rng = np.random.default_rng(2)
-    moved = replace(hand, base=hand.base + 3e-3 * rng.normal(size=6), hand=hand.hand + 8e-3 * rng.normal(size=6))
+    moved = hand.with_values(base=hand.base + 3e-3 * rng.normal(size=6), hand=hand.hand + 8e-3 * rng.normal(size=6))
     q = postures(8, len(description.joints))
     found = fit_frames(hand, q, moved.poses(q), description)
     np.testing.assert_allclose(found.base, moved.base, atol=1e-9)
     np.testing.assert_allclose(found.hand, moved.hand, atol=1e-9)
-    assert found.chain is hand.chain and found.offset is hand.offset
+    np.testing.assert_array_equal(found.theta[12:], hand.theta[12:])
 
 
 def test_what_is_left_is_smallest_in_units_of_the_tolerances(hand, description):
@@ -57,7 +55,7 @@ def test_what_is_left_is_smallest_in_units_of_the_tolerances(hand, description):
     for k in range(12):
         step = 1e-4 * np.eye(12)[k]
         for sign in (1.0, -1.0):
-            other = replace(best, base=best.base + sign * step[:6], hand=best.hand + sign * step[6:])
+            other = best.with_values(base=best.base + sign * step[:6], hand=best.hand + sign * step[6:])
             assert misfit(other) > misfit(best)
 
 
@@ -80,12 +78,14 @@ def test_frames_of_few_postures_are_as_uncertain_as_the_same_fit_repeated_shows(
     )
     k, p = len(hand.offset), 12 + 7 * len(hand.offset)
     sigma = np.r_[np.full(12, 9.0), np.full(6 * k, 4e-4), np.full(k, 1e-3)]  # of the old frames: no matter
-    robot = Compensator(hand, np.diag(sigma**2), np.full(k, 2e-3), np.array([2e-4, 1e-3]))
+    robot = Compensator(hand, hand.names[:p], np.diag(sigma**2), np.full(k, 2e-3), np.array([2e-4, 1e-3]))
     found = registered_anew(robot, q, hand.poses(q), description)
     stated = found.points(MARKERS, other)
     errors = []
     for _ in range(300):
-        true = hand.with_theta(hand.theta[:p] + np.r_[np.zeros(12), sigma[12:] * rng.normal(size=p - 12)])
+        true = hand.with_theta(
+            hand.theta[:p] + np.r_[np.zeros(12), sigma[12:] * rng.normal(size=p - 12)], hand.names[:p]
+        )
         T = [moved_hand(true, x, robot, rng) for x in (q, other)]
         again = registered_anew(robot, q, T[0], description)
         seen = np.einsum("nij,mj->nmi", T[1][:, :3, :3], MARKERS) + T[1][:, None, :3, 3]

@@ -9,7 +9,7 @@ from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predi
 from tests.doubles import rigid_robot
 
 X = np.array(rigid_robot.BODIES["gripper"][1])
-NONE = Spread(np.zeros((12, 12)), np.zeros(8), np.zeros(2))
+NONE = Spread((), np.zeros((0, 0)), np.zeros(8), np.zeros(2))
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def test_another_day_moves_base_and_marker_body_as_it_says(hand):
 def test_random_errors_of_readings_go_along_lever_arms(hand):
     q = rigid_robot.near_postures(np.random.default_rng(0), 1)
     reading = np.array([0.0, 1.0, 1.0, 1.5, 1.5, 3.0, 12.0, 10.0]) * 1e-3
-    found = predicted_points(hand, Spread(NONE.theta, reading, np.array([1e-4, 0.0])), X, q)
+    found = predicted_points(hand, Spread(NONE.names, NONE.theta, reading, np.array([1e-4, 0.0])), X, q)
     T = hand.poses(q + reading * np.random.default_rng(2).normal(size=(20000, 8)))
     p = np.einsum("nij,mj->nmi", T[:, :3, :3], X) + T[:, None, :3, 3]
     expected = np.cov(p[:, 0].T) + 1e-8 * np.eye(3)
@@ -41,7 +41,7 @@ def test_random_errors_of_readings_go_along_lever_arms(hand):
 
 
 def test_a_hand_that_was_seen_as_a_point_has_random_errors_of_its_place_only():
-    seen = Spread(NONE.theta, np.full(2, 1e-3), np.array([2e-3]))
+    seen = Spread(NONE.names, NONE.theta, np.full(2, 1e-3), np.array([2e-3]))
     np.testing.assert_array_equal(seen.random_errors(np.zeros((1, 6, 2))), [np.diag([4e-6] * 3 + [0.0] * 3)])
 
 

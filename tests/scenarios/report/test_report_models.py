@@ -82,7 +82,7 @@ def known_estimate(**changes) -> Estimate:
 
 def linked(trial):
     """The trial with link readings that the known joint models make of its motor readings."""
-    inputs = input_model(joint_data.LAB, replace(joint_data.hand(), offset=np.zeros(8)))
+    inputs = input_model(joint_data.LAB, joint_data.hand().with_values(offset=np.zeros(8)))
     asked, y = inputs.inputs(trial.t_robot, trial.q_motor), np.zeros_like(trial.q_motor)
     j, model = rigid_robot.JOINTS.index(JOINT), known_joint()[0]
     y[:, j] = model.discrepancy(asked.theta[:, j], asked.tau[:, j], asked.velocity[:, j])

@@ -88,12 +88,12 @@ def test_flanks_of_an_exact_play_move_the_fit_as_predicted(task, few):
     """The bias is that of the least squares the flanks go through, postures read on their flanks."""
     chosen, h = np.arange(20), np.array([0.0, *7 * [2e-3]])
     one = sides(few, chosen, h, np.random.default_rng(0))
-    model, p = task.model, len(task.parameters)
+    model = task.model
     flank = np.array(few.q[chosen])
     flank[:, model.chain.columns] += np.where(np.abs(one.approach) > 0, h, 0.0)
     T0, T1 = model.poses(few.q[chosen]), model.poses(flank)
     r = np.array([pin.log6(pin.SE3(a).actInv(pin.SE3(b))).vector for a, b in zip(T0, T1, strict=True)])
-    J = model.poses_and_derivatives(few.q[chosen], n_parameters=p)
+    J = model.poses_and_derivatives(few.q[chosen], names=task.parameters.names)
     W = few.J_joint[chosen] @ np.linalg.pinv(J.J_joint)  # whitener on the joints' span
     x = few.after(chosen) @ np.einsum("ndr,ndc,nc->r", few.B[chosen], W, r)
     np.testing.assert_allclose(np.linalg.norm(few.P @ x, axis=1), one.one_sided, rtol=0.02)
@@ -123,7 +123,7 @@ def test_exchanging_finds_the_best_set_of_a_pool_small_enough_to_try_all(few):
 def test_predicted_sigmas_are_those_of_the_information_inverted_whole(task, few):
     """All parameters at once, gauge included, by the normal equations with the tolerances as priors."""
     chosen = np.arange(25)
-    found = task.model.poses_and_derivatives(few.q[chosen], n_parameters=len(task.parameters))
+    found = task.model.poses_and_derivatives(few.q[chosen], names=task.parameters.names)
     again = prospect(task.model, task.parameters, DESCRIBED, task.play, few.q[chosen], few.q[:1])
     W = again.J_joint @ np.linalg.pinv(found.J_joint)
     np.testing.assert_allclose(W @ found.J_joint, again.J_joint, atol=1e-6)

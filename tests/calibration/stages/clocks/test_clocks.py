@@ -102,7 +102,7 @@ def test_the_sigma_of_a_lag_is_its_scatter_when_the_noise_is_correlated():
     assert 0.7 < stated / scatter < 1.4
 
 
-def test_a_play_starts_centred_and_follows_half_a_gap_behind():
+def test_a_reading_sigmas_centred_and_follows_half_a_gap_behind():
     q = np.array([0.0, 0.5, 3.0, 2.5, 1.5, 0.0])[:, None]
     np.testing.assert_array_equal(play(q, np.array([1.0]))[:, 0], [0.0, 0.0, 2.0, 2.0, 2.0, 1.0])
 

@@ -219,7 +219,7 @@ def test_the_hand_is_predicted_by_the_same_numbers(chain, q, base_frame):
     np.testing.assert_allclose(robot.hand.poses(q), postures(chain, q).T_base_hand, atol=1e-10)
     found = robot.predict(np.zeros(N), q)
     S = robot.covariance
-    J = robot.hand.poses_and_derivatives(q, n_parameters=len(S)).J
+    J = robot.hand.poses_and_derivatives(q, names=robot.names).J
     in_base_body = np.sqrt(np.diagonal(J @ S @ np.swapaxes(J, 1, 2), axis1=1, axis2=2))
     assert in_base_body.max() < 1e-5  # of T_base_B, 2 mm and 2 mrad, nothing is left
     assert np.isfinite(found.covariance).all()

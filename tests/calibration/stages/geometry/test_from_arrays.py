@@ -11,6 +11,7 @@ from calibration.mocap.cluster_shape import cluster
 from calibration.numerics.alignment import registration_start
 from calibration.robot.hand_uncertainty import Session
 from calibration.stages.geometry.from_arrays import GeometryFit, fit_geometry
+from calibration.stages.geometry.parameters import reading_names
 from tests.doubles import rigid_robot
 from tests.doubles.real_postures import KINDS, spoilt
 
@@ -151,7 +152,11 @@ def test_the_predicted_covariance_is_that_of_its_parameters_and_errors(good):
     at, step = found.fit.theta, 1e-6
     J = np.array(
         [
-            (found.hand.with_theta(at + d).poses(q) - found.hand.with_theta(at - d).poses(q))[0] / (2.0 * step)
+            (
+                found.hand.with_theta(at + d, found.parameters.names).poses(q)
+                - found.hand.with_theta(at - d, found.parameters.names).poses(q)
+            )[0]
+            / (2.0 * step)
             for d in step * np.eye(len(at))
         ]
     )
@@ -159,5 +164,5 @@ def test_the_predicted_covariance_is_that_of_its_parameters_and_errors(good):
     expected = np.einsum("mpi,pq,mqj->mij", moved, found.fit.covariance, moved)
     bare = replace(found.fit.widths, noise=np.zeros_like(found.fit.widths.noise))
     alone = replace(found, fit=replace(found.fit, widths=bare))
-    assert len(found.fit.play) == k
+    assert len(found.fit.noise_sigma(reading_names(found.hand.nominal))) == k
     np.testing.assert_allclose(alone.predict_with_covariance(q).covariance[0], expected, rtol=1e-4, atol=1e-14)

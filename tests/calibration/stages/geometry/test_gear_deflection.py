@@ -69,7 +69,7 @@ def test_the_bayes_factor_is_that_of_the_data_s_likelihoods(chain):
     play = np.full(8, 1e-3)
     found = fit(nominal_hand(chain, parameters.nominal[:12]), parameters, postures, play, play)
     rng, width = np.random.default_rng(0), np.array([2e-3, 1e-3])
-    J = found.at.J_joint[:, :, [4, 6]] * rng.normal(size=(12, 1, 2))
+    J = found.at.B[:, :, [4, 6]] * rng.normal(size=(12, 1, 2))
     A, H = found.J_white, (found.whitener @ J).reshape(-1, 2) * width
     r = found.r_white.ravel() - A @ (found.theta - parameters.nominal)
     scale = np.sqrt(parameters.prior.factor(found.widths.prior)) * parameters.tolerance
@@ -79,7 +79,7 @@ def test_the_bayes_factor_is_that_of_the_data_s_likelihoods(chain):
 
 
 def test_zeros_of_a_robot_with_play_carry_it(chain, tmp_path):
-    played = replace(nominal_hand(chain, np.zeros(12)), compliance=1e-4 * np.arange(8.0), gap=2.0 * HELD)
+    played = nominal_hand(chain, np.zeros(12)).with_values(compliance=1e-4 * np.arange(8.0), gap=2.0 * HELD)
     (tmp_path / "zeros.yaml").write_text(zeros_text(played))
     zeros, q = read_zeros(tmp_path / "zeros.yaml"), rigid_robot.random_angles(np.random.default_rng(0), 5)
     tau = chain.gravity_torques(q)

@@ -3,14 +3,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import mjcf
 from calibration.inference.identifiability import identifiability
 from calibration.mocap.postures import Postures
 from calibration.numerics.lie import exp6
+from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.guards import distinct
 from calibration.stages.geometry.hand_residual import fit, linearised
-from calibration.stages.geometry.parameters import geometry_parameters, play_floor, play_start, registration_parameters
+from calibration.stages.geometry.parameters import (
+    geometry_parameters,
+    reading_floor,
+    reading_names,
+    reading_sigma,
+    registration_parameters,
+)
 from calibration.stages.geometry.registration import register
 from calibration.stages.geometry.stage import calibrate_geometry
 from tests.doubles import rigid_robot
@@ -19,11 +27,14 @@ TINY = np.full(8, 1e-12)
 GAPS = np.array([0.0, 1.0, 1.0, 1.5, 1.5, 3.0, 12.0, 10.0]) * 1e-3
 
 
+GEOMETRIC = geometry_parameters(chain_of(mjcf.urdf(), rigid_robot.described()), rigid_robot.described()).names
+
+
 def fitted(chain, postures, description=None, **start):
     description = description or rigid_robot.described()
     parameters = geometry_parameters(chain, description)
     hand = nominal_hand(chain, nominal_frames(chain, description))
-    play, floor = start.get("play", TINY), start.get("floor", TINY)
+    play, floor = start.get("reading", TINY), start.get("floor", TINY)
     return hand, parameters, fit(hand, parameters, postures, play, floor)
 
 
@@ -47,7 +58,7 @@ def test_without_noise_the_hand_is_predicted_to_1e_8_everywhere(chain, torso, ra
     assert found.converged
     assert (known.rank, known.clear) == (rank, True)
     new = rigid_robot.random_angles(np.random.default_rng(2), 200, torso)
-    predicted = hand.with_theta(found.theta).poses(new + truth.offset)
+    predicted = hand.with_theta(found.theta, GEOMETRIC).poses(new + truth.offset)
     np.testing.assert_allclose(predicted, rigid_robot.hand_in_base(truth, new), atol=1e-8)
 
 
@@ -67,10 +78,12 @@ def test_derivatives_of_the_residual_match_finite_differences(chain):
     postures = rigid_robot.postures(rigid_robot.defects(5), rigid_robot.random_angles(np.random.default_rng(1), 4))
     hand = nominal_hand(chain, np.zeros(12))
     theta = np.concatenate([truth.base, truth.hand, truth.xi.ravel(), truth.offset])
-    at, step = linearised(hand, theta, postures), 1e-6
+    at, step = linearised(hand, theta, postures, GEOMETRIC), 1e-6
     for column in range(len(theta)):
         d = step * np.eye(len(theta))[column]
-        numeric = linearised(hand, theta + d, postures).r - linearised(hand, theta - d, postures).r
+        numeric = (
+            linearised(hand, theta + d, postures, GEOMETRIC).r - linearised(hand, theta - d, postures, GEOMETRIC).r
+        )
         np.testing.assert_allclose(at.J[:, :, column], numeric / (2.0 * step), atol=1e-8)
 
 
@@ -94,11 +107,11 @@ def test_every_parameter_of_a_combination_is_said_to_be_combined(chain):
 
 def test_random_reading_errors_are_estimated_joint_by_joint(chain):
     description, q = rigid_robot.described(), rigid_robot.near_postures(np.random.default_rng(1), 200)
-    start = {"play": play_start(chain, description), "floor": play_floor(chain, description)}
+    start = {"reading": reading_sigma(chain, description), "floor": reading_floor(chain, description)}
     _, _, found = fitted(chain, with_play(rigid_robot.defects(1), q), description, **start)
     assert found.converged
-    np.testing.assert_allclose(found.play[1:], GAPS[1:] / np.sqrt(3.0), rtol=0.2)
-    assert found.play[0] < 1e-4
+    np.testing.assert_allclose(found.noise_sigma(reading_names(chain))[1:], GAPS[1:] / np.sqrt(3.0), rtol=0.2)
+    assert found.noise_sigma(reading_names(chain))[0] < 1e-4
 
 
 def test_prior_widths_hardly_matter(chain):
@@ -109,9 +122,9 @@ def test_prior_widths_hardly_matter(chain):
     for factor in (1.0, 3.0, 1.0 / 3.0):
         wide = {k: factor * v for k, v in rigid_robot.description([])["tolerances"].items()}
         wide["joint_play"] = description.tolerances.joint_play
-        start = {"play": play_start(chain, description), "floor": play_floor(chain, description)}
+        start = {"reading": reading_sigma(chain, description), "floor": reading_floor(chain, description)}
         hand, _, found = fitted(chain, with_play(truth, q), rigid_robot.described(tolerances=wide), **start)
-        T = hand.with_theta(found.theta).poses(new + truth.offset)
+        T = hand.with_theta(found.theta, GEOMETRIC).poses(new + truth.offset)
         errors.append(np.sqrt(((T - rigid_robot.hand_in_base(truth, new))[:, :3, 3] ** 2).mean()))
     assert max(errors[1:]) <= 1.1 * errors[0]
 

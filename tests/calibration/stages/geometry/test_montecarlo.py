@@ -20,9 +20,10 @@ from scipy.stats import chi2
 import mjcf
 from calibration.mocap.cluster_pose import body_poses
 from calibration.numerics.lie import exp6, inverse, log6
+from calibration.robot.blocks import Compliance
 from calibration.robot.chain import chain_of_frames
+from calibration.robot.parameter_block import Known
 from calibration.stages.geometry.from_arrays import Widths, fit_chain
-from calibration.stages.geometry.parameters import DEFLECTION, gear_tolerances
 from tests.calibration.stages.geometry.test_from_arrays import LAB, X
 from tests.doubles import rigid_robot
 
@@ -48,7 +49,11 @@ def drawn(chain, rng, soft=False):
     xi, zeros = rng.normal(size=(8, 6)) * np.repeat([4e-3, 8e-3], 3), rng.normal(size=8) * np.r_[4e-3, np.full(7, 4e-2)]
     reading = rigid_robot.random_angles(rng, POSTURES + NEW) + zeros
     tau = chain.gravity_torques(reading)
-    gives = gear_tolerances(chain, tau[:POSTURES], DEFLECTION) * rng.normal(size=8) * (rng.random(8) < rng.random())
+    gives = (
+        Compliance.nominal(chain, np.zeros(12)).tolerance(Known(chain, None, tau[:POSTURES]))
+        * rng.normal(size=8)
+        * (rng.random(8) < rng.random())
+    )
     return rigid_robot.Truth(xi=xi, offset=zeros), reading, reading - zeros - soft * gives * tau
 
 
@@ -62,10 +67,10 @@ def judged(chain, seed, soft):
     truth, reading, q = drawn(chain, rng, soft)
     found = fit_chain(chain, reading[:POSTURES], measured(truth, q[:POSTURES], rng), Widths())
     true = body_poses(found.markers, rigid_robot.positions(LAB @ rigid_robot.hand_in_base(truth, q[POSTURES:]), X)).T
-    predicted = found.hand.poses_and_derivatives(reading[POSTURES:], n_parameters=len(found.parameters))
+    predicted = found.hand.poses_and_derivatives(reading[POSTURES:], names=found.parameters.names)
     J, scale = predicted.J, found.parameters.scale[:KNOWN]
     # The bound: the markers' noise alone is known, nothing is believed beforehand, no gear gives.
-    noise = found.fit.noise.B[:, :, -6:]
+    noise = found.fit.at.B[:, :, -6:]
     A = (np.linalg.inv(np.linalg.cholesky(noise @ np.swapaxes(noise, 1, 2))) @ found.fit.at.J[:, :, :KNOWN]) * scale
     A = A.reshape(-1, KNOWN)
     G = J[:, :, :KNOWN] * scale

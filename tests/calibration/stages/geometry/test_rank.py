@@ -8,7 +8,6 @@ from calibration.inference.identifiability import identifiability
 from calibration.inference.parameters import ParameterSet
 from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand import nominal_hand
-from calibration.stages.geometry.parameters import parameter_names
 from tests.doubles import rigid_robot
 
 N_PARAMETERS = 60
@@ -18,7 +17,7 @@ def told(q, tool="gripper_grasping_frame", hand=(0.02, -0.03, 0.1, 0.1, 0.2, 0.0
     chain = chain_of_frames(mjcf.urdf(), rigid_robot.JOINTS, "base_footprint", tool)
     model = nominal_hand(chain, np.r_[0.1, -0.2, 0.3, 0.02, 0.01, -0.5, hand])
     J = model.poses_and_derivatives(q).J[:, :components, :N_PARAMETERS]
-    names, units = parameter_names(chain)[:N_PARAMETERS], ("m", "m", "m", "rad", "rad", "rad") * 10
+    names, units = model.names[:N_PARAMETERS], ("m", "m", "m", "rad", "rad", "rad") * 10
     parameters = ParameterSet(names, units, np.zeros(N_PARAMETERS), np.full(N_PARAMETERS, np.inf))
     return identifiability((J / 1e-4).reshape(-1, N_PARAMETERS), parameters)
 
