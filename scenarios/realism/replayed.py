@@ -10,8 +10,9 @@ import numpy as np
 
 from scenarios.realism.log import Recorded
 from twin.base_tests import WrenchHistory, massless_base_on, replay
-from twin.config import Base, TwinConfig, sampled
-from twin.defects import Defect, ground, wheels_of
+from twin.config import TwinConfig
+from twin.defects import Base, Defect, ground, wheels_of
+from twin.fields import sampled
 from twin.instruments import sample_plate
 from twin.random_streams import generator
 

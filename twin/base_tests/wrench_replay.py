@@ -18,9 +18,8 @@ from mujoco import rollout
 from scipy.spatial.transform import Rotation
 
 import mjcf
-from twin.config.base import Base
 from twin.defects.defect import Defect
-from twin.defects.wheels.from_config import ground, wheels_of
+from twin.defects.wheels.base import Base, ground, wheels_of
 from twin.errors import Diverged
 from twin.simulation.base_joint import ROOT, base_poses, place_base
 from twin.simulation.build import Twin, build

@@ -2,19 +2,18 @@
 
 from typing import cast
 
-import numpy as np
-
 import mjcf
 from calibration.recording import Description, TrialEntry, schema
-from twin.campaign.robot import BASE, TOOL, TORSO
 from twin.config.instruments import Instruments
 from twin.config.twin import TwinConfig
+from twin.fields.names import BASE, HAND, TORSO
+from twin.fields.values import point
 from twin.simulation.force_plates import PLATE, PlateGrid, T_lab_plate
 from twin.simulation.wrist_sensor import WRIST_SENSOR
 
 
 def describe_dataset(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:
-    """The description of a recorded campaign; nothing drawn enters it."""
+    """The description of a recorded campaign, of nominal values: those of one robot have another type."""
     i, d = config.instruments, config.datasheet
     joints = [schema.Joint(name=TORSO, encoders=("motor",), rate=i.robot_rate)]
     joints += [schema.Joint(name=n, encoders=("motor", "link"), rate=i.robot_rate) for n in config.arm]
@@ -22,7 +21,7 @@ def describe_dataset(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Desc
     return Description(
         robot="tiago",
         base_frame=BASE,
-        tool_frame=TOOL,
+        tool_frame=HAND,
         joints=tuple(joints),
         bodies=tuple(
             schema.Body(name=n, link=b.link, markers=tuple(schema.Marker(name=m, xyz=p) for m, p in b.markers.items()))
@@ -52,21 +51,16 @@ def describe_dataset(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Desc
 def _plates(instruments: Instruments) -> tuple[schema.Plate, ...]:
     spec = mjcf.spec()
     T = T_lab_plate(spec.body(PLATE), instruments.plate_place)
-    axes = cast(tuple[schema.Vector3, schema.Vector3, schema.Vector3], tuple(map(_vector, T[:3, :3].T)))
+    axes = cast(tuple[schema.Vector3, schema.Vector3, schema.Vector3], tuple(map(point, T[:3, :3].T)))
     cut = PlateGrid(instruments.plate_grid).cut(*(2.0 * spec.geom(PLATE).size[:2]).tolist())
     return tuple(
-        schema.Plate(name=t.name, centre=_vector(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size)
+        schema.Plate(name=t.name, centre=point(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size)
         for t in cut
     )
-
-
-def _vector(v: np.ndarray) -> schema.Vector3:
-    x, y, z = (float(c) for c in v)
-    return x, y, z
 
 
 def _payload(config: TwinConfig) -> schema.Payload | None:
     p = config.payload
     return (
-        schema.Payload(link=TOOL, mass=p.mass, com=p.com, tolerance=config.datasheet.payload_mass) if p.mass else None
+        schema.Payload(link=HAND, mass=p.mass, com=p.com, tolerance=config.datasheet.payload_mass) if p.mass else None
     )

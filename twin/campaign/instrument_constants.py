@@ -4,12 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.config.instruments import Instruments, LogErrors, MocapErrors
-from twin.config.twin import TwinConfig
+from twin.config.instruments import Instruments
+from twin.config.twin import RobotConfig
+from twin.instruments.motion_capture import MocapErrors
+from twin.instruments.robot_log import LogErrors
 from twin.truth import Parameter
 
 
-def constants(config: TwinConfig) -> tuple[Parameter, ...]:
+def constants(config: RobotConfig) -> tuple[Parameter, ...]:
     """Every constant of the instruments; of what is off unless a scenario names it, what is on."""
     i = config.instruments
     return (*_noise(i), *_drives(config), *_log(i.log), *_capture(i.mocap))
@@ -22,7 +24,7 @@ def _noise(i: Instruments) -> Iterator[Parameter]:
     yield Parameter("plate.moment_noise", "N.m", i.plate_moment_noise)
 
 
-def _drives(config: TwinConfig) -> Iterator[Parameter]:
+def _drives(config: RobotConfig) -> Iterator[Parameter]:
     """From torque to current, and the current's step."""
     yield Parameter("gear.torso_lift_joint.force_per_ampere", "N/A", config.torso.force_per_ampere)
     for name, joint in config.arm.items():

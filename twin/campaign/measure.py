@@ -8,15 +8,16 @@ The campaign's clock is the motion capture's: its stamps are true times of expos
 """
 
 from dataclasses import asdict, replace
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from calibration.recording import Trial
 from twin.campaign.laboratory import EPOCH, Laboratory
-from twin.campaign.robot import BASE
-from twin.config.twin import TwinConfig
+from twin.config.twin import RobotConfig
 from twin.defects.defect import Defect
+from twin.fields.names import BASE
 from twin.instruments import force_plate, motion_capture, robot_log, wrist_sensor
 from twin.instruments.clock import Clock, Latency
 from twin.instruments.sampling import averaged, interpolate, interpolate_poses
@@ -24,7 +25,6 @@ from twin.motions.motion import Motion
 from twin.motions.swings import JOINTS
 from twin.random_streams import generator
 from twin.simulation.force_plates import PLATE, PlateGrid, plate_sites
-from twin.simulation.kinematic import without_plate
 from twin.simulation.states import States
 from twin.transforms import transform
 from twin.truth import TruthTrial
@@ -40,10 +40,20 @@ def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tu
     t_mocap, _ = Clock("mocap").ticks(start + late, stop + late, i.mocap_rate)
     true = _true(lab, states, t_mocap, start)
     wrench = _wrist(lab, motion, states, true_robot - start)
-    log = robot_log.measured(true_robot - start, states, lab.robot.encoders, lab.config, wrench)
+    log = robot_log.measured(true_robot - start, states, lab.robot.encoders, _drives(lab.config), wrench)
     rng = generator(lab.seed, motion.id, "robot")
+    plates: dict[str, Any] = (
+        {}
+        if motion.kinematic
+        else {
+            "plate": PlateGrid(i.plate_grid).names,
+            "t_plate": t_plate,
+            "plate_wrench": _wrenches(lab, motion, states, true_plate, start),
+            "plate_centre": plate_centres(lab.twin.model),
+        }
+    )
     t_robot, log = robot_log.kept(robot_log.stamped(t_robot, i.robot_rate, i.log, rng), log, i.log, rng)
-    trial = Trial(
+    return Trial(
         id=motion.id,
         joint=JOINTS,
         t_robot=t_robot,
@@ -52,23 +62,21 @@ def measure(lab: Laboratory, motion: Motion, states: States, start: float) -> tu
         marker_body=tuple(c.name for c in lab.robot.clusters for _ in c.marker_names),
         t_mocap=t_mocap,
         marker_position=_markers(lab, motion, states, true, start),
-        plate=PlateGrid(i.plate_grid).names,
-        t_plate=t_plate,
-        plate_wrench=_wrenches(lab, motion, states, true_plate, start),
-        plate_centre=plate_centres(lab.twin.model),
+        **plates,
         dwell_start=motion.dwells[:, 0] + start + late,
         dwell_stop=motion.dwells[:, 1] + start + late,
         approach=motion.approach,
+    ), true
+
+
+def _drives(config: RobotConfig) -> robot_log.Drives:
+    per_ampere = [config.torso.force_per_ampere, *(config.arm[j].torque_per_ampere for j in JOINTS[1:])]
+    return robot_log.Drives(
+        np.array(per_ampere), config.instruments.current_quantum, config.instruments.log.velocity_cutoff
     )
-    return (without_plate(trial) if is_kinematic(lab, motion) else trial), true
 
 
-def is_kinematic(lab: Laboratory, motion: Motion) -> bool:
-    """Whether no plate feels the robot."""
-    return lab.config.campaign.carried or (motion.base is not None and motion.base.form == "kinematic")
-
-
-def clocks(config: TwinConfig) -> tuple[Clock, Clock]:
+def clocks(config: RobotConfig) -> tuple[Clock, Clock]:
     """The robot's and the plate's, against true time; stamps of a log that is late are late."""
     i = config.instruments
     robot, force = i.robot_clock, i.plate_clock

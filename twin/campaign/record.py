@@ -10,7 +10,6 @@ and the instrument, so that the files do not depend on the number of threads.
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,22 +21,15 @@ from twin.base_tests.gravity_stiffness import gravity_stiffness
 from twin.base_tests.slip_load import slip_loads
 from twin.campaign.dataset_description import describe_dataset
 from twin.campaign.instrument_constants import constants
-from twin.campaign.laboratory import EPOCH, Laboratory, built, laboratory, second_session
-from twin.campaign.measure import instrument_errors, is_kinematic, measure, plate_centre
+from twin.campaign.laboratory import EPOCH, Laboratory, laboratory, second_session
+from twin.campaign.measure import instrument_errors, measure, plate_centre
 from twin.campaign.second_session import CONFIRMATION, session_parameters
 from twin.config.twin import TwinConfig
-from twin.defects.defect import Defect
-from twin.defects.inertia import Payload
-from twin.defects.thermal_drift import Warming
-from twin.defects.wheels.rolling_wheel import Rolling
+from twin.defects.wheels.rolling_wheel import rolling_parameters
 from twin.defects.wheels.stiffness import spatial_stiffness
-from twin.defects.wheels.wheel import Wheel
 from twin.motions.motion import Motion
 from twin.motions.schedule import schedule
-from twin.simulation.build import Twin
-from twin.simulation.kinematic import arm_frame, kinematic_states
-from twin.simulation.rollout import simulate
-from twin.simulation.states import States
+from twin.simulation.kinematic import arm_frame
 from twin.truth import Parameter
 
 Progress = Callable[[str, float], None]
@@ -93,7 +85,7 @@ def record(
 
 
 def _one(lab: Laboratory, motion: Motion, start: float, out: Path, watch: Watch) -> TrialEntry:
-    states = _states(lab, motion, start - EPOCH + motion.duration / 2.0)
+    states = lab.states(motion, start - EPOCH + motion.duration / 2.0)
     trial, true = measure(lab, motion, states, start)
     file = f"trials/{motion.id}.nc"
     digest = write_trial(out / "dataset" / file, trial)
@@ -110,28 +102,6 @@ def _one(lab: Laboratory, motion: Motion, start: float, out: Path, watch: Watch)
     )
 
 
-def _states(lab: Laboratory, motion: Motion, time: float) -> States:
-    """What the motion does at `time` [s] of the campaign."""
-    move = kinematic_states if is_kinematic(lab, motion) else simulate
-    return move(_in_trial(lab, motion, time), motion, lab.T_lab_base)
-
-
-def _in_trial(lab: Laboratory, motion: Motion, time: float) -> Twin:
-    """The robot with the motion's payload in its hand, as warm as it is at `time` [s] of the campaign."""
-
-    def now(defect: Defect) -> Defect:
-        if isinstance(defect, Payload) and motion.payload is not None:
-            return replace(defect, mass=motion.payload)
-        if isinstance(defect, Wheel) and motion.base is not None and not is_kinematic(lab, motion):
-            return Rolling(defect)
-        return replace(defect, time=time) if isinstance(defect, Warming) else defect
-
-    defects = tuple(now(d) for d in lab.robot.defects)
-    if all(a is b for a, b in zip(defects, lab.robot.defects, strict=True)):
-        return lab.twin
-    return built(lab.config, defects, lab.twin.links)
-
-
 def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> None:
     robot = lab.robot
     K, C = spatial_stiffness(robot.wheels)
@@ -140,7 +110,7 @@ def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> Non
         parameters += source.parameters()
     parameters += constants(lab.config)
     if "wheels" in lab.config.campaign.driving.forms:
-        parameters += (p for wheel in robot.wheels for p in Rolling(wheel).parameters())
+        parameters += (p for wheel in robot.wheels for p in rolling_parameters(wheel.name))
     if lab.config.campaign.driving.forms:
         parameters += arm_frame(lab.twin, next(iter(lab.config.arm)))
     derived = {"K": K, "C": C, "K_gravity": gravity_stiffness(lab.twin, robot.wheels)}

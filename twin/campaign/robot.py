@@ -1,41 +1,34 @@
-"""From what a scenario says to one robot: every stochastic defect drawn from a stream of its own name."""
+"""From the values of one robot to its parts: every stochastic one sampled from a stream of its own name."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 import mjcf
-from twin.config.instruments import MarkerBody
-from twin.config.twin import TwinConfig
-from twin.defects.bending import Cable, Flexibility
+from twin.config.robot import ArmJoint
+from twin.config.twin import RobotConfig
+from twin.defects.bending import Flexibility
 from twin.defects.defect import Defect
 from twin.defects.differential import Differential
-from twin.defects.gear import DirectDrive, Gear
-from twin.defects.gear_friction import GearFriction
-from twin.defects.inertia import LinkMass, Payload
+from twin.defects.gear import DirectDrive
+from twin.defects.inertia import LinkMass
 from twin.defects.placement import Placement
-from twin.defects.thermal_drift import Warming
-from twin.defects.wheels.from_config import ground, wheels_of
+from twin.defects.wheels.base import ground, wheels_of
 from twin.defects.wheels.wheel import Wheel
+from twin.fields.names import ARM, BASE, TORSO
+from twin.fields.values import point
 from twin.instruments import motion_capture
-from twin.instruments.encoder import Encoder
+from twin.instruments.encoder import Encoder, harmonics
 from twin.instruments.markers import Cluster, LooseMarker
 from twin.random_streams import generator
-from twin.simulation.build import HAND
-from twin.simulation.force_plates import FloorTilt, PlateGrid, PlatePlacement
+from twin.simulation.force_plates import PlateGrid, PlatePlacement
 
-TORSO = "torso_lift_joint"
-TOOL = HAND
-BASE = "base_footprint"
-WRIST = ("arm_6_joint", "arm_7_joint")
-_LINK_INERTIA = 0.004  # [kg.m2] output gear of an arm joint
-_DAMPING_RATIO = 1.2  # servo velocity gain over sqrt(kp J)
+WRIST = ARM[-2:]
 
 
 @dataclass(frozen=True)
 class Robot:
-    """One drawn robot with its sensors and targets.
+    """One robot with its sensors and targets.
 
     Attributes:
         defects: What changes the body, in the order it is applied.
@@ -51,31 +44,52 @@ class Robot:
     wheels: tuple[Wheel, ...]
     loose: tuple[LooseMarker, ...] = ()
 
+    def with_defects(self, *defects: Defect) -> "Robot":
+        """The robot with further defects, each in place of one of its class on the same joint, link or wheel."""
+        new, own = {_place(d): d for d in defects}, {_place(d) for d in self.defects}
+        kept = tuple(new.get(_place(d), d) for d in self.defects)
+        found = (*kept, *(d for place, d in new.items() if place not in own))
+        return replace(self, defects=found, wheels=tuple(d for d in found if isinstance(d, Wheel)) or self.wheels)
 
-def sample(config: TwinConfig, seed: int) -> Robot:
+
+def _place(defect: Defect) -> tuple[type, str]:
+    """The class of a defect and what of the robot it concerns."""
+    parts = (getattr(defect, name, None) for name in ("joint_name", "link", "name"))
+    return type(defect), next((part for part in parts if part), "")
+
+
+def sample(config: RobotConfig, seed: int) -> Robot:
     """One robot of the series; the same seed gives the same robot."""
-    wheels = wheels_of(config.base)
+    wheels, torso = wheels_of(config.base), config.torso
+    arm = {name: _joint(config, seed, joint) for name, joint in config.arm.items()}
     return Robot(
         defects=(
             PlateGrid(config.instruments.plate_grid),
             PlatePlacement(config.instruments.plate_place),
             *_placements(config, seed),
             *_masses(config, seed),
-            *_gears(config, seed),
-            _torso_drive(config),
-            Flexibility("torso_lift_link", config.torso.bending_stiffness, config.torso.bending_damping),
+            *_gears(config, arm),
+            DirectDrive(TORSO, torso.rotor_inertia, torso.servo_stiffness),
+            Flexibility("torso_lift_link", torso.bending_stiffness, torso.bending_damping),
             *ground(config.base, wheels),
-            _payload(config, seed),
-            *_departures(config),
+            config.payload.sample(generator(seed, "payload")),
+            *config.departures.defects(),
+            *(d.sample(generator(seed, "defect", str(k))) for k, d in enumerate(config.defects)),
         ),
-        encoders=_encoders(config, seed),
-        clusters=tuple(cluster(name, body, seed) for name, body in config.instruments.bodies.items()),
+        encoders=_encoders(config, seed, arm),
+        clusters=mounted(config, seed),
         wheels=wheels,
-        loose=tuple(LooseMarker(n, m.sag, m.since) for n, m in config.departures.loosened.items()),
+        loose=tuple(config.departures.loosened.values()),
     )
 
 
-def _placements(config: TwinConfig, seed: int) -> tuple[Placement, ...]:
+def mounted(config: RobotConfig, seed: int, *session: str) -> tuple[Cluster, ...]:
+    """The marker bodies as mounted, in the first session unless one is named."""
+    bodies = config.instruments.bodies.items()
+    return tuple(body.mounted(name, generator(seed, *session, "cluster", name)) for name, body in bodies)
+
+
+def _placements(config: RobotConfig, seed: int) -> tuple[Placement, ...]:
     w = config.widths
     widths = np.repeat([w.placement_translation, w.placement_rotation], 3)
     xi = {n: generator(seed, "placement", n).normal(size=6) * widths for n in (TORSO, *config.arm)}
@@ -84,7 +98,7 @@ def _placements(config: TwinConfig, seed: int) -> tuple[Placement, ...]:
     return tuple(Placement(name, twist) for name, twist in xi.items())
 
 
-def _masses(config: TwinConfig, seed: int) -> tuple[LinkMass, ...]:
+def _masses(config: RobotConfig, seed: int) -> tuple[LinkMass, ...]:
     """Links of the upper body with a mass of their own; the base's never moves against the plate."""
     nominal = mjcf.model()
     links = [nominal.body(i).name for i in range(nominal.nbody)]
@@ -98,115 +112,46 @@ def _masses(config: TwinConfig, seed: int) -> tuple[LinkMass, ...]:
     def one(link: str) -> LinkMass:
         rng = generator(seed, "mass", link)
         scale = make.get(link, 1.0) * (1.0 + w.link_mass * float(rng.uniform(-1.7, 1.7)))
-        return LinkMass(link, scale, w.link_com * rng.normal(size=3))
+        return LinkMass(link, scale, point(w.link_com * rng.normal(size=3)))
 
     return tuple(one(link) for link in heavy)
 
 
-def _factor(config: TwinConfig, seed: int, *names: str) -> float:
-    return 1.0 + config.widths.spread * float(generator(seed, "spread", *names).uniform(-1.0, 1.0))
+def _joint(config: RobotConfig, seed: int, joint: ArmJoint) -> ArmJoint:
+    """Gap and offset scattered about what is written."""
+
+    def scattered(what: str) -> float:
+        factor = float(generator(seed, "spread", what, joint.joint_name).uniform(-1.0, 1.0))
+        return float(getattr(joint, what)) * (1.0 + config.widths.spread * factor)
+
+    return replace(joint, gap=scattered("gap"), offset=scattered("offset"))
 
 
-def _gears(config: TwinConfig, seed: int) -> tuple[Defect, ...]:
+def _gears(config: RobotConfig, arm: dict[str, ArmJoint]) -> tuple[Defect, ...]:
     """Drive trains base to tip, then what friction adds to them."""
-    alone = [_gear(config, seed, name) for name in config.arm]
-    trains: list[Defect] = [g for g in alone if not (config.coupled_wrist and g.joint_name in WRIST)]
-    held = config.friction_held.items() if config.gear_form == "friction_held" else ()
-    frictions = [GearFriction(name, h.stiffness, h.slip, h.holding) for name, h in held]
-    if config.coupled_wrist:
-        first, second = (g for g in alone if g.joint_name in WRIST)
-        trains.append(Differential((first, second), tuple(f for f in frictions if f.joint_name in WRIST)))
-    return (*trains, *(f for f in frictions if not (config.coupled_wrist and f.joint_name in WRIST)))
+    frictions = tuple(config.friction_held.values()) if config.gear_form == "friction_held" else ()
+    if not config.coupled_wrist:
+        return (*arm.values(), *frictions)
+    first, second = (arm[name] for name in WRIST)
+    of_wrist = tuple(f for f in frictions if f.joint_name in WRIST)
+    alone = [joint for name, joint in arm.items() if name not in WRIST]
+    return (*alone, Differential((first, second), of_wrist), *(f for f in frictions if f.joint_name not in WRIST))
 
 
-def _gear(config: TwinConfig, seed: int, name: str) -> Gear:
-    j = config.arm[name]
-    return Gear(
-        joint_name=name,
-        gap=j.gap * _factor(config, seed, "gap", name),
-        stiffness=j.stiffness,
-        damping=j.damping,
-        coulomb=j.coulomb,
-        viscous=j.viscous,
-        rotor_inertia=j.rotor_inertia,
-        link_inertia=_LINK_INERTIA,
-        servo_stiffness=j.servo_stiffness,
-        servo_damping=_DAMPING_RATIO * float(np.sqrt(j.servo_stiffness * j.rotor_inertia)),
-    )
-
-
-def _torso_drive(config: TwinConfig) -> DirectDrive:
-    t = config.torso
-    damping = _DAMPING_RATIO * float(np.sqrt(t.servo_stiffness * t.rotor_inertia))
-    return DirectDrive(TORSO, t.rotor_inertia, t.servo_stiffness, damping)
-
-
-def _departures(config: TwinConfig) -> tuple[Defect, ...]:
-    """Those the scenario names, none by default."""
-    d = config.departures
-    return (
-        *(Flexibility(link, b.stiffness, b.damping) for link, b in d.bending.items()),
-        *(Warming(joint, np.array(w.xi), w.time_constant) for joint, w in d.warming.items()),
-        *((FloorTilt(d.floor_tilt),) if any(d.floor_tilt) else ()),
-        *(Cable(joint, c.stiffness, c.rest) for joint, c in d.cables.items()),
-    )
-
-
-def _payload(config: TwinConfig, seed: int) -> Payload:
-    p = config.payload
-    shift = p.com_error * generator(seed, "payload").normal(size=3)
-    return Payload(TOOL, p.mass, np.array(p.com) + shift, np.array(p.size))
-
-
-def _encoders(config: TwinConfig, seed: int) -> tuple[Encoder, ...]:
+def _encoders(config: RobotConfig, seed: int, arm: dict[str, ArmJoint]) -> tuple[Encoder, ...]:
     still = (0.0, 0.0, 0.0, 0.0)
     link, motor = config.instruments.link_encoders, config.instruments.motor_encoders
     found = [Encoder(TORSO, "motor", 0.0, still, config.torso.quantum, prismatic=True)]
-    for name, j in config.arm.items():
-        waves = _harmonics(generator(seed, "motor encoder", name), motor.once, motor.twice)
-        found.append(Encoder(name, "motor", j.offset * _factor(config, seed, "offset", name), waves, j.quantum))
+    for name, j in arm.items():
+        waves = harmonics(generator(seed, "motor encoder", name), motor.once, motor.twice)
+        found.append(Encoder(name, "motor", j.offset, waves, j.quantum))
         rng = generator(seed, "link encoder", name)
         offset = link.offset * float(rng.normal())
-        found.append(Encoder(name, "link", offset, _harmonics(rng, link.once, link.twice), link.quantum))
+        found.append(Encoder(name, "link", offset, harmonics(rng, link.once, link.twice), link.quantum))
     return tuple(found)
 
 
-def _harmonics(rng: np.random.Generator, once: float, twice: float) -> tuple[float, float, float, float]:
-    """cos1, sin1, cos2, sin2 [rad] of standard deviation `once`, `twice` in amplitude."""
-    c1, s1, c2, s2 = rng.normal(size=4) * np.repeat([once, twice], 2) / np.sqrt(2.0) + 0.0  # no -0.0
-    return float(c1), float(s1), float(c2), float(s2)
-
-
-def cluster(name: str, body: MarkerBody, seed: int, *session: str) -> Cluster:
-    """Mount a marker body, in the first session unless one is named."""
-    rng = generator(seed, *session, "cluster", name)
-    nominal = np.array(list(body.markers.values()))
-    placement = rng.normal(size=6) * np.repeat([body.translation, body.rotation], 3)
-    scattered = nominal + rng.normal(size=nominal.shape) * body.marker
-    frames = {BASE: f"base.{name}", TOOL: "tool.hand"}.get(body.link, f"{body.link}.{name}")
-    return Cluster(
-        name=name,
-        link=body.link,
-        frames=frames,
-        xi=placement,
-        marker_names=tuple(body.markers),
-        nominal=nominal,
-        shift=_without_rigid_part(scattered, nominal) - nominal,
-    )
-
-
-def _without_rigid_part(points: np.ndarray, nominal: np.ndarray) -> np.ndarray:
-    """Points (n, 3) moved onto `nominal` as one rigid body: a body's frame is where its nominal markers fit best.
-
-    Markers of one nominal place, or a single one, tell no rotation: these are only shifted.
-    """
-    p, q = points.mean(axis=0), nominal.mean(axis=0)
-    if (nominal == nominal[0]).all():
-        return points - p + q
-    return Rotation.align_vectors(nominal - q, points - p)[0].apply(points - p) + q
-
-
-def links_seen(config: TwinConfig, robot: Robot) -> list[str]:
+def links_seen(config: RobotConfig, robot: Robot) -> list[str]:
     """Links whose poses the instruments depend on."""
     arm = set(motion_capture.ARM) if config.instruments.mocap.cameras else set()
     return sorted({c.link for c in robot.clusters} | {BASE} | arm)

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.campaign.robot import Robot, cluster
-from twin.config.twin import TwinConfig
+from twin.campaign.robot import Robot, mounted
+from twin.config.twin import RobotConfig
 from twin.instruments.encoder import Encoder
 from twin.random_streams import generator
 from twin.transforms import exp6
@@ -17,7 +17,7 @@ from twin.truth import Parameter
 CONFIRMATION = "confirmation"
 
 
-def remounted(config: TwinConfig, robot: Robot, seed: int, session: str = CONFIRMATION) -> Robot:
+def remounted(config: RobotConfig, robot: Robot, seed: int, session: str = CONFIRMATION) -> Robot:
     """The robot with its markers remounted, none loose, and its motors homed anew; link encoders are absolute."""
 
     def homed(encoder: Encoder) -> Encoder:
@@ -26,12 +26,11 @@ def remounted(config: TwinConfig, robot: Robot, seed: int, session: str = CONFIR
         shift = config.session.encoder_zero * float(generator(seed, session, "zero", encoder.joint_name).normal())
         return replace(encoder, offset=encoder.offset + shift)
 
-    bodies = config.instruments.bodies.items()
-    clusters = tuple(cluster(name, body, seed, session) for name, body in bodies)
+    clusters = mounted(config, seed, session)
     return replace(robot, encoders=tuple(homed(e) for e in robot.encoders), clusters=clusters, loose=())
 
 
-def moved(config: TwinConfig, T_lab_base: np.ndarray, seed: int, session: str = CONFIRMATION) -> np.ndarray:
+def moved(config: RobotConfig, T_lab_base: np.ndarray, seed: int, session: str = CONFIRMATION) -> np.ndarray:
     """T_lab_base (4, 4) after the base was moved."""
     x, y, yaw = generator(seed, session, "base").uniform(-1.0, 1.0, size=3)
     T = T_lab_base @ exp6(np.array([0.0, 0.0, 0.0, 0.0, 0.0, config.session.base_rotation * yaw]))

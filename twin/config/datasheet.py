@@ -2,7 +2,7 @@
 
 from pydantic.dataclasses import dataclass
 
-from twin.config.values import STRICT, FixedNonNegative, FixedPositive
+from twin.fields.values import STRICT, FixedNonNegative, FixedPositive
 
 
 @dataclass(frozen=True, config=STRICT)

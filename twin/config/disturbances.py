@@ -1,53 +1,23 @@
-"""What a scenario may add that no model of the pipeline holds; every departure is off unless it is named. SI units."""
+"""What a scenario may add that no model of the calibration contains; each is off unless it is named. SI units."""
 
+from collections.abc import Iterator
 from dataclasses import field
 from typing import Annotated
 
-from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from twin.config.distributions import DRAWN
-from twin.config.names import ArmLinkName, ArmName, JointName
-from twin.config.values import BY_NAME, STRICT, NonNegative, Positive, Twist, Value
-
-Tilt = Annotated[float, Field(ge=-0.05, le=0.05), DRAWN]
-
-
-@dataclass(frozen=True, config=STRICT)
-class Bending:
-    """A link that bends about its x and y axes: stiffness [N.m/rad], damping [N.m.s/rad]."""
-
-    stiffness: Annotated[float, Field(ge=1e3), DRAWN]
-    damping: NonNegative
-
-
-@dataclass(frozen=True, config=STRICT)
-class Warming:
-    """A joint placement that drifts by the twist xi [m, rad] once warm, with a time constant [s]."""
-
-    xi: Twist
-    time_constant: Positive
-
-
-@dataclass(frozen=True, config=STRICT)
-class Cable:
-    """A harness that pulls a joint towards an angle: stiffness [N.m/rad], rest [rad]."""
-
-    stiffness: NonNegative
-    rest: Value
-
-
-@dataclass(frozen=True, config=STRICT)
-class Loosened:
-    """A marker that hangs down by `sag` [m] from `since` [s] after the campaign's start, until it is mounted anew."""
-
-    sag: NonNegative
-    since: NonNegative = 0.0
+from twin.defects.bending import Cable, Flexibility
+from twin.defects.defect import Defect
+from twin.defects.floor_tilt import FloorTilt, Tilt
+from twin.defects.thermal_drift import ThermalDrift
+from twin.fields.names import ArmLinkName, ArmName, JointName
+from twin.fields.values import BY_NAME, STRICT, Keyed
+from twin.instruments.markers import LooseMarker
 
 
 @dataclass(frozen=True, config=STRICT)
 class Departures:
-    """Departures no model of the pipeline holds.
+    """Disturbances by the part they concern; `twin.defects` lists any defect.
 
     Attributes:
         bending: By link of the arm; the column bends as `torso` says.
@@ -57,8 +27,16 @@ class Departures:
         loosened: By marker.
     """
 
-    bending: Annotated[dict[ArmLinkName, Bending], BY_NAME] = field(default_factory=dict)
-    warming: Annotated[dict[JointName, Warming], BY_NAME] = field(default_factory=dict)
+    bending: Annotated[dict[ArmLinkName, Flexibility], Keyed("link"), BY_NAME] = field(default_factory=dict)
+    warming: Annotated[dict[JointName, ThermalDrift], Keyed("joint_name"), BY_NAME] = field(default_factory=dict)
     floor_tilt: tuple[Tilt, Tilt] = (0.0, 0.0)
-    cables: Annotated[dict[ArmName, Cable], BY_NAME] = field(default_factory=dict)
-    loosened: Annotated[dict[str, Loosened], BY_NAME] = field(default_factory=dict)
+    cables: Annotated[dict[ArmName, Cable], Keyed("joint_name"), BY_NAME] = field(default_factory=dict)
+    loosened: Annotated[dict[str, LooseMarker], Keyed("name"), BY_NAME] = field(default_factory=dict)
+
+    def defects(self) -> Iterator[Defect]:
+        """Those that change the robot or its floor."""
+        yield from self.bending.values()
+        yield from self.warming.values()
+        if any(self.floor_tilt):
+            yield FloorTilt(self.floor_tilt)
+        yield from self.cables.values()

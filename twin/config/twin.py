@@ -1,53 +1,65 @@
 """What a scenario says about a robot and its laboratory: magnitudes, widths and instruments.
 
 SI units. Every field is validated here once; nothing downstream checks it again. Magnitudes of one robot are values,
-what differs between robots is drawn: placements from zero-mean normals, offsets and gaps within +-spread of theirs, and
-any value that is given as a distribution (`twin.uncertain`).
+what differs between robots is sampled: placements from zero-mean normals, offsets and gaps within +-spread of theirs,
+and any value that is given as a distribution (`twin.fields.distributions`).
 """
 
 from collections.abc import Iterator
-from dataclasses import field
-from typing import Annotated, Literal
+from dataclasses import field, fields
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from twin.config.base import Base
-from twin.config.campaign import Campaign, Session
 from twin.config.datasheet import Datasheet
 from twin.config.disturbances import Departures
 from twin.config.instruments import Instruments
-from twin.config.names import OF_KEY, refuse, unknown
-from twin.config.robot import FRICTION_HELD, Arm, Load, SomeHeld, Torso, Widths
-from twin.config.values import STRICT
+from twin.config.robot import FRICTION_HELD, Arm, SomeHeld, Torso, Widths
+from twin.config.session import Session
+from twin.defects import DEFECTS, Defect
+from twin.defects.inertia import Payload
+from twin.defects.wheels.base import Base
+from twin.fields.distributions import sampled
+from twin.fields.names import OF_KEY, refuse, unknown
+from twin.fields.values import STRICT
+from twin.motions.campaign import Campaign
+
+if TYPE_CHECKING:
+    AnyDefect = Defect
+else:
+    AnyDefect = Annotated[reduce(or_, DEFECTS), Field(discriminator="kind")]
 
 
 @dataclass(frozen=True, config=STRICT)
-class TwinConfig:
-    """Everything `record` needs beside a seed.
+class RobotConfig:
+    """A robot and its laboratory.
 
     Attributes:
         arm: Arm joints by name, base to tip.
         torso: The lift and its column.
         base: Wheels and floor.
         payload: In the hand.
-        widths: What is drawn.
+        widths: What is sampled.
         instruments: The laboratory.
         campaign: What is recorded.
         datasheet: What is declared.
         timestep: Of the simulation [s].
-        gear_form: dead_zone: load torque decides the flank; friction_held: friction holds the play, the mesh slips.
+        gear_form: dead_zone: load torque decides the flank; friction_held: friction does, and the mesh slips.
         friction_held: What that form adds, by joint; joints not named keep the dead zone.
         coupled_wrist: Whether arm_6 and arm_7 are driven by one differential.
-        departures: What no model of the pipeline holds.
+        departures: Disturbances that no model of the calibration contains.
         session: What changes until the confirmation.
+        defects: Further defects of any kind that `twin.defects` knows, applied last, in this order.
     """
 
     arm: Arm
     torso: Torso
     base: Base
-    payload: Load
+    payload: Payload
     widths: Widths
     instruments: Instruments
     campaign: Campaign
@@ -58,10 +70,11 @@ class TwinConfig:
     coupled_wrist: bool = False
     departures: Departures = field(default_factory=Departures)
     session: Session = field(default_factory=Session)
+    defects: tuple[AnyDefect, ...] = ()
 
     def __post_init__(self) -> None:
         """What one field says fits what the others say."""
-        refuse("TwinConfig", [*self._loose(), *self._unheld(), *self._ungrounded()])
+        refuse("RobotConfig", [*self._loose(), *self._unheld(), *self._ungrounded()])
 
     def _loose(self) -> Iterator[InitErrorDetails]:
         """Markers that hang but are not there."""
@@ -91,3 +104,19 @@ class TwinConfig:
                 "wheels", "wheels cannot roll where base.wheels is '{wheels}'", {"wheels": wheels}
             )
             yield InitErrorDetails(type=error, loc=("campaign", "driving", "forms"), input=forms)
+
+
+@dataclass(frozen=True, config=STRICT)
+class TwinConfig(RobotConfig):
+    """What a scenario says: nominal values and distributions; all a laboratory may be told."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class SampledConfig(RobotConfig):
+    """One robot's true values: no value has a distribution."""
+
+
+def sampled_config(config: TwinConfig, seed: int) -> SampledConfig:
+    """The values of the robot of a seed."""
+    one = sampled(config, seed)
+    return SampledConfig(**{f.name: getattr(one, f.name) for f in fields(one)})

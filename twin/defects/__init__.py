@@ -2,25 +2,35 @@
 
 from twin.defects.bending import Cable, Flexibility
 from twin.defects.defect import Defect
-from twin.defects.differential import Differential
+from twin.defects.floor_tilt import FloorTilt
 from twin.defects.gear import Gear
 from twin.defects.gear_friction import GearFriction
-from twin.defects.inertia import LinkMass, Payload
+from twin.defects.inertia import LinkMass
 from twin.defects.placement import Placement
-from twin.defects.thermal_drift import Warming
-from twin.defects.wheels.from_config import ground, wheels_of
+from twin.defects.thermal_drift import ThermalDrift
+from twin.defects.wheels.base import Base, ground, wheels_of
+
+DEFECTS: tuple[type[Defect], ...] = (
+    Cable,
+    Flexibility,
+    FloorTilt,
+    LinkMass,
+    Placement,
+    ThermalDrift,
+)
+"""Those that a scenario may list under `twin.defects`, by their `kind`."""
 
 __all__ = [
+    "DEFECTS",
+    "Base",
     "Cable",
     "Defect",
-    "Differential",
     "Flexibility",
     "Gear",
     "GearFriction",
     "LinkMass",
-    "Payload",
     "Placement",
-    "Warming",
+    "ThermalDrift",
     "ground",
     "wheels_of",
 ]

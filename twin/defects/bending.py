@@ -1,15 +1,21 @@
-"""Structures that bend: links at their joint, and harnesses that pull a joint."""
+"""Structures that bend: links at their joint, and harnesses that pull a joint.
 
-from dataclasses import dataclass
+cable     tau = -k (q - q_0)                            on the link
+bending   tau = -k theta - c dtheta/dt                  about x and y of the link's frame
+"""
+
+from typing import Literal
 
 import mujoco
 import numpy as np
+from pydantic.dataclasses import dataclass
 
 from twin.defects.defect import Defect, body, joint
+from twin.fields.values import STRICT, AtLeast1000, NonNegative, Value
 from twin.truth import Parameter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Cable(Defect):
     """A harness that pulls a joint towards an angle.
 
@@ -17,11 +23,13 @@ class Cable(Defect):
         joint_name: The joint.
         stiffness: k [N.m/rad].
         rest: q_0 [rad].
+        kind: Its name in a scenario.
     """
 
     joint_name: str
-    stiffness: float
-    rest: float
+    stiffness: NonNegative
+    rest: Value
+    kind: Literal["cable"] = "cable"
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Put a spring on the joint."""
@@ -35,7 +43,7 @@ class Cable(Defect):
         return Parameter(f"{name}.stiffness", "N.m/rad", self.stiffness), Parameter(f"{name}.rest", "rad", self.rest)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Flexibility(Defect):
     """A link that bends about its x and y axes where its joint carries it.
 
@@ -43,11 +51,13 @@ class Flexibility(Defect):
         link: The link.
         stiffness: About x and y [N.m/rad].
         damping: About x and y [N.m.s/rad].
+        kind: Its name in a scenario.
     """
 
     link: str
-    stiffness: float
-    damping: float
+    stiffness: AtLeast1000
+    damping: NonNegative
+    kind: Literal["bending"] = "bending"
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add two sprung hinges behind the link's own joint."""

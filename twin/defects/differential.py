@@ -8,8 +8,8 @@ as two `Gear`s put them, and only the meshes are coupled. Torque follows from vi
 t_b = t_1 - t_2: with K_i half of what the joints' own gears have, each joint is as stiff as before. The free play of
 the pair is a diamond, |q_a + q_b| <= gap_1 / 2 and |q_a - q_b| <= gap_2 / 2, about the motors' positions.
 
-A mesh's friction (`hysteresis`) has half of its joint's spring k_i and slider s_i. While joint b bears no torque each
-mesh bears half of t_a, and joint a shows, of its own K_i, k_i, s_i,
+Friction in a mesh (`gear_friction`) has half of its joint's spring k_i and slider s_i. While joint b bears no torque
+each mesh bears half of t_a, and joint a shows, of its own K_i, k_i, s_i,
 
     1 / K = sum 1 / K_i / 2       s = sum (s_i / K_i) / sum 1 / K_i       K + k = 2 / sum 1 / (K_i + k_i)
 """
@@ -21,7 +21,7 @@ import mujoco
 
 from twin.defects.defect import Defect
 from twin.defects.gear import Gear, add_mesh, add_servo, mesh_tendon, rotor_joint, tune_mesh
-from twin.defects.gear_friction import GearFriction
+from twin.defects.gear_friction import GearFriction, friction_parameters
 from twin.errors import TwinError
 from twin.truth import Parameter
 
@@ -58,10 +58,11 @@ class Differential(Defect):
             UnlikeMotors: They are not.
         """
         a, b = self.gears
-        for what in ("rotor_inertia", "servo_stiffness", "servo_damping"):
-            values = getattr(a, what), getattr(b, what)
+        names = ("rotor inertia", "servo stiffness", "servo damping")
+        motors = ((g.rotor_inertia, *g.servo_gains) for g in self.gears)
+        for what, *values in zip(names, *motors, strict=True):
             if values[0] != values[1]:
-                raise UnlikeMotors(a.joint_name, b.joint_name, what.replace("_", " "), values)
+                raise UnlikeMotors(a.joint_name, b.joint_name, what, (values[0], values[1]))
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add rotors and servos joint by joint, and the two meshes across both."""
@@ -71,7 +72,7 @@ class Differential(Defect):
         for gear, sign in zip(self.gears, _SIGNS, strict=True):
             wraps = {a: 1.0, b: sign, rotor_joint(a): -1.0, rotor_joint(b): -sign}
             add_mesh(spec, mesh_tendon(gear.joint_name), wraps, gear.gap)
-            add_servo(spec, rotor_joint(gear.joint_name), gear.servo_stiffness, gear.servo_damping)
+            add_servo(spec, rotor_joint(gear.joint_name), *gear.servo_gains)
         for whole in self.frictions:
             replace(whole, stiffness=0.5 * whole.stiffness, slip=0.5 * whole.slip).apply(spec)
 
@@ -100,14 +101,13 @@ class Differential(Defect):
         if not self.frictions:
             return
         slips = {f.joint_name: f for f in self.frictions if f.slip > 0.0}
-        of = [slips.get(g.joint_name, GearFriction(g.joint_name, 0.0, 0.0, 0.0)) for g in self.gears]
+        of = [(f.stiffness, f.slip) if (f := slips.get(g.joint_name)) else (0.0, 0.0) for g in self.gears]
         soft = sum(1.0 / g.stiffness for g in self.gears)
-        slip = sum(f.slip / g.stiffness for f, g in zip(of, self.gears, strict=True)) / soft
-        held = sum(1.0 / (g.stiffness + f.stiffness) for f, g in zip(of, self.gears, strict=True))
+        slip = sum(s / g.stiffness for (_, s), g in zip(of, self.gears, strict=True)) / soft
+        held = sum(1.0 / (g.stiffness + k) for (k, _), g in zip(of, self.gears, strict=True))
         stiffness = 2.0 / held - 2.0 / soft
         holding = {f.joint_name: f.holding for f in self.frictions}
-        for i, (gear, mesh) in enumerate(zip(self.gears, of, strict=True), 1):
-            joint = GearFriction(gear.joint_name, stiffness, slip, holding.get(gear.joint_name, 0.0))
-            yield from joint.parameters()
-            yield Parameter(f"differential.motor_{i}.slip", "N.m", 0.5 * mesh.slip)
-            yield Parameter(f"differential.motor_{i}.slip_stiffness", "N.m/rad", 0.5 * mesh.stiffness)
+        for i, (gear, (k, s)) in enumerate(zip(self.gears, of, strict=True), 1):
+            yield from friction_parameters(gear.joint_name, stiffness, slip, holding.get(gear.joint_name, 0.0))
+            yield Parameter(f"differential.motor_{i}.slip", "N.m", 0.5 * s)
+            yield Parameter(f"differential.motor_{i}.slip_stiffness", "N.m/rad", 0.5 * k)

@@ -1,4 +1,4 @@
-"""A drive train with play: rotor, mesh with a dead zone, link. The load's torque decides which flank is in contact.
+"""A drive train with backlash: rotor, mesh with a dead zone, link. The load's torque decides which flank is in contact.
 
     rotor: J_m dd q_m = kp (u - q_m) - kv d q_m - tau        motor side; the motor encoder reads q_m
     mesh:  tau = K dz(q_m - q_l; gap) + D d/dt(...)          in contact only, dz the dead zone of TOTAL width gap
@@ -7,20 +7,21 @@
 The rotor is a sibling body of the link on the same axis, so that the reaction acts on the parent; the mesh is a fixed
 tendon q_l - q_m limited to +-gap/2 whose soft limit is the spring. With constant impedance d the limit's stiffness is
 K = S / ((1 - d) iw) with iw the tendon's inverse weight in the compiled model: S is set from it after each compile.
-`twin.defects.hysteresis` adds the friction of the mesh, `twin.defects.differential` couples two such trains.
+`twin.defects.gear_friction` adds the friction of the mesh, `twin.defects.differential` couples two such trains.
 """
-
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from pydantic.dataclasses import dataclass
 
 from twin.defects.defect import Defect, joint
+from twin.fields.values import STRICT, NonNegative, Positive
 from twin.truth import Parameter
 
 _IMPEDANCE = 0.02
 _ROTOR_MASS = 1e-4  # [kg] a moving body must have some
 _ROTOR_INERTIA = 1e-8  # [kg.m2] of the body itself; the rotor's real inertia is its armature
+_DAMPING_RATIO = 1.2  # servo velocity gain over sqrt(kp J), where none is given
 _OPEN = 1e-9  # [rad] half width that stands for no play at all
 
 
@@ -34,40 +35,45 @@ def mesh_tendon(joint_name: str) -> str:
     return f"{joint_name}.mesh"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Gear(Defect):
     """Gear of one joint.
 
     Attributes:
         joint_name: The joint.
-        gap: Total play [rad].
+        gap: Total backlash [rad].
         stiffness: Of the mesh in contact [N.m/rad].
         damping: Of the mesh in contact [N.m.s/rad].
         coulomb: Friction of the link side [N.m].
         viscous: Friction of the link side [N.m.s/rad].
         rotor_inertia: Reflected to the joint [kg.m2].
-        link_inertia: Of the output gear, fixed to the link [kg.m2].
         servo_stiffness: Position gain on the motor side [N.m/rad].
-        servo_damping: Velocity gain on the motor side [N.m.s/rad].
+        link_inertia: Of the output gear, fixed to the link [kg.m2].
+        servo_damping: Velocity gain on the motor side [N.m.s/rad]; None: 1.2 sqrt(servo_stiffness rotor_inertia).
     """
 
     joint_name: str
-    gap: float
-    stiffness: float
-    damping: float
-    coulomb: float
-    viscous: float
-    rotor_inertia: float
-    link_inertia: float
-    servo_stiffness: float
-    servo_damping: float
+    gap: NonNegative
+    stiffness: Positive
+    damping: NonNegative
+    coulomb: NonNegative
+    viscous: NonNegative
+    rotor_inertia: Positive
+    servo_stiffness: Positive
+    link_inertia: NonNegative = 0.004
+    servo_damping: NonNegative | None = None
+
+    @property
+    def servo_gains(self) -> tuple[float, float]:
+        """Position gain [N.m/rad] and velocity gain [N.m.s/rad] on the motor side."""
+        return _gains(self.servo_stiffness, self.servo_damping, self.rotor_inertia)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add the rotor, the mesh and the servo."""
         self.add_rotor(spec)
         mesh = {self.joint_name: 1.0, rotor_joint(self.joint_name): -1.0}
         add_mesh(spec, mesh_tendon(self.joint_name), mesh, self.gap)
-        add_servo(spec, rotor_joint(self.joint_name), self.servo_stiffness, self.servo_damping)
+        add_servo(spec, rotor_joint(self.joint_name), *self.servo_gains)
 
     def add_rotor(self, spec: mujoco.MjSpec) -> None:
         """Give the link its friction and output gear, and add the rotor beside it."""
@@ -96,13 +102,13 @@ class Gear(Defect):
             Parameter(f"gear.{j}.rotor_inertia", "kg.m2", self.rotor_inertia),
             Parameter(f"gear.{j}.link_inertia", "kg.m2", self.link_inertia),
             Parameter(f"gear.{j}.servo_stiffness", "N.m/rad", self.servo_stiffness),
-            Parameter(f"gear.{j}.servo_damping", "N.m.s/rad", self.servo_damping),
+            Parameter(f"gear.{j}.servo_damping", "N.m.s/rad", self.servo_gains[1]),
             Parameter(f"friction.{j}.coulomb", "N.m", self.coulomb),
             Parameter(f"friction.{j}.viscous", "N.m.s/rad", self.viscous),
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class DirectDrive(Defect):
     """A sliding joint whose motor is fixed to it without play: the torso's spindle.
 
@@ -110,18 +116,23 @@ class DirectDrive(Defect):
         joint_name: The joint.
         rotor_inertia: Reflected [kg].
         servo_stiffness: Position gain [N/m].
-        servo_damping: Velocity gain [N.s/m].
+        servo_damping: Velocity gain [N.s/m]; None: 1.2 sqrt(servo_stiffness rotor_inertia).
     """
 
     joint_name: str
-    rotor_inertia: float
-    servo_stiffness: float
-    servo_damping: float
+    rotor_inertia: Positive
+    servo_stiffness: Positive
+    servo_damping: NonNegative | None = None
+
+    @property
+    def servo_gains(self) -> tuple[float, float]:
+        """Position gain [N/m] and velocity gain [N.s/m]."""
+        return _gains(self.servo_stiffness, self.servo_damping, self.rotor_inertia)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add rotor inertia and servo."""
         joint(spec, self.joint_name).armature = self.rotor_inertia
-        add_servo(spec, self.joint_name, self.servo_stiffness, self.servo_damping)
+        add_servo(spec, self.joint_name, *self.servo_gains)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Rotor and servo."""
@@ -129,7 +140,7 @@ class DirectDrive(Defect):
         return (
             Parameter(f"{name}.rotor_inertia", "kg", self.rotor_inertia),
             Parameter(f"{name}.servo_stiffness", "N/m", self.servo_stiffness),
-            Parameter(f"{name}.servo_damping", "N.s/m", self.servo_damping),
+            Parameter(f"{name}.servo_damping", "N.s/m", self.servo_gains[1]),
         )
 
 
@@ -147,6 +158,10 @@ def tune_mesh(model: mujoco.MjModel, name: str, stiffness: float, damping: float
     i = model.tendon(name).id
     scale = (1.0 - _IMPEDANCE) * model.tendon_invweight0[i]
     model.tendon_solref_lim[i] = -stiffness * scale, -damping * scale
+
+
+def _gains(stiffness: float, damping: float | None, inertia: float) -> tuple[float, float]:
+    return stiffness, _DAMPING_RATIO * float(np.sqrt(stiffness * inertia)) if damping is None else damping
 
 
 def add_servo(spec: mujoco.MjSpec, joint_name: str, stiffness: float, damping: float) -> None:

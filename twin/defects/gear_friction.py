@@ -9,18 +9,18 @@ tell the flank, motion decides it: the link follows its motor as a play operator
 elasto-plastic spring. Reference: Lampaert, Al-Bender, Swevers, IEEE MMAR 2003 (Maxwell-slip elements).
 """
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
+from pydantic.dataclasses import dataclass
 
 from twin.defects.defect import Defect, joint
 from twin.defects.gear import mesh_tendon
 from twin.errors import UnknownElement
+from twin.fields.values import STRICT, NonNegative, Positive
 from twin.truth import Parameter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class GearFriction(Defect):
     """Friction of a geared joint's mesh and of its link; applied after its `Gear`.
 
@@ -32,9 +32,9 @@ class GearFriction(Defect):
     """
 
     joint_name: str
-    stiffness: float
-    slip: float
-    holding: float
+    stiffness: Positive
+    slip: NonNegative
+    holding: NonNegative
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Put the elasto-plastic spring on the mesh and the friction on the link."""
@@ -46,11 +46,13 @@ class GearFriction(Defect):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Spring, slider and holding friction."""
-        return (
-            Parameter(f"hysteresis.{self.joint_name}.stiffness", "N.m/rad", self.stiffness),
-            Parameter(f"hysteresis.{self.joint_name}.slip", "N.m", self.slip),
-            Parameter(f"hysteresis.{self.joint_name}.holding", "N.m", self.holding),
-        )
+        return friction_parameters(self.joint_name, self.stiffness, self.slip, self.holding)
+
+
+def friction_parameters(joint_name: str, stiffness: float, slip: float, holding: float) -> tuple[Parameter, ...]:
+    """Spring [N.m/rad], slider and holding friction [N.m] as one joint shows them."""
+    values = (("stiffness", "N.m/rad", stiffness), ("slip", "N.m", slip), ("holding", "N.m", holding))
+    return tuple(Parameter(f"hysteresis.{joint_name}.{name}", unit, value) for name, unit, value in values)
 
 
 def _tendon(spec: mujoco.MjSpec, name: str) -> mujoco.MjsTendon:

@@ -4,10 +4,23 @@ t_mocap = t (1 + drift) + offset        true time of the campaign is the mocap c
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass as validated
 
+from twin.fields.distributions import DRAWN
+from twin.fields.values import STRICT, Value
 from twin.truth import Parameter
+
+
+@validated(frozen=True, config=STRICT)
+class ClockSetting:
+    """t_mocap = t (1 + drift) + offset: offset [s], drift [-]."""
+
+    offset: Value
+    drift: Annotated[float, Field(ge=-1e-3, le=1e-3), DRAWN]
 
 
 @dataclass(frozen=True)

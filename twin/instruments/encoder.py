@@ -1,18 +1,46 @@
-"""What the robot's own sensors and the laboratory's targets get wrong: encoders and marker clusters.
+"""Joint encoders: offset, eccentricity and quantisation.
 
-Encoder reading of a true angle q [rad]:
-
-    r = round_to_quantum(q + offset + cos1 cos q + sin1 sin q + cos2 cos 2q + sin2 sin 2q)
-
-Cluster placement: T_link_body = exp6(xi), nominally the identity, so that a body's frame is its link's frame.
+r = round_to_quantum(q + offset + cos1 cos q + sin1 sin q + cos2 cos 2q + sin2 sin 2q)      q the true angle [rad]
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic.dataclasses import dataclass as validated
 
 from twin.defects.defect import Defect
+from twin.fields.values import STRICT, NonNegative, Positive
 from twin.truth import Parameter
+
+
+@validated(frozen=True, config=STRICT)
+class LinkEncoders:
+    """Absolute encoders on the link side, standard deviations of what differs among them.
+
+    Attributes:
+        offset: Zero [rad].
+        once: Amplitude once per turn [rad].
+        twice: Amplitude twice per turn [rad].
+        quantum: Step of the reading [rad].
+    """
+
+    offset: NonNegative
+    once: NonNegative
+    twice: NonNegative
+    quantum: Positive
+
+
+@validated(frozen=True, config=STRICT)
+class MotorEncoders:
+    """Eccentricity of the motor-side encoders as seen at the joint, standard deviations of what differs among them.
+
+    Attributes:
+        once: Amplitude once per turn of the joint [rad].
+        twice: Amplitude twice per turn [rad].
+    """
+
+    once: NonNegative = 0.0
+    twice: NonNegative = 0.0
 
 
 @dataclass(frozen=True)
@@ -47,3 +75,9 @@ class Encoder(Defect):
         values = (self.offset, *self.harmonics, self.quantum)
         prefix, unit = f"encoder.{self.joint_name}.{self.side}", "m" if self.prismatic else "rad"
         return tuple(Parameter(f"{prefix}.{n}", unit, v) for n, v in zip(names, values, strict=True))
+
+
+def harmonics(rng: np.random.Generator, once: float, twice: float) -> tuple[float, float, float, float]:
+    """cos1, sin1, cos2, sin2 [rad] of standard deviation `once`, `twice` in amplitude."""
+    c1, s1, c2, s2 = rng.normal(size=4) * np.repeat([once, twice], 2) / np.sqrt(2.0) + 0.0  # no -0.0
+    return float(c1), float(s1), float(c2), float(s2)

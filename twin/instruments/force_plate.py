@@ -11,12 +11,36 @@ sqrt(2) / (2 pi cutoff) at low frequency, which no time stamp knows.
 from dataclasses import dataclass, field
 
 import numpy as np
+from pydantic.dataclasses import dataclass as validated
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from twin.config.instruments import PlateErrors
 from twin.defects.defect import Defect
+from twin.fields.values import STRICT, FixedNonNegative, NonNegative
 from twin.instruments.sampling import averaged
 from twin.truth import Parameter
+
+
+@validated(frozen=True, config=STRICT)
+class PlateErrors:
+    """Of the force plate, in its own axes; widths are standard deviations of what is drawn for one plate.
+
+    Attributes:
+        gain: Of each diagonal entry of the gain matrix about 1 [-].
+        crosstalk: Of each other entry, relative; a length of 1 m relates forces and moments [-].
+        force_drift: Of the offset's rate [N/s].
+        moment_drift: Of the offset's rate [N.m/s].
+        force_resolution: Step [N].
+        moment_resolution: Step [N.m].
+        cutoff: Of the anti-alias filter, Butterworth of order 2 [Hz]; 0: none.
+    """
+
+    gain: NonNegative = 0.0
+    crosstalk: NonNegative = 0.0
+    force_drift: NonNegative = 0.0
+    moment_drift: NonNegative = 0.0
+    force_resolution: FixedNonNegative = 0.0
+    moment_resolution: FixedNonNegative = 0.0
+    cutoff: FixedNonNegative = 0.0
 
 
 @dataclass(frozen=True)

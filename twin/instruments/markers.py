@@ -1,18 +1,28 @@
-"""Marker clusters on their links, as mounted, and markers that come loose."""
+"""Marker clusters on their links, as mounted, and markers that come loose.
+
+placement   T_link_body = exp6(xi)              nominally the identity: a body's frame is its link's frame
+loose       y = p - a (0, 0, 1)                 hangs by its slack a, from t_0 on
+"""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass as validated
+from scipy.spatial.transform import Rotation
 
 from twin.defects.defect import Defect
 from twin.errors import UnknownElement
+from twin.fields.names import BASE, HAND, LinkName
+from twin.fields.values import BY_NAME, STRICT, NonNegative, Vector3
 from twin.transforms import exp6
 from twin.truth import Parameter, twist_parameters
 
 
-@dataclass(frozen=True)
+@validated(frozen=True, config=STRICT)
 class LooseMarker:
-    """A marker that hangs by its play.
+    """A marker that hangs by its slack, until it is mounted anew.
 
     Attributes:
         name: The marker.
@@ -21,8 +31,8 @@ class LooseMarker:
     """
 
     name: str
-    sag: float
-    since: float
+    sag: NonNegative
+    since: NonNegative = 0.0
 
     def moved(self, t: np.ndarray, markers: tuple[str, ...], positions: np.ndarray) -> np.ndarray:
         """Positions (n, n_markers, 3) [m, lab] at times t (n,) [s from the campaign's start] with this marker loose.
@@ -78,3 +88,42 @@ class Cluster(Defect):
             *twist_parameters(f"frame.{self.frames}", values),
             *(Parameter(f"marker.{m}.{a}", "m", float(v)) for m, p in markers for a, v in zip("xyz", p, strict=True)),
         )
+
+
+@validated(frozen=True, config=STRICT)
+class MarkerBody:
+    """A marker cluster: where it should be, and how far off it is mounted.
+
+    Attributes:
+        link: The link that carries it; the body's frame is nominally the link's.
+        markers: Nominal position of each marker in that frame [m].
+        translation: Standard deviation of the cluster's placement, per axis [m].
+        rotation: [rad].
+        marker: Standard deviation of each marker within its cluster, per axis [m].
+    """
+
+    link: LinkName
+    markers: Annotated[dict[str, Vector3], Field(min_length=1), BY_NAME]
+    translation: NonNegative
+    rotation: NonNegative
+    marker: NonNegative
+
+    def mounted(self, name: str, rng: np.random.Generator) -> Cluster:
+        """The cluster as it is mounted on one robot."""
+        nominal = np.array(list(self.markers.values()))
+        placement = rng.normal(size=6) * np.repeat([self.translation, self.rotation], 3)
+        scattered = nominal + rng.normal(size=nominal.shape) * self.marker
+        frames = {BASE: f"base.{name}", HAND: "tool.hand"}.get(self.link, f"{self.link}.{name}")
+        shift = _without_rigid_part(scattered, nominal) - nominal
+        return Cluster(name, self.link, frames, placement, tuple(self.markers), nominal, shift)
+
+
+def _without_rigid_part(points: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """Points (n, 3) moved onto `nominal` as one rigid body: a body's frame is where its nominal markers fit best.
+
+    Markers of one nominal place, or a single one, tell no rotation: these are only shifted.
+    """
+    p, q = points.mean(axis=0), nominal.mean(axis=0)
+    if (nominal == nominal[0]).all():
+        return points - p + q
+    return Rotation.align_vectors(nominal - q, points - p)[0].apply(points - p) + q

@@ -1,30 +1,57 @@
-"""What a motion capture gets wrong beside noise.
+"""Motion capture: marker positions in the lab with white noise per axis, and what it gets wrong beside.
 
+    p = T_lab_link T_link_body p_m                          of marker m
     y(p) = (1 + scale) p + A sum_k a_k cos(w_k . p + phi_k) / sqrt(K / 2) + n      |w_k| about 1 / bias_length
     lost   a marker that fewer than two cameras see past the arm, a chain of capsules from shoulder to hand
     swapped   two markers of a body exchange labels for a while
 
-Amplitudes: volume errors of 0.15-0.3 mm and scale 1e-4 are typical (Merriaux et al., Sensors 2017).
-
-Motion capture: marker positions in the lab with white noise per axis.
-
-y_m = T_lab_link (T_link_body p_m) + n,   n ~ N(0, sigma^2 1)
+Amplitudes: volume errors of 0.15-0.3 mm and scale 1e-4 are typical (Merriaux et al., Sensors 2017). n: white noise.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass as validated
 
-from twin.config.instruments import MocapErrors
 from twin.defects.defect import Defect
+from twin.fields.distributions import DRAWN
+from twin.fields.values import STRICT, FixedNonNegative, FixedPositive, NonNegative, Vector3
 from twin.instruments.markers import Cluster
 from twin.instruments.sampling import windows, within
 from twin.truth import Parameter
 
 ARM = ("arm_2_link", "arm_4_link", "arm_6_link", "gripper_grasping_frame")
 """Links whose origins are joined by the capsules that hide markers."""
+Small = Annotated[float, Field(ge=-0.05, le=0.05), DRAWN]
 _WAVES = 8
 _LEAST = 2  # cameras that must see a marker
+
+
+@validated(frozen=True, config=STRICT)
+class MocapErrors:
+    """Of the motion capture.
+
+    Attributes:
+        scale: Relative error of all lengths [-].
+        bias: Standard deviation of a smooth field of position errors, per axis [m].
+        bias_length: Over which that field changes [m].
+        latency: From exposure to time stamp [s].
+        cameras: Where they are [m]; a marker that fewer than two see past the arm is lost. None: all is seen.
+        arm_radius: Of what hides markers [m].
+        swaps: Times per minute that two markers of a body exchange labels [1/min].
+        swap_duration: Of each [s].
+    """
+
+    scale: Small = 0.0
+    bias: NonNegative = 0.0
+    bias_length: FixedPositive = 1.5
+    latency: NonNegative = 0.0
+    cameras: tuple[Vector3, ...] = ()
+    arm_radius: FixedPositive = 0.06
+    swaps: FixedNonNegative = 0.0
+    swap_duration: FixedPositive = 0.3
 
 
 @dataclass(frozen=True)

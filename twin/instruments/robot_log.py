@@ -6,16 +6,35 @@ Stamps jitter about the ticks of the robot's clock, messages are lost, velocity 
 from dataclasses import dataclass, fields
 
 import numpy as np
+from pydantic.dataclasses import dataclass as validated
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from twin.config.instruments import LogErrors
-from twin.config.twin import TwinConfig
+from twin.fields.values import STRICT, FixedNonNegative, FixedPositive, NonNegative
 from twin.instruments.encoder import Encoder
 from twin.instruments.sampling import interpolate, windows, within
 from twin.motions.swings import JOINTS
 from twin.simulation.states import States
 
 _MOST = 0.45  # of the interval between ticks that a stamp may be off [-]
+
+
+@validated(frozen=True, config=STRICT)
+class LogErrors:
+    """Of the robot's log.
+
+    Attributes:
+        jitter: Standard deviation of the stamps about the ticks of the robot's clock [s].
+        latency: From sampling to time stamp [s].
+        velocity_cutoff: Of the velocity's first-order low-pass [Hz]; 0: none.
+        dropouts: Times per minute that messages are lost [1/min].
+        dropout_duration: Of each [s].
+    """
+
+    jitter: FixedNonNegative = 0.0
+    latency: NonNegative = 0.0
+    velocity_cutoff: FixedNonNegative = 0.0
+    dropouts: FixedNonNegative = 0.0
+    dropout_duration: FixedPositive = 0.15
 
 
 @dataclass(frozen=True)
@@ -30,21 +49,34 @@ class RobotLog:
     wrist_wrench: np.ndarray
 
 
+@dataclass(frozen=True)
+class Drives:
+    """What the drives report beside their encoders.
+
+    Attributes:
+        per_ampere: Force or torque over current (8,) [N/A, N.m/A].
+        quantum: Step of the current [A].
+        velocity_cutoff: Of the velocity's low-pass [Hz]; 0: none.
+    """
+
+    per_ampere: np.ndarray
+    quantum: float
+    velocity_cutoff: float
+
+
 def measured(
-    t: np.ndarray, states: States, encoders: tuple[Encoder, ...], config: TwinConfig, wrench: np.ndarray | None = None
+    t: np.ndarray, states: States, encoders: tuple[Encoder, ...], drives: Drives, wrench: np.ndarray | None = None
 ) -> RobotLog:
     """The log at true times t (n,) [s from the first set-point]; `wrench` (n, 6) is what the wrist's sensor reads."""
 
     def sampled(values: np.ndarray) -> np.ndarray:
         return interpolate(t, states.t, values)
 
-    per_ampere = np.array([config.torso.force_per_ampere, *(config.arm[j].torque_per_ampere for j in JOINTS[1:])])
-    quantum = config.instruments.current_quantum
     return RobotLog(
         q_motor=_read(sampled(states.motor), encoders, "motor"),
         q_link=_read(sampled(states.link), encoders, "link"),
-        v_motor=sampled(_slowed(states, config.instruments.log.velocity_cutoff)),
-        effort=np.round(sampled(states.torque) / per_ampere / quantum) * quantum,
+        v_motor=sampled(_slowed(states, drives.velocity_cutoff)),
+        effort=np.round(sampled(states.torque) / drives.per_ampere / drives.quantum) * drives.quantum,
         q_command=sampled(states.command),
         wrist_wrench=np.full((len(t), 6), np.nan) if wrench is None else wrench,
     )

@@ -8,12 +8,34 @@ Action of the hand on the sensor, in the sensor's axes, about its origin [N, N.m
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic.dataclasses import dataclass as validated
 
-from twin.config.instruments import WristSensor
 from twin.defects.defect import Defect
+from twin.fields.values import STRICT, FixedNonNegative, NonNegative
 from twin.instruments.force_plate import rounded
 from twin.instruments.sampling import averaged
 from twin.truth import Parameter
+
+
+@validated(frozen=True, config=STRICT)
+class WristSensor:
+    """The force-torque sensor between wrist and hand, read with the encoders; widths are of what is drawn for one.
+
+    Attributes:
+        force_noise: Per axis and sample [N].
+        moment_noise: Per axis and sample [N.m].
+        force_resolution: Step [N].
+        moment_resolution: Step [N.m].
+        force_offset: Standard deviation of the zero [N].
+        moment_offset: Standard deviation of the zero [N.m].
+    """
+
+    force_noise: NonNegative = 0.1
+    moment_noise: NonNegative = 0.003
+    force_resolution: FixedNonNegative = 0.0625
+    moment_resolution: FixedNonNegative = 0.002
+    force_offset: NonNegative = 0.0
+    moment_offset: NonNegative = 0.0
 
 
 @dataclass(frozen=True)

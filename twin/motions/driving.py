@@ -4,8 +4,8 @@ import numpy as np
 
 import mjcf
 from calibration.recording import schema
-from twin.config.campaign import Campaign, Form
 from twin.defects.wheels.rolling_wheel import DRIVES
+from twin.motions.campaign import Campaign, Form
 from twin.motions.motion import RATE, BasePath, Motion, path_time
 from twin.motions.swings import JOINTS
 
@@ -54,5 +54,6 @@ def _stepped(
         command=np.repeat(np.array(FOLDED)[None], len(planar), axis=0),
         dwells=np.array(dwells),
         approach=np.zeros((rests, len(JOINTS)), dtype=np.int8),
-        base=BasePath(form, planar),
+        base=BasePath(planar),
+        kinematic=form == "kinematic",
     )

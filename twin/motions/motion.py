@@ -4,12 +4,10 @@ A motion follows a path q(s) at s(t), where ds/dt is a trapezoid: it rises to 1 
 Short ramps start and stop a swing abruptly, as on the real robot, whatever the path is.
 
     swing:  q_j(s) = c_j + A_j (sin(2 pi f_j s + phi_j) - sin phi_j)
+    base:   left = (way - yaw b/2) / r,    right = (way + yaw b/2) / r,    d way = (dx, dy) . (cos yaw, sin yaw)
 
-Where a base is to go, and how its two driven wheels turn for it.
-
-    left = (way - yaw b/2) / r,    right = (way + yaw b/2) / r,    d way = (dx, dy) . (cos yaw, sin yaw)
-
-b the track, r the wheels' radius: a differential drive without slip; yaw in the middle of each step.
+The driven wheels of a base that moves: a differential drive without slip, b the track, r the wheels' radius; yaw in the
+middle of each step.
 """
 
 from dataclasses import dataclass
@@ -18,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from calibration.recording import schema
-from twin.config.campaign import Campaign, Form
+from twin.motions.campaign import Campaign
 from twin.motions.swings import FORWARD, JOINTS, TAU, Swing, in_step
 from twin.transforms import exp6
 
@@ -72,11 +70,9 @@ class BasePath:
     """Path of the base during a motion.
 
     Attributes:
-        form: kinematic: it is there; wheels: it is meant to get there.
         planar: x, y [m] and yaw [rad] in the base frame at the start, (n, 3), one a set-point.
     """
 
-    form: Form
     planar: np.ndarray
 
     def poses(self) -> np.ndarray:
@@ -109,6 +105,7 @@ class Motion:
         payload: Mass in the hand [kg]; None: the campaign's.
         push: Force on the hand at each set-point (n, 3), tool axes [N]; None: none.
         base: Where the base goes; None: nowhere.
+        kinematic: Whether joints and base are where they are commanded to be, without physics.
     """
 
     id: str
@@ -121,6 +118,12 @@ class Motion:
     payload: float | None = None
     push: np.ndarray | None = None
     base: BasePath | None = None
+    kinematic: bool = False
+
+    @property
+    def rolls(self) -> bool:
+        """Whether the base moves on its wheels."""
+        return self.base is not None and not self.kinematic
 
     @property
     def duration(self) -> float:

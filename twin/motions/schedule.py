@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from calibration.recording import schema
-from twin.config.campaign import Campaign
 from twin.motions import driving
 from twin.motions import motion as motions
+from twin.motions.campaign import Campaign
 from twin.motions.motion import Motion
 from twin.motions.postures import sample_postures
 from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
@@ -34,7 +34,8 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
     )
     second = _confirmation(campaign, nominal, seed) if campaign.confirmation else ()
-    return (*(m for m in trials if _asked(campaign, _group(m))), *second)
+    found = (*(m for m in trials if _asked(campaign, _group(m))), *second)
+    return tuple(replace(m, kinematic=True) for m in found) if campaign.carried else found
 
 
 def _asked(campaign: Campaign, name: str) -> bool:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-JOINTS = ("torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8)))
+from twin.fields.names import ARM, TORSO
+
+JOINTS = (TORSO, *ARM)
 TAU = 2.0 * np.pi
 # arm_1 = 1.5: arm forward, 0.3: to the right. arm_2 > 0 lifts the upper arm, arm_3 = -1.57 turns the elbow outwards.
 FORWARD = (0.12, 1.50, 0.10, -1.55, 0.60, 0.10, 0.10, 0.10)

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from twin.defects.wheels.anchored_base import AXES
+from twin.fields.names import BASE
 from twin.transforms import placement, transform
 
-ROOT = "base_footprint"
+ROOT = BASE
 
 
 def anchored(model: mujoco.MjModel) -> bool:

@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 
 from twin.defects.defect import Defect, body
+from twin.fields.names import HAND
 from twin.simulation import wrist_sensor
 from twin.simulation.force_plates import add_plates
 from twin.truth import Parameter
 
 _POSES = (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMEQUAT)
-HAND = "gripper_grasping_frame"
 PUSH = ("push.x", "push.y", "push.z")
 _HELD = ("wheel", "caster", "head", "gripper")
 

@@ -1,22 +1,24 @@
-"""Several force plates where the nominal laboratory has one: its square cut into columns and rows, each felt apart.
+"""Force plates of a laboratory: one square or several, where they lie, and the robot's action on each.
 
-Every tile is a body of its own on the plate's body, whose site still feels them all together.
+    place    T_lab_plate = Trans(x, y, height) T_nominal R_z(yaw)
+    grid     the square cut into columns and rows; every tile is a body on the plate's body, measured by itself
+    wrench   MuJoCo sums up a plate's contacts as a force f at a point p (lab axes):   tau = tau_p + (p - c) x f
 
-Where the force plate lies in its laboratory: shifted, raised and turned about the vertical.
-
-    T_lab_plate = Trans(x, y, height) T_nominal R_z(yaw)
-
-The slabs of floor around it are shifted and turned with it and stay at their height: a raised plate is a step.
+The plate's own site still measures all tiles together. The slabs of floor around the square are shifted and turned with
+it and stay at their height: a raised plate is a step.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import mujoco
 import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass as validated
 from scipy.spatial.transform import Rotation
 
-from twin.config.instruments import PlatePlace
 from twin.defects.defect import UNTOUCHED, Defect, body
+from twin.fields.values import STRICT
 from twin.simulation.wrist_sensor import CARRIED, NET, sensed
 from twin.transforms import placement, transform
 from twin.truth import Parameter
@@ -24,6 +26,21 @@ from twin.truth import Parameter
 PLATE = "plate"
 """Name of the whole square's body, shape and site."""
 _SLAB = "floor_"  # begins the name of a slab of floor
+
+
+@validated(frozen=True, config=STRICT)
+class PlatePlace:
+    """Where the plate lies against its nominal place, as surveyed: it is declared.
+
+    Attributes:
+        shift: Of its centre along the lab's x and y [m].
+        height: Of its surface above the floor around it [m]; the robot stands on it.
+        yaw: About the vertical [rad].
+    """
+
+    shift: tuple[Annotated[float, Field(ge=-0.5, le=0.5)], Annotated[float, Field(ge=-0.5, le=0.5)]] = (0.0, 0.0)
+    height: Annotated[float, Field(ge=-0.05, le=0.05)] = 0.0
+    yaw: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -129,26 +146,6 @@ def T_lab_plate(nominal: mujoco.MjsBody, place: PlatePlace) -> np.ndarray:
     T[:3, 3] += (*place.shift, place.height)
     T[:3, :3] = T[:3, :3] @ Rotation.from_euler("z", place.yaw).as_matrix()
     return T
-
-
-@dataclass(frozen=True)
-class FloorTilt(Defect):
-    """A floor out of level.
-
-    Attributes:
-        rotation: Of the floor about the level's x and y axes (2,), a rotation vector [rad].
-    """
-
-    rotation: tuple[float, float]
-
-    def apply(self, spec: mujoco.MjSpec) -> None:
-        """Turn gravity in the lab."""
-        R_level_lab = Rotation.from_rotvec([*self.rotation, 0.0])
-        spec.option.gravity = R_level_lab.inv().apply(spec.option.gravity)
-
-    def parameters(self) -> tuple[Parameter, ...]:
-        """The rotation vector."""
-        return tuple(Parameter(f"floor.tilt.{a}", "rad", v) for a, v in zip(("rx", "ry"), self.rotation, strict=True))
 
 
 def add_plates(spec: mujoco.MjSpec) -> None:

@@ -8,7 +8,7 @@ dv = -h (K p + D v) / m, dp = h v: unstable beyond kappa + 2 delta = 4. Within t
 by the part of a step it happens to have: half of an oscillation in contact must last two steps, kappa <= 2, or bounces
 gain speed over these parts' mean: from kappa = 2.3 on at delta = 0.02, from 2.7 on at 0.2. Between two flanks a link
 with less damping can meet one part again and again, and gain within the limit too: 3 times at kappa = 1.5. The spring
-of a mesh that slips (`hysteresis`) adds to K in contact alone.
+of a mesh that slips (`gear_friction`) adds to K in contact alone.
 """
 
 from collections.abc import Mapping
@@ -17,8 +17,7 @@ import mujoco
 import numpy as np
 from scipy.stats.qmc import Halton
 
-from twin.config.robot import ArmJoint
-from twin.defects.gear import mesh_tendon, rotor_joint
+from twin.defects.gear import Gear, mesh_tendon, rotor_joint
 from twin.errors import TwinError
 
 _BOUNCES, _STABLE = 2.0, 4.0
@@ -41,7 +40,7 @@ class GearTooStiff(TwinError):
         )
 
 
-def check_meshes(model: mujoco.MjModel, arm: Mapping[str, ArmJoint]) -> None:
+def check_meshes(model: mujoco.MjModel, arm: Mapping[str, Gear]) -> None:
     """Check the meshes of every joint of the arm, coupled or not.
 
     Raises:

@@ -1,23 +1,19 @@
-"""A robot that is carried: joints where they are told to be, the base on its path, no physics.
+"""Kinematic playback: joints where they are commanded to be, the base on its path, no physics.
 
 The clean form of a campaign. A spin is a turntable with its axis through the base frame's origin, upright; nothing
-sags, bends or plays, and no wrench is felt. States are those of the set-points.
+sags or bends, gears have no backlash, and no wrench is measured. States are those of the set-points.
 """
-
-from dataclasses import replace
 
 import mujoco
 import numpy as np
 
-from calibration.recording import Trial
+from twin.fields.names import BASE
 from twin.motions.motion import RATE, Motion
 from twin.motions.swings import JOINTS
 from twin.simulation.build import Twin
 from twin.simulation.states import States
 from twin.transforms import rotation_vector
 from twin.truth import Parameter, twist_parameters
-
-_ROOT = "base_footprint"
 
 
 def kinematic_states(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
@@ -26,19 +22,7 @@ def kinematic_states(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> Stat
     t = np.arange(len(q)) / RATE
     T = np.tile(np.eye(4), (len(q), 1, 1)) if motion.base is None else motion.base.poses()
     poses = T_lab_base @ T @ np.moveaxis(in_base(twin, q, twin.links), 1, 0)
-    still = np.zeros_like(q)
-    return States(
-        t=t,
-        motor=q,
-        link=q,
-        motor_velocity=still,
-        torque=still,
-        command=q,
-        poses=dict(zip(twin.links, poses, strict=True)),
-        wrench=np.zeros((len(q), 6)),
-        plates=np.zeros((len(q), 1, 6)),
-        wrist=np.zeros((len(q), 6)),
-    )
+    return States.zeros(t, q, dict(zip(twin.links, poses, strict=True)))
 
 
 def in_base(twin: Twin, q: np.ndarray, links: tuple[str, ...]) -> np.ndarray:
@@ -51,7 +35,7 @@ def in_base(twin: Twin, q: np.ndarray, links: tuple[str, ...]) -> np.ndarray:
         for joint, value in zip(JOINTS, row, strict=True):
             data.joint(joint).qpos = value
         mujoco.mj_kinematics(twin.model, data)
-        for i, name in enumerate((_ROOT, *links)):
+        for i, name in enumerate((BASE, *links)):
             body = data.body(name)
             T[k, i, :3, :3], T[k, i, :3, 3] = body.xmat.reshape(3, 3), body.xpos
     return np.linalg.solve(T[:, :1], T[:, 1:])
@@ -61,12 +45,3 @@ def arm_frame(twin: Twin, joint: str) -> tuple[Parameter, ...]:
     """`frame.base.arm`: the link of the arm's first joint in the base, every joint at zero, unstrained."""
     T = in_base(twin, np.zeros((1, len(JOINTS))), (joint.replace("_joint", "_link"),))[0, 0]
     return twist_parameters("frame.base.arm", np.concatenate([T[:3, 3], rotation_vector(T)]))
-
-
-def without_plate(trial: Trial) -> Trial:
-    """The recording of a robot that no plate feels, nor its wrist."""
-    none = np.zeros((0, 1, 6))
-    return replace(
-        trial, plate=(), t_plate=np.zeros(0), plate_wrench=none[:, :0], plate_centre=none[:, 0, :3],
-        wrist_wrench=none[:, 0],
-    )  # fmt: skip

@@ -32,3 +32,10 @@ class States:
     wrench: np.ndarray
     plates: np.ndarray
     wrist: np.ndarray
+
+    @classmethod
+    def zeros(cls, t: np.ndarray, q: np.ndarray, poses: dict[str, np.ndarray]) -> "States":
+        """A robot at joint positions q (n, 8) that exerts no force, with no velocity."""
+        n = len(t)
+        still, none = np.zeros_like(q), np.zeros((n, 6))
+        return cls(t, q, q, still, still, q, poses, none, np.zeros((n, 0, 6)), np.full((n, 6), np.nan))

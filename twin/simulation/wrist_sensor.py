@@ -1,14 +1,9 @@
-"""Sensors of force in a simulation: the robot's action on the plates and the hand's on the wrist's sensor.
-
-plate:  what its contacts carry, which MuJoCo sums up as a force f at a point p (lab axes):  tau = tau_p + (p - c) x f
-wrist:  what holds the hand up, from how it moves and what pushes it
-
-What the wrist's force-torque sensor holds: a rigid hand, and the wrench that its motion asks for.
+"""The wrench on the wrist's force-torque sensor, from the motion of the rigid hand behind it and what pushes it.
 
     F = m (dv_c/dt - g) - f        tau = d(R I R^T w)/dt + c x m (dv_c/dt - g) - r x f      (Newton, Euler)
 
 v_c, w: velocity of the centre of mass c and angular velocity, R = R_lab_sensor, f: a push on the hand at r. The sensor
-feels -F, -tau. The change of momentum in a step is exact, whatever the integrator; a force-torque sensor of MuJoCo's
+measures -F, -tau. The change of momentum in a step is exact, whatever the integrator; a force-torque sensor of MuJoCo's
 has all accelerations found again, a twentieth of a step, and does not see the push, which is an actuator's there.
 """
 

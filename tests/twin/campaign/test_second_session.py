@@ -9,7 +9,7 @@ import pytest
 
 from twin.campaign import laboratory, record, second_session
 from twin.config import Departures
-from twin.config.disturbances import Loosened
+from twin.instruments import LooseMarker
 from twin.motions import schedule
 from twin.truth import read_trial
 
@@ -55,7 +55,7 @@ def test_the_truth_tells_of_no_session_that_is_not_recorded(config, tmp_path):
 
 
 def test_a_loose_marker_is_tight_once_it_is_remounted(config):
-    lab = laboratory(replace(config, departures=Departures(loosened={"gripper2": Loosened(1e-3)})), 0)
+    lab = laboratory(replace(config, departures=Departures(loosened={"gripper2": LooseMarker("gripper2", 1e-3)})), 0)
     assert lab.robot.loose and not second_session(lab).robot.loose
 
 

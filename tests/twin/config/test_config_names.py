@@ -10,9 +10,9 @@ import pytest
 import mjcf
 from scenarios import steps
 from scenarios.files.errors import ScenarioError
-from twin.campaign.robot import cluster
-from twin.config.names import ARM, TORSO, links
+from twin.fields.names import ARM, TORSO, links
 from twin.motions import JOINTS
+from twin.random_streams import generator
 
 BEND = "{stiffness: 3.0e+4, damping: 30.0}"
 WARM = "{xi: [1.0e-4, 0.0, 0.0, 0.0, 0.0, 0.0], time_constant: 900.0}"
@@ -89,6 +89,6 @@ def test_friction_that_nothing_holds_is_refused(tmp_path):
 def test_a_body_whose_markers_tell_no_rotation_is_mounted(markers):
     """What one marker is off is where its body is; two of one nominal place are off against each other alone."""
     body = replace(steps.load("humanoids2024").twin.instruments.bodies["gripper"], markers=markers, marker=1e-3)
-    mounted = cluster("gripper", body, 0)
+    mounted = body.mounted("gripper", generator(0, "cluster", "gripper"))
     np.testing.assert_allclose(mounted.shift.sum(axis=0), 0.0, atol=1e-15)
     assert (np.abs(mounted.shift).max() > 1e-4) == (len(markers) > 1)

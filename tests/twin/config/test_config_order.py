@@ -11,7 +11,6 @@ from scenarios import load
 from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
 from twin.campaign import laboratory, measure
-from twin.campaign.record import _states
 from twin.motions import motion as motions
 
 OVERRIDES = (
@@ -54,7 +53,7 @@ def test_the_robot_is_the_same(laboratories):
 def test_the_recording_is_the_same(laboratories):
     path = motions.sweep_path("arm_2_joint", 2.0)
     motion = motions.swing("sweep", "calibration", "sweep", path, 2.0, laboratories[0].config.campaign)
-    one, other = (measure(lab, motion, _states(lab, motion, 0.0), 100.0)[0] for lab in laboratories)
+    one, other = (measure(lab, motion, lab.states(motion, 0.0), 100.0)[0] for lab in laboratories)
     for field in fields(one):
         np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name), field.name)
 

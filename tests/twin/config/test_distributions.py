@@ -10,7 +10,7 @@ from scenarios import load
 from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
 from twin.campaign import describe_dataset, laboratory
-from twin.config import Distribution, RandomValue, sampled
+from twin.fields import Distribution, RandomValue, sampled
 from twin.simulation import build
 
 GAP = "twin.arm.arm_6_joint.gap"

@@ -9,7 +9,8 @@ import pytest
 import mjcf
 from scenarios import load
 from twin.campaign import sample
-from twin.defects import Gear, LinkMass, Payload, Placement
+from twin.defects import Gear, LinkMass, Placement
+from twin.defects.inertia import Payload
 from twin.defects.wheels.contact import ContactTooStiff
 from twin.errors import UnknownElement
 from twin.instruments import Encoder
@@ -26,7 +27,7 @@ def test_a_perturbed_twin_has_pinocchios_kinematics(lab, body_poses):
     model = pin.buildModelFromXML(mjcf.urdf())
     for d in placements:
         i = model.getJointId(d.joint_name)
-        model.jointPlacements[i] = model.jointPlacements[i] * pin.exp6(d.xi)
+        model.jointPlacements[i] = model.jointPlacements[i] * pin.exp6(np.array(d.xi))
     data, worst = model.createData(), 0.0
     for values in rng.uniform(0.0, 0.3, size=(50, len(JOINTS))):
         q = pin.neutral(model)

@@ -7,8 +7,8 @@ import pytest
 
 from tests.doubles.gear_bench import bench, gear
 from twin.campaign import laboratory
-from twin.defects import Differential, GearFriction
-from twin.defects.differential import UnlikeMotors
+from twin.defects import GearFriction
+from twin.defects.differential import Differential, UnlikeMotors
 from twin.defects.gear import mesh_tendon
 from twin.motions import JOINTS
 

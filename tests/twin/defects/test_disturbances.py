@@ -11,24 +11,20 @@ import pytest
 import mjcf
 from twin import motions
 from twin.campaign import laboratory, measure
-from twin.campaign.record import _in_trial
 from twin.config import Departures
-from twin.config.disturbances import Bending, Loosened, Warming
-from twin.config.disturbances import Cable as CableConfig
-from twin.defects import Cable, Flexibility, LinkMass, Placement
+from twin.defects import Cable, Flexibility, LinkMass, Placement, ThermalDrift
 from twin.errors import UnknownElement
 from twin.instruments import LooseMarker
-from twin.motions import JOINTS, in_step
-from twin.motions.swings import FORWARD
+from twin.motions.swings import FORWARD, JOINTS, in_step
 from twin.simulation import build, simulate
 
 XI = (3e-4, -2e-4, 1e-4, 5e-4, 4e-4, -3e-4)
 EVERY = Departures(
-    bending={"arm_4_link": Bending(2e4, 20.0)},
-    warming={"arm_3_joint": Warming(XI, 600.0)},
+    bending={"arm_4_link": Flexibility("arm_4_link", 2e4, 20.0)},
+    warming={"arm_3_joint": ThermalDrift("arm_3_joint", XI, 600.0)},
     floor_tilt=(4e-3, -3e-3),
-    cables={"arm_5_joint": CableConfig(0.3, 0.2)},
-    loosened={"gripper2": Loosened(2e-3, 5.0)},
+    cables={"arm_5_joint": Cable("arm_5_joint", 0.3, 0.2)},
+    loosened={"gripper2": LooseMarker("gripper2", 2e-3, 5.0)},
 )
 PENDULUM = """<mujoco><option gravity="0 0 -9.81" timestep="0.001" integrator="implicitfast"/><worldbody>
 <body name="link"><joint name="elbow" axis="0 0 1"/><inertial pos="0.3 0.2 0" mass="2" diaginertia=".1 .1 .1"/></body>
@@ -104,7 +100,7 @@ def test_a_placement_drifts_exponentially_to_its_twist(departed, config, body_po
     motion = still(config)
 
     def placed(time):
-        return body_poses(_in_trial(departed, motion, time).model, {}, "arm_2_link", "arm_3_link")
+        return body_poses(departed.twin_in(motion, time).model, {}, "arm_2_link", "arm_3_link")
 
     cold = placed(0.0)
     for time, share in ((600.0, 1.0 - np.exp(-1.0)), (1e5, 1.0)):
@@ -121,7 +117,7 @@ def test_a_tilted_floor_shows_in_the_plates_horizontal_force(config):
 
 def test_a_loose_marker_hangs_by_its_sag_from_its_time_on(departed, config):
     motion = still(config)
-    states = simulate(_in_trial(departed, motion, 0.0), motion, departed.T_lab_base)
+    states = simulate(departed.twin_in(motion, 0.0), motion, departed.T_lab_base)
     tight = replace(departed, robot=replace(departed.robot, loose=()))
     _, loose = measure(departed, motion, states, 103.0)
     _, fixed = measure(tight, motion, states, 103.0)
@@ -171,7 +167,7 @@ def _gravity_torques(given, q):
     for d in given:
         if isinstance(d, Placement):
             i = model.getJointId(d.joint_name)
-            model.jointPlacements[i] = model.jointPlacements[i] * pin.exp6(d.xi)
+            model.jointPlacements[i] = model.jointPlacements[i] * pin.exp6(np.array(d.xi))
     configuration = pin.neutral(model)
     for name, value in q.items():
         configuration[model.joints[model.getJointId(name)].idx_q] = value

@@ -9,8 +9,11 @@ from scipy.stats import chi2
 from twin import motions
 from twin.campaign import EPOCH, laboratory, measure
 from twin.campaign.measure import instrument_errors
-from twin.config.instruments import LogErrors, MocapErrors, PlateErrors, WristSensor
 from twin.instruments import force_plate, motion_capture
+from twin.instruments.force_plate import PlateErrors
+from twin.instruments.motion_capture import MocapErrors
+from twin.instruments.robot_log import LogErrors
+from twin.instruments.wrist_sensor import WristSensor
 from twin.motions import CALIBRATION_SWINGS
 from twin.simulation import simulate
 

@@ -8,9 +8,8 @@ import pytest
 from scenarios import load
 from scenarios.files.errors import ScenarioError
 from twin.campaign import laboratory, measure
-from twin.campaign.record import _in_trial, _states
 from twin.config import Departures
-from twin.config.disturbances import Warming
+from twin.defects import ThermalDrift
 from twin.motions import RATE, BasePath, driving, schedule
 from twin.simulation import kinematic_states
 from twin.simulation.kinematic import in_base
@@ -40,7 +39,7 @@ def test_the_wheels_turn_by_what_the_path_asks():
     way, middle = 0.2 * np.cos(0.5 * t[1:]) / RATE, 0.5 * (yaw[1:] + yaw[:-1])
     steps = way[:, None] * np.column_stack([np.cos(middle), np.sin(middle)])
     planar = np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), yaw])
-    left, right = BasePath("wheels", planar).wheel_angles(TRACK, RADIUS).T
+    left, right = BasePath(planar).wheel_angles(TRACK, RADIUS).T
     np.testing.assert_allclose((right - left) * RADIUS / TRACK, yaw - yaw[0], atol=1e-12)
     np.testing.assert_allclose(0.5 * np.diff(left + right) * RADIUS, way, atol=1e-12)
 
@@ -61,7 +60,7 @@ def test_a_spin_and_a_drive_rest_where_they_say(moves):
 def test_casters_that_turn_where_they_stand_roll_in_a_drive(robot, moves):
     casters = [f"twin.base.caster_{k}.turning_force=8.0" for k in ("front", "back")]
     lab = laboratory(load("heins2022", casters).twin, 0)
-    driven = [_in_trial(which, moves["spin_wheels"], 0.0).model for which in (lab, robot)]
+    driven = [which.twin_in(moves["spin_wheels"], 0.0).model for which in (lab, robot)]
     assert driven[0].nv == driven[1].nv
     assert not any(".turn_" in driven[0].joint(j).name for j in range(driven[0].njnt))
 
@@ -79,7 +78,7 @@ def test_a_carried_spin_turns_about_the_base_frame_and_nothing_else_moves(robot,
 
 def test_no_plate_feels_a_carried_robot(robot, moves):
     motion = moves["drive_kinematic"]
-    trial, true = measure(robot, motion, _states(robot, motion, 0.0), 50.0)
+    trial, true = measure(robot, motion, robot.states(motion, 0.0), 50.0)
     assert trial.plate == () and len(trial.t_plate) == 0
     assert len(trial.dwell_start) == 9
     np.testing.assert_allclose(np.ptp(true.base_pose[:, 1, 3]), 0.8 * abs(np.sin(robot.config.base.pose[2])), atol=1e-9)
@@ -87,12 +86,14 @@ def test_no_plate_feels_a_carried_robot(robot, moves):
 
 def test_a_carried_robot_warms_too(heins, moves):
     xi = (5e-3, 0.0, 0.0, 10e-3, 0.0, 0.0)
-    lab = laboratory(replace(heins, departures=Departures(warming={"arm_1_joint": Warming(xi, 100.0)})), 0)
+    lab = laboratory(
+        replace(heins, departures=Departures(warming={"arm_1_joint": ThermalDrift("arm_1_joint", xi, 100.0)})), 0
+    )
     motion = moves["spin_kinematic"]
-    cold, warm = (_states(lab, motion, time).poses for time in (0.0, 1e5))
+    cold, warm = (lab.states(motion, time).poses for time in (0.0, 1e5))
     moved = [p["gripper_grasping_frame"][0, :3, 3] - p["base_footprint"][0, :3, 3] for p in (cold, warm)]
     hand = np.linalg.solve(lab.T_lab_base, cold["gripper_grasping_frame"][0])
-    physical = [_in_trial(lab, moves["spin_wheels"], time) for time in (0.0, 1e5)]
+    physical = [lab.twin_in(moves["spin_wheels"], time) for time in (0.0, 1e5)]
     expected = [in_base(twin, motion.command[:1], ("gripper_grasping_frame",))[0, 0] for twin in physical]
     np.testing.assert_allclose(hand, expected[0], atol=1e-12)
     shift = lab.T_lab_base[:3, :3] @ (expected[1] - expected[0])[:3, 3]
@@ -106,7 +107,7 @@ def driven(heins):
     quick = replace(heins.campaign.driving, forms=("wheels",), spin_rests=4, drive_rests=4, yaw_rate=2.0, speed=0.2)
     short = replace(heins, campaign=replace(heins.campaign, driving=quick, dwell=0.8, rest=1.0))
     robot = laboratory(short, 0)
-    return robot, {m.kind: (m, _states(robot, m, 0.0)) for m in driving.trials(short.campaign)}
+    return robot, {m.kind: (m, robot.states(m, 0.0)) for m in driving.trials(short.campaign)}
 
 
 def rests(robot, motion, states):

@@ -9,8 +9,8 @@ from calibration.numerics.wrench import centre_of_pressure
 from twin import motions
 from twin.campaign import describe_dataset, laboratory, measure
 from twin.campaign.measure import instrument_errors
-from twin.config.instruments import PlateErrors
 from twin.errors import RobotFell
+from twin.instruments.force_plate import PlateErrors
 from twin.motions import CALIBRATION_SWINGS
 from twin.simulation import simulate
 from twin.simulation.force_plates import PlateGrid

@@ -10,11 +10,12 @@ from tests.calibration.formats.test_exporter import exported, largest, run
 from twin import motions
 from twin.base_tests import load_test
 from twin.campaign import describe_dataset, laboratory, measure, record
-from twin.config.instruments import PlateErrors, PlatePlace
 from twin.errors import RobotFell
 from twin.instruments import force_plate
+from twin.instruments.force_plate import PlateErrors
 from twin.motions import CALIBRATION_SWINGS
 from twin.simulation import simulate
+from twin.simulation.force_plates import PlatePlace
 
 YAW = np.radians(25.0)
 PLACE = PlatePlace((0.03, -0.02), 0.005, YAW)

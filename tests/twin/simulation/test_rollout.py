@@ -110,12 +110,11 @@ def test_the_plate_sees_a_push_at_the_hand(lab, config):
 
 
 def test_a_payload_weighs_what_its_trial_says(lab, config, nominal):
-    from twin.campaign.record import _in_trial
     from twin.motions import schedule
 
     campaign = replace(config.campaign, payloads=(0.0, 2.0))
     masses = {
-        m.id: _in_trial(lab, m, 0.0).model.body_mass.sum() for m in schedule(campaign, nominal, 0) if m.name == "xyz"
+        m.id: lab.twin_in(m, 0.0).model.body_mass.sum() for m in schedule(campaign, nominal, 0) if m.name == "xyz"
     }
     assert masses["xyz_0kg"] == pytest.approx(masses["xyz"] - 0.437)
     assert masses["xyz_2kg"] == pytest.approx(masses["xyz"] + 2.0 - 0.437)

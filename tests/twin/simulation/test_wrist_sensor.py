@@ -7,7 +7,7 @@ from mujoco import rollout
 from scipy.spatial.transform import Rotation
 
 import mjcf
-from twin.campaign.robot import TOOL
+from twin.fields.names import HAND
 from twin.motions import CALIBRATION_SWINGS, motion
 from twin.simulation import build, simulate, wrist_sensor
 from twin.simulation.setpoints import prepare
@@ -31,10 +31,10 @@ def test_it_bears_the_weight_of_the_hand_in_its_own_axes(lab, states):
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
-    sensor, held, grasp = data.body("wrist_ft_link"), model.body("wrist_ft_tool_link").id, data.body(TOOL)
+    sensor, held, grasp = data.body("wrist_ft_link"), model.body("wrist_ft_tool_link").id, data.body(HAND)
     R_sensor_grasp = sensor.xmat.reshape(3, 3).T @ grasp.xmat.reshape(3, 3)
     lever = sensor.xmat.reshape(3, 3).T @ (data.subtree_com[held] - sensor.xpos)
-    down = R_sensor_grasp @ states.poses[TOOL][0, :3, :3].T @ [0.0, 0.0, -1.0]
+    down = R_sensor_grasp @ states.poses[HAND][0, :3, :3].T @ [0.0, 0.0, -1.0]
     weight = 9.81 * model.body_subtreemass[held] * down
     expected = np.concatenate([weight, np.cross(lever, weight)])
     np.testing.assert_allclose(states.wrist[0], expected, atol=1e-2)

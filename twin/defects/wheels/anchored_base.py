@@ -17,11 +17,11 @@ import numpy as np
 from twin.defects.defect import UNTOUCHED, Defect, body
 from twin.defects.wheels.stiffness import spatial_stiffness
 from twin.defects.wheels.wheel import Wheel
+from twin.fields.names import BASE
 from twin.truth import Parameter
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 _ORDER = (3, 4, 5, 0, 1, 2)  # outermost first
-_ROOT = "base_footprint"
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Anchored(Defect):
             wheel.fixed(spec)
             geom = spec.geom(wheel.contact_geom)
             geom.contype, geom.conaffinity = UNTOUCHED
-        base = body(spec, _ROOT)
+        base = body(spec, BASE)
         for joint in base.joints:
             spec.delete(joint)
         for i in _ORDER:

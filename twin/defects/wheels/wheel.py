@@ -1,42 +1,39 @@
-"""A wheel under the base: hung on a bushing or fixed to the base, standing by a contact or anchored in the floor.
+"""A wheel under the base: on a bushing or fixed to the base, standing on a contact or anchored in the floor.
 
-    contact:   bushing and contact    sticks, slips and leaves a set
-    anchored:  bushing alone          its lower end fixed in the floor: linear, see `anchored`
-    rigid:     contact alone          soft in heave and tilt, held by friction in the floor's plane
+    contact:   bushing and contact    sticks, slips and leaves a permanent offset
+    anchored:  bushing alone          its lower end fixed in the floor: linear, see `anchored_base`
+    rigid:     contact alone          compliant in heave and tilt, held by friction in the floor's plane
 
-Drives are braked: they do not roll. Casters slide as they stand, or, with a turning force f, turn first: two slides
-behind the bushing, each held by f whatever the load. What they hold then is bearing and scrub, not Coulomb's.
+Drives are braked: they do not roll, see `rolling_wheel` for those that do. Casters slide as they stand or, with a
+turning force f, turn first, against the friction of bearings and scrub instead of Coulomb's law:
 
-A caster that turns where it would slide: it swivels and rolls against bearings and scrub, not against Coulomb's law.
+    m_w d(v + s')/dt = F - g,    a s'' = F - g - f sign(s')      at rest where |..| < f; s along x and along y
 
-    m_w d(v + s')/dt = F - g,    a s'' = F - g - f sign(s')      held where |..| < f; s along x and along y
-
-Two slides between fork and wheel, each held by f whatever the load; g the floor's force. a = I / r^2 is what swivel and
-wheel turn at their radius. Without it the light wheel between two frictions in series is found by more sweeps than
-MuJoCo makes, and creeps.
+two slides between fork and wheel, each with friction f whatever the load; g the floor's force. a = I / r^2 is what
+swivel and wheel turn at their radius. Without it the light wheel between two frictions in series needs more solver
+iterations than MuJoCo makes, and creeps.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from twin.defects.defect import Defect, body
+from twin.defects.defect import Defect, Trial, body
 from twin.defects.wheels.bushing import DIRECTIONS, RUBS, Bushing
 from twin.defects.wheels.contact import Contact
+from twin.defects.wheels.rolling_wheel import CASTER_INERTIA, let_roll
+from twin.fields.names import BASE
 from twin.truth import Parameter
 
 Vector = tuple[float, float, float]
-_ROOT = "base_footprint"
 # Solver tolerance, iterations against slip and their tolerance. One rigid body's wheels share its load in more than one
 # way: without the fine tolerance of both it creeps. Where each has a spring, those iterations set the accuracy.
 _OWN = 1e-4, 20, 1e-9
 _TWISTING = 1e-6, 20, 1e-9  # where wheels twist in their bushings, their contacts hold a moment too
 _SHARED = 1e-10, 20, 1e-12
 _SERIES = 1e-14  # tolerance against slip where a caster's friction in turning is in series with the floor's
-CASTER_INERTIA = 5e-4
-"""Of a caster's wheel and of its swivel each, bearings and tyre included [kg.m2]."""
 _RADIUS = 0.025  # of a caster's wheel [m]
 INERTIA = CASTER_INERTIA / _RADIUS**2
 """a [kg]."""
@@ -55,6 +52,7 @@ class Wheel(Defect):
         bushing: Between base and wheel; None: fixed to the base.
         footing: Between wheel and floor; None: anchored.
         turning_force: Of a caster along x and along y [N]; 0: it does not turn.
+        rolls: Whether its brake is off, under a base that drives; a caster then swivels instead of turning.
     """
 
     name: str
@@ -65,6 +63,11 @@ class Wheel(Defect):
     bushing: Bushing | None
     footing: Contact | None
     turning_force: float = 0.0
+    rolls: bool = False
+
+    def at(self, trial: Trial, time: float) -> "Wheel":
+        """The wheel let loose, where the base drives."""
+        return replace(self, rolls=True) if trial.rolls else self
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Replace the wheel's joints by its bushing."""
@@ -73,7 +76,9 @@ class Wheel(Defect):
             T_base_wheel = _pose_in_base(wheel)
             R, inertia = T_base_wheel[:3, :3], CASTER_INERTIA if wheel.bodies else 0.0
             self.bushing.hang(wheel, self.name, R.T, R.T @ (np.array(self.centre) - T_base_wheel[:3, 3]), inertia)
-        if self.turning_force > 0.0:
+        if self.rolls:
+            let_roll(spec, wheel, self.name)
+        elif self.turning_force > 0.0:
             (hub,) = wheel.bodies
             let_turn(hub, self.name, _pose_in_base(hub)[:2, :3], self.turning_force)
 
@@ -130,7 +135,7 @@ class Wheel(Defect):
 def _pose_in_base(found: mujoco.MjsBody) -> np.ndarray:
     """T_base_body (4, 4) along the parents."""
     T = np.eye(4)
-    while found.name != _ROOT:
+    while found.name != BASE:
         step = np.eye(4)
         step[:3, :3], step[:3, 3] = Rotation.from_quat(found.quat, scalar_first=True).as_matrix(), found.pos
         T, found = step @ T, found.parent

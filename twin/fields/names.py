@@ -17,6 +17,8 @@ OF_KEY = "[key]"
 """What pydantic puts behind the key of a mapping when the key itself is wrong."""
 TORSO = "torso_lift_joint"
 ARM = tuple(f"arm_{i}_joint" for i in range(1, 8))
+HAND = "gripper_grasping_frame"
+BASE = mjcf.ROOT
 BodyName = Literal["base", "shoulder", "gripper"]
 
 

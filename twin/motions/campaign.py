@@ -1,9 +1,4 @@
-"""What a scenario records: trials, their motions and durations; SI units.
-
-What a scenario says about trials in which the base moves: yaw spins in steps, straight drives; SI units.
-
-What a scenario says of another day: the confirmation session; SI units.
-"""
+"""What a scenario records: trials, their motions and durations, and those in which the base moves; SI units."""
 
 from dataclasses import field
 from typing import Annotated, Literal
@@ -11,14 +6,13 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from twin.config.values import (
+from twin.fields.values import (
     STRICT,
     Count,
     FixedNonNegative,
     FixedPositive,
     GivenApproaches,
     GivenPosture,
-    NonNegative,
 )
 
 TrialName = Literal[
@@ -97,19 +91,3 @@ class Campaign:
     only: tuple[TrialName, ...] = ()
     given_postures: tuple[GivenPosture, ...] = ()
     given_approaches: GivenApproaches = ()
-
-
-@dataclass(frozen=True, config=STRICT)
-class Session:
-    """What changes from the first session to the confirmation; markers are remounted with their bodies' own widths.
-
-    Attributes:
-        base_translation: Half width of the base's move, per axis [m].
-        base_rotation: Half width of its turn [rad].
-        encoder_zero: Standard deviation of a motor encoder's zero after homing anew [rad]: three steps of the absolute
-            encoder it is homed by.
-    """
-
-    base_translation: NonNegative = 0.08
-    base_rotation: NonNegative = 0.5
-    encoder_zero: NonNegative = 3e-4
