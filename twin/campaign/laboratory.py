@@ -51,7 +51,7 @@ class Laboratory:
             return self.twin
         return built(self.config, defects, self.twin.links)
 
-    def states(self, motion: Motion, time: float) -> States:
+    def states(self, motion: Motion, time: float = 0.0) -> States:
         """What a motion does to the robot at `time` [s] of the campaign; see `twin.simulate`."""
         move = kinematic_states if motion.kinematic else simulate
         return move(self.twin_in(motion, time), motion, self.T_lab_base)

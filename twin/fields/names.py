@@ -39,6 +39,17 @@ def one_of(kind: str, known: Callable[[], Collection[str]]) -> AfterValidator:
     return AfterValidator(checked)
 
 
+def other_than(kind: str, known: Callable[[], Collection[str]]) -> AfterValidator:
+    """Refuse names that are taken."""
+
+    def checked(name: str) -> str:
+        if name in known():
+            raise ValueError(f"there is a {kind} of this name; choose another")
+        return name
+
+    return AfterValidator(checked)
+
+
 ArmName = Annotated[str, one_of("arm joint", lambda: ARM)]
 JointName = Annotated[str, one_of("joint of torso or arm", lambda: (TORSO, *ARM))]
 ArmLinkName = Annotated[str, one_of("link of the arm", lambda: [n.replace("_joint", "_link") for n in ARM])]

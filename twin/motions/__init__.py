@@ -1,10 +1,10 @@
 """What a campaign commands: set-points of joints and base, and the order of the trials."""
 
-from twin.motions.campaign import Campaign
 from twin.motions.motion import RATE, BasePath, Motion, static_postures, swing
 from twin.motions.postures import sample_postures
 from twin.motions.schedule import schedule
 from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
+from twin.motions.trajectory import trajectory
 
 __all__ = [
     "CALIBRATION_SWINGS",
@@ -12,11 +12,11 @@ __all__ = [
     "RATE",
     "VALIDATION_SWINGS",
     "BasePath",
-    "Campaign",
     "Motion",
     "Swing",
     "sample_postures",
     "schedule",
     "static_postures",
     "swing",
+    "trajectory",
 ]

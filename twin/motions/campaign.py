@@ -3,9 +3,10 @@
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, StringConstraints
 from pydantic.dataclasses import dataclass
 
+from twin.fields.names import one_of, other_than
 from twin.fields.values import (
     STRICT,
     Count,
@@ -14,11 +15,11 @@ from twin.fields.values import (
     GivenApproaches,
     GivenPosture,
 )
+from twin.motions.swings import CALIBRATION_SWINGS, VALIDATION_SWINGS
 
-TrialName = Literal[
-    "postures", "sweeps", "around_x", "around_y", "around_z", "x_fold", "y_fold",
-    "xyz", "xyz_mirror", "push", "postures_validation",
-]  # fmt: skip
+TRIALS = ("postures", "sweeps", *CALIBRATION_SWINGS, *VALIDATION_SWINGS, "push", "postures_validation")
+TrialName = Annotated[str, one_of("trial", lambda: TRIALS)]
+OwnName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]+$"), other_than("trial", lambda: TRIALS)]
 Form = Literal["kinematic", "wheels"]
 Rests = Annotated[int, Field(ge=4, le=100)]
 
@@ -70,7 +71,10 @@ class Campaign:
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
         driving: Trials in which the base moves.
         carried: Whether every trial is without physics, joints and base where they are told to be.
-        only: Trials to record, `sweeps` for those of one joint; empty: all. A confirmation repeats those of validation.
+        motions: CSV files of trajectories by the names of their trials, from the current folder; see
+            `twin.motions.trajectory`.
+        only: Trials to record beside these, `sweeps` for those of one joint; empty: all. A confirmation repeats those of
+            validation.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]
@@ -91,3 +95,4 @@ class Campaign:
     only: tuple[TrialName, ...] = ()
     given_postures: tuple[GivenPosture, ...] = ()
     given_approaches: GivenApproaches = ()
+    motions: dict[OwnName, str] = field(default_factory=dict)

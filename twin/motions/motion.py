@@ -21,6 +21,7 @@ from twin.motions.swings import FORWARD, JOINTS, TAU, Swing, in_step
 from twin.transforms import exp6
 
 RATE = 100.0  # [Hz] of the set-points
+REST = 1.5  # [s] before and after a motion, unless a campaign says otherwise
 SETTLE = 2.0  # [s] before a recording starts, not recorded
 BEYOND = np.array([5e-3, *7 * [5e-2]])  # how far off a joint turns to approach from a given side [m, rad]
 _SWEEP_SPEED = 0.2 * np.pi  # [rad/s]
@@ -44,7 +45,8 @@ def _times(duration: float) -> np.ndarray:
     return np.arange(round(duration * RATE) + 1) / RATE
 
 
-def _no_dwells() -> tuple[np.ndarray, np.ndarray]:
+def no_dwells() -> tuple[np.ndarray, np.ndarray]:
+    """Dwells and approaches of a motion without rests in between."""
     return np.empty((0, 2)), np.empty((0, len(JOINTS)), dtype=np.int8)
 
 
@@ -135,7 +137,7 @@ def swing(id: str, role: schema.Role, kind: schema.Kind, path: Swing, duration: 
     """A swing between two rests."""
     t = _times(duration + 2.0 * campaign.rest)
     s = path_time(t - campaign.rest, duration, campaign.ramp)
-    return Motion(id, role, kind, id, path.at(s), *_no_dwells())
+    return Motion(id, role, kind, id, path.at(s), *no_dwells())
 
 
 def pushed(id: str, role: schema.Role, force: float, campaign: Campaign) -> Motion:
@@ -146,7 +148,7 @@ def pushed(id: str, role: schema.Role, force: float, campaign: Campaign) -> Moti
         since = t - campaign.rest - 4.0 * k
         push[:, axis] = -force * np.clip(np.minimum(since / 0.2, (2.2 - since) / 0.2), 0.0, 1.0)
     still = np.repeat(np.array(FORWARD)[None], len(t), axis=0)
-    return Motion(id, role, "swing", id, still, *_no_dwells(), push=push)
+    return Motion(id, role, "swing", id, still, *no_dwells(), push=push)
 
 
 def static_postures(

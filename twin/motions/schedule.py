@@ -12,6 +12,7 @@ from twin.motions.campaign import Campaign
 from twin.motions.motion import Motion
 from twin.motions.postures import sample_postures
 from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
+from twin.motions.trajectory import read_trajectory
 from twin.random_streams import generator
 
 REGISTRATION = "registration"
@@ -31,6 +32,7 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *_swings("validation", campaign.validation_swing, VALIDATION_SWINGS, campaign),
         *_loaded(campaign),
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
+        *(read_trajectory(path, name, campaign.rest) for name, path in campaign.motions.items()),
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
     )
     second = _confirmation(campaign, nominal, seed) if campaign.confirmation else ()
@@ -39,7 +41,7 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
 
 
 def _asked(campaign: Campaign, name: str) -> bool:
-    return not campaign.only or name in campaign.only
+    return not campaign.only or name in campaign.only or name in campaign.motions
 
 
 def _group(motion: Motion) -> str:
