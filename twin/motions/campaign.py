@@ -3,7 +3,7 @@
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import Field, StringConstraints
+from pydantic import BeforeValidator, Field, StringConstraints
 from pydantic.dataclasses import dataclass
 
 from twin.fields.names import one_of, other_than
@@ -15,13 +15,30 @@ from twin.fields.values import (
     GivenApproaches,
     GivenPosture,
 )
-from twin.motions.swings import CALIBRATION_SWINGS, VALIDATION_SWINGS
+from twin.motions.swings import CALIBRATION_SWINGS, FURTHER_SWINGS, VALIDATION_SWINGS
 
-TRIALS = ("postures", "sweeps", *CALIBRATION_SWINGS, *VALIDATION_SWINGS, "push", "postures_validation")
+TRIALS = ("postures", "sweeps", *CALIBRATION_SWINGS, *VALIDATION_SWINGS, *FURTHER_SWINGS, "push", "postures_validation")
 TrialName = Annotated[str, one_of("trial", lambda: TRIALS)]
 OwnName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]+$"), other_than("trial", lambda: TRIALS)]
 Form = Literal["kinematic", "wheels"]
 Rests = Annotated[int, Field(ge=4, le=100)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Trajectory:
+    """A motion of one's own.
+
+    Attributes:
+        file: CSV file, see `twin.motions.trajectory`; from the current folder.
+        role: calibration: the fit may use it; validation: it is predicted.
+    """
+
+    file: str
+    role: Literal["calibration", "validation"] = "validation"
+
+
+OwnMotion = Annotated[Trajectory, BeforeValidator(lambda value: {"file": value} if isinstance(value, str) else value)]
+"""Or its file alone."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -71,10 +88,9 @@ class Campaign:
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
         driving: Trials in which the base moves.
         carried: Whether every trial is without physics, joints and base where they are told to be.
-        motions: CSV files of trajectories by the names of their trials, from the current folder; see
-            `twin.motions.trajectory`.
-        only: Trials to record beside these, `sweeps` for those of one joint; empty: all. A confirmation repeats those of
-            validation.
+        motions: Motions of one's own by the names of their trials.
+        only: Trials to record beside these, `sweeps` for those of one joint; empty: all but `FURTHER_SWINGS`. A
+            confirmation repeats those of validation.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]
@@ -95,4 +111,4 @@ class Campaign:
     only: tuple[TrialName, ...] = ()
     given_postures: tuple[GivenPosture, ...] = ()
     given_approaches: GivenApproaches = ()
-    motions: dict[OwnName, str] = field(default_factory=dict)
+    motions: dict[OwnName, OwnMotion] = field(default_factory=dict)

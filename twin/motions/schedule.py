@@ -11,7 +11,7 @@ from twin.motions import motion as motions
 from twin.motions.campaign import Campaign
 from twin.motions.motion import Motion
 from twin.motions.postures import sample_postures
-from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
+from twin.motions.swings import CALIBRATION_SWINGS, FURTHER_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
 from twin.motions.trajectory import read_trajectory
 from twin.random_streams import generator
 
@@ -24,15 +24,17 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
 
     Of them those the campaign asks for.
     """
+    further = {name: path for name, path in FURTHER_SWINGS.items() if name in campaign.only}
     trials = (
         *_calibration_postures(nominal, seed, campaign),
         *driving.trials(campaign),
         *_sweeps(campaign),
         *_swings("calibration", campaign.calibration_swing, CALIBRATION_SWINGS, campaign),
         *_swings("validation", campaign.validation_swing, VALIDATION_SWINGS, campaign),
+        *_swings("validation", campaign.validation_swing, further, campaign),
         *_loaded(campaign),
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
-        *(read_trajectory(path, name, campaign.rest) for name, path in campaign.motions.items()),
+        *(read_trajectory(m.file, name, m.role, campaign.rest) for name, m in campaign.motions.items()),
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
     )
     second = _confirmation(campaign, nominal, seed) if campaign.confirmation else ()

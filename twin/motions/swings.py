@@ -55,6 +55,9 @@ VALIDATION_SWINGS = {
     ),
 }
 
+FURTHER_SWINGS: dict[str, Swing] = {}
+"""Swings that are recorded where a campaign's `only` names them, in the role of validation."""
+
 
 def in_step(frequency: float, start: tuple[float, ...], amplitudes: tuple[float, ...]) -> Swing:
     """A swing of all joints at one frequency [Hz] and without phase."""

@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 
 import mjcf
+from calibration.recording import schema
 from twin.errors import TwinError
+from twin.fields.names import TORSO
 from twin.motions.motion import RATE, REST, Motion, no_dwells
 from twin.motions.swings import JOINTS
 
@@ -24,13 +26,16 @@ class InvalidTrajectory(TwinError, ValueError):
     """Positions over time that are none, or that the robot cannot follow."""
 
 
-def trajectory(id: str, t: Sequence[float] | np.ndarray, q: np.ndarray, rest: float = REST) -> Motion:
-    """A motion through joint positions at given times, in the role of a validation swing.
+def trajectory(
+    id: str, t: Sequence[float] | np.ndarray, q: np.ndarray, role: schema.Role = "validation", rest: float = REST
+) -> Motion:
+    """A motion through joint positions at given times.
 
     Args:
         id: Name of the trial.
         t: Times (n,) [s].
         q: Positions of `JOINTS` (n, 8) [m, rad].
+        role: Of the trial.
         rest: Rest before and after [s].
 
     Raises:
@@ -40,10 +45,10 @@ def trajectory(id: str, t: Sequence[float] | np.ndarray, q: np.ndarray, rest: fl
     _check(t, q)
     times = np.arange(round((t[-1] - t[0] + 2.0 * rest) * RATE) + 1) / RATE - rest + t[0]
     command = np.stack([np.interp(times, t, column) for column in q.T], axis=1)
-    return Motion(id, "validation", "swing", id, command, *no_dwells())
+    return Motion(id, role, "swing", id, command, *no_dwells())
 
 
-def read_trajectory(path: str | Path, id: str, rest: float = REST) -> Motion:
+def read_trajectory(path: str | Path, id: str, role: schema.Role, rest: float) -> Motion:
     """The motion of a CSV file.
 
     Raises:
@@ -58,7 +63,7 @@ def read_trajectory(path: str | Path, id: str, rest: float = REST) -> Motion:
             raise InvalidTrajectory(f"columns are {', '.join(names)}; there must be t, {', '.join(JOINTS)}")
         values = np.array([[float(x) for x in row] for row in rows])
         columns = [names.index(name) for name in ("t", *JOINTS)]
-        return trajectory(id, values[:, columns[0]], values[:, columns[1:]], rest)
+        return trajectory(id, values[:, columns[0]], values[:, columns[1:]], role, rest)
     except OSError as error:
         raise InvalidTrajectory(f"{where}: cannot be read: {error.strerror}") from error
     except (InvalidTrajectory, ValueError, IndexError) as error:
@@ -84,6 +89,6 @@ def _check(t: np.ndarray, q: np.ndarray) -> None:
             raise InvalidTrajectory(f"{name} is at {q[k, j]:g} at t = {t[k]:g} s; it goes from {low:g} to {high:g}")
         if (speed[:, j] > fastest + _SLACK).any():
             k = int(np.argmax(speed[:, j]))
-            raise InvalidTrajectory(
-                f"{name} moves at {speed[k, j]:.3g} [m/s, rad/s] after t = {t[k]:g} s; its limit is {fastest:g}"
-            )
+            unit = "m/s" if name == TORSO else "rad/s"
+            found = f"{name} moves at {speed[k, j]:.3g} {unit} after t = {t[k]:g} s"
+            raise InvalidTrajectory(f"{found}; its limit is {fastest:g} {unit}")
