@@ -1,107 +1,54 @@
 """Judge an estimate by the truth: parameters with their intervals, and every row of the ladder against true hand poses.
 
-    z = (estimate - truth) / sigma       for what the data fix alone, and for the identifiable combinations
-    NEES = e' C^-1 e                      over those together; its expectation is their number where the model is true
-
 The truth is read here and nowhere else. The row `floor` is the error left with the true parameters and joint angles,
 through the same measurements: T_lab_B measured, all that follows it true.
 """
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 
 from calibration import Estimate, Evaluation
 from calibration.evaluation import Row, TrialErrors, ladder, pose_errors, row_entry, scored_errors
-from calibration.inference.parameters import Model
-from calibration.inference.parameters import Parameter as EstimatedParameter
 from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
+from scenarios.score.parameters import ModelScore, ParameterScore, judge_estimate
 from twin import truth
 from twin.truth import Parameter, TruthTrial
 
-Status = Literal["estimated", "combined", "not_identifiable", "not_estimated"]
-SPAN_95 = 1.959963984540054
-"""Half width of a 95 % interval in standard deviations."""
 FLOOR = "floor"
-_ALIKE = 1e-9  # [-] share of the largest eigenvalue below which combinations repeat each other
-
-
-@dataclass(frozen=True)
-class Judged:
-    """A parameter or an identifiable combination beside its truth; NaN where there is none."""
-
-    name: str
-    unit: str
-    truth: float
-    estimate: float
-    sigma: float
-    z: float
-    status: Status
-
-
-@dataclass(frozen=True)
-class ParameterScore:
-    """A model's parameters judged.
-
-    Attributes:
-        parameters: Every parameter of the truth.
-        combinations: Identifiable combinations of more than one parameter, by their leading one.
-        coverage_95: Share of the estimated and the combinations whose 95 % interval holds the truth [-].
-        n_covered: How many of them it is.
-        n_judged: Of how many.
-        nees: Normalised estimation error squared of all of them together [-].
-        dof: Its degrees of freedom.
-    """
-
-    parameters: tuple[Judged, ...]
-    combinations: tuple[Judged, ...]
-    coverage_95: float
-    n_covered: int
-    n_judged: int
-    nees: float
-    dof: int
-
-    def save(self, folder: Path) -> None:
-        """Write score.json."""
-        text = json.dumps(self._content(), indent=1, allow_nan=False)
-        (folder / "score.json").write_text(text + "\n", encoding="utf-8")
-
-    def _content(self) -> dict[str, object]:
-        return {
-            "schema": 1,
-            "parameters": [_entry(p) for p in self.parameters],
-            "combinations": [_entry(p) for p in self.combinations],
-            "coverage_95": _finite(self.coverage_95),
-            "n_covered": self.n_covered,
-            "n_judged": self.n_judged,
-            "nees": _finite(self.nees),
-            "dof": self.dof,
-        }
 
 
 @dataclass(frozen=True)
 class Score(ParameterScore):
-    """An estimate judged.
+    """An estimate judged; coverage and NEES are the main model's.
 
     Attributes:
         rows: The ladder against the truth, floor included.
         skill: Of each row: (registration - row) / (registration - floor) in position RMSE per component [-].
         base: The base's roll and pitch by source of the wrench.
+        models: Every model by itself, the main one first.
     """
 
     rows: tuple[Row, ...]
     skill: tuple[float | None, ...]
     base: tuple[BaseScore, ...] = ()
+    models: tuple[ModelScore, ...] = ()
 
-    def _content(self) -> dict[str, object]:
+    def content(self) -> dict[str, object]:
+        """As in score.json."""
         rows = [row_entry(r) | {"skill": s} for r, s in zip(self.rows, self.skill, strict=True)]
-        return super()._content() | {"rows": rows, "base": [asdict(b) for b in self.base]}
+        n, held = (sum(getattr(score, name) for _, score in self.models) for name in ("n_judged", "n_covered"))
+        return super().content() | {
+            "models": {name: score.coverage() for name, score in self.models},
+            "every_model": {"coverage_95": held / n if n else None, "n_covered": held, "n_judged": n},
+            "rows": rows,
+            "base": [asdict(b) for b in self.base],
+        }
 
 
 def score(estimate: Estimate, evaluation: Evaluation, truth_folder: Path) -> Score:
@@ -111,82 +58,26 @@ def score(estimate: Estimate, evaluation: Evaluation, truth_folder: Path) -> Sco
         ScenarioError: The truth is missing or of other trials.
         NotCalibrated: The estimate must not be used.
     """
-    judged = judge_parameters(estimate.model(estimate.main), _read_parameters(truth_folder / "truth.json"))
+    estimated = {p.name for model in estimate.models for p in model.parameters}
+    parameters, models = judge_estimate(estimate, _read_parameters(truth_folder / "truth.json", estimated))
     pairs = [(p, _read_trial(truth_folder / "trials" / f"{p.trial_id}.nc")) for p in evaluation.predicted]
-    rows = tuple(ladder(list(_errors(pairs, _true_base_body(truth_folder))), "truth"))
-    parts: dict[str, Any] = {f.name: getattr(judged, f.name) for f in fields(judged)}
-    base = base_scores(pairs)
-    return Score(**parts, rows=rows, skill=tuple(_skill(row, rows) for row in rows), base=base)
+    rows = tuple(ladder(list(_errors(pairs, _derived(truth_folder)["T_base_base"])), "truth"))
+    main = {f.name: getattr(models[0][1], f.name) for f in fields(ParameterScore)} | {"parameters": parameters}
+    skill = tuple(_skill(row, rows) for row in rows)
+    return Score(**main, rows=rows, skill=skill, base=base_scores(pairs), models=models)
 
 
-def judge_parameters(model: Model, true: Iterable[Parameter]) -> ParameterScore:
-    """Judge a model's parameters by the true ones."""
-    true = tuple(true)
-    parameters = tuple(_parameter(name, unit, value, model) for name, unit, value in true)
-    matrix, errors, combinations = _identified(model, {name: value for name, _, value in true})
-    covered = np.abs(errors / np.sqrt(np.diag(matrix))) <= SPAN_95
-    nees, dof = _nees(errors, matrix) if len(errors) else (np.nan, 0)
-    share = float(covered.mean()) if len(covered) else np.nan
-    return ParameterScore(parameters, combinations, share, int(covered.sum()), len(covered), nees, dof)
-
-
-def _entry(judged: Judged) -> dict[str, object]:
-    return {k: _finite(v) for k, v in asdict(judged).items()}
-
-
-def _finite(value: object) -> object:
-    """JSON has no NaN: what is not known is null."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def _read_parameters(path: Path) -> tuple[Parameter, ...]:
+def _read_parameters(path: Path, estimated: Collection[str]) -> tuple[Parameter, ...]:
+    """Every parameter of the truth, and of what follows from them the stiffness and damping that were estimated."""
     try:
-        return truth.read_parameters(path)
+        derived = _derived(path.parent)
+        elements = ((m, i, j) for m in "KC" if m in derived for i in range(6) for j in range(i, 6))
+        found = (Parameter(f"suspension.{m}.{i + 1}{j + 1}", "", float(derived[m][i, j])) for m, i, j in elements)
+        return (*truth.read_parameters(path), *(p for p in found if p.name in estimated and np.isfinite(p.value)))
     except FileNotFoundError as error:
         raise ScenarioError(f"{path}: no such file; --truth names a run's truth folder") from error
     except (json.JSONDecodeError, KeyError, TypeError) as error:
         raise ScenarioError(f"{path}: not a truth.json ({error}); make the run again") from error
-
-
-def _parameter(name: str, unit: str, value: float, model: Model) -> Judged:
-    found = next((p for p in model.parameters if p.name == name), None)
-    if found is None:
-        return Judged(name, unit, value, np.nan, np.nan, np.nan, "not_estimated")
-    z = (found.value - value) / found.sigma if _has_interval(found) else np.nan
-    return Judged(name, unit, value, found.value, found.sigma, z, found.status)
-
-
-def _has_interval(p: EstimatedParameter) -> bool:
-    """Whether an estimate came with a standard deviation; other programs' need not."""
-    return p.status == "estimated" and p.sigma > 0.0
-
-
-def _identified(model: Model, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray, tuple[Judged, ...]]:
-    """Covariance (m, m) and errors (m,) of all that is identified and has a truth, and the combinations among it."""
-    names = [p.name for p in model.parameters]
-    theta = np.array([p.value for p in model.parameters])
-    true = np.array([values.get(n, np.nan) for n in names])
-    alone = [i for i, p in enumerate(model.parameters) if _has_interval(p) and np.isfinite(true[i])]
-    rows = [np.eye(len(names))[i] for i in alone]
-    judged = []
-    fixed_alone = {names[i] for i in alone}
-    for c in model.combinations:
-        if c.name in values and c.name not in fixed_alone and np.isfinite(true[c.coefficients != 0.0]).all():
-            value = float(c.coefficients @ np.nan_to_num(true))
-            unit = model.parameters[names.index(c.name)].unit
-            judged.append(Judged(c.name, unit, value, c.value, c.sigma, (c.value - value) / c.sigma, "combined"))
-            rows.append(c.coefficients)
-    A = np.array(rows).reshape(len(rows), len(names))
-    return A @ model.covariance @ A.T, A @ (theta - np.nan_to_num(true)), tuple(judged)
-
-
-def _nees(errors: np.ndarray, covariance: np.ndarray) -> tuple[float, int]:
-    """Sum e' C^+ e and the rank of C, in units of each entry's sigma."""
-    sigma = np.sqrt(np.diag(covariance))
-    values, vectors = np.linalg.eigh(covariance / sigma / sigma[:, None])
-    kept = values > _ALIKE * values[-1]
-    projected = vectors[:, kept].T @ (errors / sigma)
-    return float((projected**2 / values[kept]).sum()), int(kept.sum())
 
 
 def _errors(pairs: Iterable[tuple[PredictedTrial, TruthTrial]], T_base_body: np.ndarray) -> Iterator[TrialErrors]:
@@ -210,8 +101,9 @@ def _read_trial(path: Path) -> TruthTrial:
     return truth.read_trial(path)
 
 
-def _true_base_body(truth_folder: Path) -> np.ndarray:
-    return np.array(json.loads((truth_folder / "truth.json").read_text(encoding="utf-8"))["derived"]["T_base_base"])
+def _derived(truth_folder: Path) -> dict[str, np.ndarray]:
+    content = json.loads((truth_folder / "truth.json").read_text(encoding="utf-8"))["derived"]
+    return {name: np.array(values, dtype=float) for name, values in content.items() if values is not None}
 
 
 def _floor(trial: PredictedTrial, true: TruthTrial, T_base_body: np.ndarray) -> Prediction:

@@ -23,7 +23,7 @@ from calibration.stages.geometry.registration import register
 from calibration.stages.geometry.stage import calibrate_geometry
 from scenarios.datasets.run_spec import Magnitude
 from scenarios.files.scenario import Scenario
-from scenarios.score.score import judge_parameters
+from scenarios.score.parameters import judge_parameters
 from twin.truth import Parameter
 
 _NEW = 30  # postures the fit has not seen

@@ -18,7 +18,7 @@ from scipy import stats
 
 from scenarios.datasets.index import Row, write_whole
 from scenarios.datasets.run_spec import run_name
-from scenarios.score.score import SPAN_95
+from scenarios.score.parameters import SPAN_95
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def _nominal(model: Model) -> Iterable[Known]:
 def _scored(score: Score, model: Model) -> Iterable[Known]:
     units = {p.name: p.unit for p in model.parameters}
     terms = {c.name: _terms(c.coefficients, model, c.name) for c in model.combinations}
-    alone = ((p, ()) for p in score.parameters if p.status == "estimated")
+    alone = ((p, ()) for p in score.parameters if p.status == "estimated" and p.model in ("", model.name))
     for p, others in (*alone, *((c, terms.get(c.name, ())) for c in score.combinations)):
         if p.estimate is not None and p.truth is not None and p.sigma is not None:
             factor, unit = readable(p.name, units.get(p.name, p.unit))

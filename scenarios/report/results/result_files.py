@@ -51,6 +51,7 @@ class Scored(Entry):
     sigma: float | None = None
     z: float | None = None
     status: str
+    model: str = ""
 
 
 class Protocol(Entry):
