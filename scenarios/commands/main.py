@@ -233,7 +233,7 @@ def _of_importing_mujoco(error: Exception) -> bool:
 
 
 def _fail(error: Exception | str, code: int) -> None:
-    typer.echo(str(error), err=True)
+    typer.echo("\n".join([str(error), *getattr(error, "__notes__", ())]), err=True)
     sys.exit(code)
 
 

@@ -31,7 +31,7 @@ class Kind:
 
 
 EVALUATION = frozenset({"evaluation.json", "evaluation.nc", "predictions", "score.json"})
-REPORT = frozenset({"report.html", "figures"})
+REPORT = frozenset({"report.html", "figures", "refused.txt"})
 RUN = Kind("run", "scenario.yaml", frozenset({"scenario.yaml", "dataset", "truth", "estimate"}) | EVALUATION | REPORT)
 ESTIMATE = Kind(
     "estimate",
@@ -102,7 +102,7 @@ def check_replaceable(out: Path, kind: Kind) -> None:
         raise ScenarioError(f"{out}: is a file; name a folder")
     if Path.cwd().is_relative_to(out):
         raise ScenarioError(f"{out}: is the folder you are in; name one inside it, such as --out {kind.name}")
-    present = {path.name for path in out.iterdir()}
+    present = {path.name for path in out.iterdir() if not _is_remnant(path.name)}
     foreign = sorted(present - kind.entries)
     if foreign or (present and kind.marker not in present):
         why = f"holds {', '.join(foreign[:5])}" if foreign else f"holds no {kind.marker}"
@@ -110,6 +110,11 @@ def check_replaceable(out: Path, kind: Kind) -> None:
             f"{out}: {why}, so it is not a {kind.name} folder of this program and is left alone; "
             "name another --out, or move away what is in it"
         )
+
+
+def _is_remnant(name: str) -> bool:
+    """Whether it is a file or folder of this program that a killed process left half written."""
+    return name.startswith(".") and name.endswith((".part", ".partial"))
 
 
 @contextmanager

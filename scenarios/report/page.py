@@ -63,15 +63,15 @@ def write(run_dir: Path | str) -> None:
     folder.mkdir(exist_ok=True)
     for name, drawing in drawings.items():
         if drawing is not None:
-            _replace(folder / f"{name}.svg", drawing.file)
+            replace_text(folder / f"{name}.svg", drawing.file)
         else:
             (folder / f"{name}.svg").unlink(missing_ok=True)
-    _replace(run / "report.html", page)
+    replace_text(run / "report.html", page)
 
 
 def render(view: RunView, sections: Iterable[Section], drawings: Mapping[str, Drawing]) -> str:
     """The page: rendered twice, so that a caption's number is known where an earlier section refers to it."""
-    environment = _environment()
+    templates = environment()
     shown = [(section, values) for section in sections if (values := section.context()) is not None]
     seed = view.results.scenario.seed
     shared = {
@@ -86,13 +86,14 @@ def render(view: RunView, sections: Iterable[Section], drawings: Mapping[str, Dr
     for _ in range(2):
         figure, table = Numbers(figure.found), Numbers(table.found)
         numbers = {"figure": figure, "table": table}
-        parts = [(s, environment.get_template(s.template).render(**shared, **numbers, **v)) for s, v in shown]
+        parts = [(s, templates.get_template(s.template).render(**shared, **numbers, **v)) for s, v in shown]
     style = (_HERE / "report.css").read_text(encoding="utf-8")
-    return environment.get_template("page.html").render(**shared, parts=parts, style=style)
+    return templates.get_template("page.html").render(**shared, parts=parts, style=style)
 
 
-def _environment() -> Environment:
-    environment = Environment(
+def environment() -> Environment:
+    """The templates of the report with our formats of numbers."""
+    found = Environment(
         loader=FileSystemLoader([_HERE, _HERE / "sections"]),
         autoescape=True,
         undefined=StrictUndefined,
@@ -100,9 +101,9 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {name: getattr(formatting, name) for name in _FILTERS}
-    environment.filters["png"] = lambda data: "data:image/png;base64," + base64.b64encode(data).decode("ascii")
-    return environment
+    found.filters |= {name: getattr(formatting, name) for name in _FILTERS}
+    found.filters["png"] = lambda data: "data:image/png;base64," + base64.b64encode(data).decode("ascii")
+    return found
 
 
 def _drawing(name: str, drawn: Drawn) -> Drawing | None:
@@ -112,7 +113,12 @@ def _drawing(name: str, drawn: Drawn) -> Drawing | None:
     return Drawing(text[text.index("<svg") :].strip(), text)
 
 
-def _replace(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8", newline="\n")
-    os.replace(part, path)
+def replace_text(path: Path, text: str) -> None:
+    """Write a file whole; nothing is written through a link that somebody else put there."""
+    part = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -83,15 +83,26 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
     Raises:
         ScenarioError: `out` must not be overwritten.
         TwinError: The simulation failed.
-        CalibrationError: The data do not allow a result that may be used; nothing is written.
+        NotEnoughData, NotCalibrated: The data do not allow a result that may be used; the folder keeps the recordings,
+            and a report of why.
     """
+    from calibration.errors import NotCalibrated, NotEnoughData
+
     scenario = scenario.quick() if quick else scenario
+    refused: NotCalibrated | NotEnoughData | None = None
     with folder.replacing(out, folder.RUN) as new, one_blas_thread():
         _simulate(scenario, new, progress)
-        estimate = _calibrate(new / "dataset", new / "estimate", None, scenario.calibration, progress)
-        evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
-        score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation, progress)
-        _report(new, progress)
+        try:
+            estimate = _calibrate(new / "dataset", new / "estimate", None, scenario.calibration, progress)
+            evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
+            score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation, progress)
+            _report(new, progress)
+        except (NotCalibrated, NotEnoughData) as error:
+            refused = error
+            _refuse(new, error, progress)
+    if refused is not None:
+        refused.add_note(f"The recordings are kept, with a report of why: {Path(out) / 'report.html'}")
+        raise refused
     return RunResult(Path(out), scenario, estimate, evaluation, score)
 
 
@@ -242,8 +253,17 @@ def _score(
     return scored
 
 
+def _refuse(run_folder: Path, why: Exception, progress: Progress) -> None:
+    from scenarios import report as page
+
+    progress("report", "", 0.0)
+    (run_folder / page.REASON).write_text(f"{why}\n", encoding="utf-8")
+    page.write_refusal(run_folder)
+
+
 def _report(run_folder: Path, progress: Progress) -> None:
     from scenarios import report as page
 
     progress("report", "", 0.0)
-    page.write(run_folder)
+    is_refused = (run_folder / page.REASON).is_file() and not (run_folder / "evaluation.json").is_file()
+    (page.write_refusal if is_refused else page.write)(run_folder)

@@ -4,6 +4,7 @@ Real robot, measured base, link encoders, constants removed per axis: another pr
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -17,7 +18,13 @@ MEDIANS = ((12.7, 8.4, 4.6, 2.8), (5.1, 2.9, 2.6, 1.3), (18.4, 14.3, 6.8, 5.4))
 ORIENTATION = {NOMINAL: 8.57, "model_3": 2.71}
 """RMSE of the angle [deg]."""
 
-_LOOK = {"color": "#b5179e", "markersize": 5, "markerfacecolor": "none", "linestyle": "none", "zorder": 5}
+_LOOK: dict[str, Any] = {
+    "color": "#b5179e",
+    "markersize": 5,
+    "markerfacecolor": "none",
+    "linestyle": "none",
+    "zorder": 5,
+}
 
 
 def paper_steps(steps: Sequence[Step]) -> tuple[Step, ...]:

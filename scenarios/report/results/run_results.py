@@ -80,7 +80,7 @@ def read(run: Path) -> Results:
         traces=read_traces(run / "evaluation.nc"),
         score=_json(run / "score.json", Score) if (run / "score.json").is_file() else None,
         estimate=calibration.load_estimate(estimate) if (estimate / "estimate.json").is_file() else None,
-        scenario=_scenario(run / "scenario.yaml"),
+        scenario=read_scenario(run / "scenario.yaml"),
         stiffness=_matrix(derived.K),
         damping=_matrix(derived.C),
         dataset=loaded,
@@ -104,7 +104,12 @@ def _json(path: Path, model: type[M]) -> M:
         raise ScenarioError(_findings(path, error)) from error
 
 
-def _scenario(path: Path) -> ScenarioNote:
+def read_scenario(path: Path) -> ScenarioNote:
+    """Name, seed and versions of a run; empty where there is no file.
+
+    Raises:
+        ScenarioError: The file cannot be read.
+    """
     if not path.is_file():
         return ScenarioNote()
     try:

@@ -28,7 +28,7 @@ def engines(monkeypatch, tmp_path):
     for name, content in (
         ("files.scenario", {"Scenario": Scenario}),
         ("score.score", {"score": fakes.score}),
-        ("report", {"write": fakes.report}),
+        ("report", {"write": fakes.report, "write_refusal": fakes.refusal, "REASON": "refused.txt"}),
     ):
         module = ModuleType(f"scenarios.{name}")
         vars(module).update(content)

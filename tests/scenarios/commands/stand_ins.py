@@ -95,6 +95,9 @@ class Engines:
         self.step("report", run_dir)
         (Path(run_dir) / "report.html").write_text("<html>")
 
+    def refusal(self, run_dir):
+        (Path(run_dir) / "report.html").write_text("<html>not calibrated")
+
     @staticmethod
     def saves(name, content=None):
         def save(folder):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from calibration.errors import CalibrationError, InputError
+from calibration.errors import CalibrationError, InputError, NotCalibrated, NotEnoughData
 from scenarios.commands import main
 from scenarios.files.errors import ScenarioError
 from tests.scenarios.commands.stand_ins import YAML, here
@@ -42,6 +42,20 @@ def test_an_error_is_one_message_and_leaves_the_old_run(engines, tiago_twin, ste
     assert here() == before
     assert tiago_twin("run", "small", "--out", "new")[0] == expected
     assert here() == before
+
+
+@pytest.mark.parametrize("error", [NotEnoughData("6 postures; record 7 more"), NotCalibrated(["rank 3 of 9"])])
+def test_a_refused_run_keeps_its_recordings_and_a_report_of_why(engines, tiago_twin, error):
+    engines.fail["calibrate"] = error
+    code, out, err = tiago_twin("run", "small", "--out", "x")
+    last = ["The recordings are kept, with a report of why: x/report.html"]
+    assert (code, out, err.splitlines()[-2:]) == (1, "", [str(error), *last])
+    assert Path("x/refused.txt").read_text() == f"{error}\n"
+    assert {path.name for path in Path("x").iterdir()} >= {"dataset", "truth", "report.html", "scenario.yaml"}
+    assert tiago_twin("report", "x")[0] == 0, "from what is saved"
+    engines.fail.clear()
+    assert tiago_twin("run", "small", "--out", "x")[0] == 0
+    assert not Path("x/refused.txt").exists()
 
 
 def test_a_mistake_of_ours_is_not_hidden(engines, tiago_twin):

@@ -11,7 +11,7 @@ import pytest
 
 from scenarios.files import output_folder
 from scenarios.files.errors import ScenarioError
-from scenarios.files.output_folder import RUN, replacing, updating
+from scenarios.files.output_folder import RUN, check_replaceable, replacing, updating
 
 
 def tree(top: Path) -> dict[str, str]:
@@ -164,3 +164,13 @@ def test_ctrl_c_in_a_real_process_leaves_nothing(tmp_path):
     process.communicate(timeout=10)
     assert process.returncode != 0
     assert tree(tmp_path) == {}
+
+
+def test_what_a_killed_process_left_is_no_file_of_the_users(tmp_path):
+    (tmp_path / "run").mkdir()
+    for name in ("scenario.yaml", ".report.html.1a2b3c4d.part"):
+        (tmp_path / "run" / name).write_text("")
+    check_replaceable(tmp_path / "run", RUN)
+    (tmp_path / "run" / "notes.part").write_text("")
+    with pytest.raises(ScenarioError, match=r"holds notes\.part"):
+        check_replaceable(tmp_path / "run", RUN)

@@ -14,7 +14,7 @@ from calibration.evaluation.ladder import ladder
 from calibration.verdict import Verdict
 from scenarios.commands import main
 from scenarios.files.errors import ScenarioError
-from scenarios.report import write
+from scenarios.report import write, write_refusal
 from scenarios.report.results import figures
 from scenarios.report.results.formatting import cell, count, decimals, error, fixed, readable, significant
 from scenarios.report.results.headline import headline
@@ -303,3 +303,23 @@ def test_numbers_have_the_digits_that_mean_something():
     assert [decimals(s) for s in (0.0996, 0.17, 1.04, 26.0, 0.0, None)] == [2, 2, 1, 0, 3, 3]
     assert readable("clock.robot.drift", "-") == (1e6, "ppm")
     assert readable("gear.arm_1_joint.compliance", "rad/(N.m)") == (1.0, "rad/(N.m)")
+
+
+def test_a_refused_run_has_a_report_that_says_why(run):
+    for name in ("evaluation.json", "evaluation.nc", "score.json"):
+        (run / name).unlink()
+    (run / "refused.txt").write_text("6 postures; record <7> more\n")
+    write_refusal(run)
+    text = Page(run / "report.html").text
+    assert "not calibrated" in text
+    assert "6 postures; record <7> more" in text
+    assert "Warning, geometry: arm_3 never moved" in text
+    assert "xyz validation swing 2.0" in text
+
+
+def test_nothing_is_written_through_a_link(run, tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    (run / "report.html.part").symlink_to(tmp_path / "mine")
+    write(run)
+    assert (tmp_path / "mine").read_text() == "mine"
+    assert not [path for path in run.iterdir() if path.name.startswith(".")]
