@@ -84,9 +84,14 @@ class Engines:
 
     def evaluate(self, estimate, dataset, progress=None):
         self.step("evaluate", dataset)
-        return SimpleNamespace(save=self.saves("evaluation.json", {"rows": [{**ROW, "against": "mocap"}]}))
 
-    def score(self, estimate, dataset, truth_dir, evaluation):
+        def save_predictions(folder):
+            (folder / "predictions").mkdir()
+
+        save = self.saves("evaluation.json", {"rows": [{**ROW, "against": "mocap"}]})
+        return SimpleNamespace(save=save, save_predictions=save_predictions)
+
+    def score(self, estimate, evaluation, truth_dir):
         self.step("score", truth_dir)
         row = {**ROW, "model": "floor", "against": "truth"}
         return SimpleNamespace(save=self.saves("score.json", {"rows": [row]}))

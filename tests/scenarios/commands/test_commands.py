@@ -48,7 +48,7 @@ def test_run_writes_the_folder_and_prints_verdict_and_report(engines, tiago_twin
     code, out, err = tiago_twin("run", "small")
     assert code == 0, err
     written = {path.name for path in Path("runs/small").iterdir()}
-    assert written == RUN.entries - {"evaluation.nc"}
+    assert written == RUN.entries - {"evaluation.nc", "refused.txt"}
     assert out.splitlines() == ["Calibrated.", f"Report: {Path('runs/small/report.html')}"]
 
 
