@@ -18,6 +18,7 @@ from calibration.checks.recordings import check
 from calibration.errors import InputError, InputErrors, NoSuchElement
 from calibration.formats.mapping.channels import Joints, Markers, Plates, Reader, Recorded
 from calibration.formats.mapping.dwell_means import rests_of
+from calibration.formats.mapping.found_dwells import with_rests
 from calibration.formats.mapping.mapping import MappedTrial, MappingFile
 from calibration.formats.mapping.marker_bodies import in_order, placed_bodies, unmatched
 from calibration.recording.dataset import Dataset
@@ -123,8 +124,9 @@ def _read_all(files: Sequence[Path], reader: Reader, mapping: MappingFile) -> di
     if problems:
         raise InputErrors(problems)
     turned = mapping.content.reversed_effort
-    placed = {t.id: _placed(t, read[t.stem].with_currents_turned(turned)) for t in trials}
-    return {t.id: rests_of(mapping, t, placed[t.id]) for t in trials}
+    placed = [_placed(t, read[t.stem].with_currents_turned(turned)) for t in trials]
+    rested = with_rests(mapping, placed)
+    return {t.id: rests_of(mapping, t, r) for t, r in zip(trials, rested, strict=True)}
 
 
 def _placed(trial: MappedTrial, recorded: Recorded) -> Recorded:
@@ -239,8 +241,13 @@ def _write(
     (out / "nominal.urdf").write_text(urdf, encoding="utf-8")
 
 
-def refuse_foreign(kind: str, files: Sequence[Path]) -> None:
-    """Refuse files of another format than `kind`: c3d, csv or bag.
+def format_of(path: Path) -> str:
+    """c3d, csv or bag, by suffix; a folder is a bag of ROS 2."""
+    return _OURS.get(path.suffix.lower(), "bag")
+
+
+def refuse_foreign(kind: str | None, files: Sequence[Path]) -> None:
+    """Refuse files of another format than `kind`: c3d, csv or bag; of any other than these where it is None.
 
     Raises:
         InputError: It names each file, what it is by its suffix, and what to do.
@@ -248,11 +255,13 @@ def refuse_foreign(kind: str, files: Sequence[Path]) -> None:
     found = []
     for path in files:
         suffix = path.suffix.lower()
-        ours = _OURS.get(suffix, kind)
+        ours = kind if kind is None else _OURS.get(suffix, kind)
         if ours != kind and not path.is_dir():
             found.append(InputError(path, f"is no {kind} by its suffix; read it with `tiago-twin import {ours}`"))
         elif suffix in _INSTEAD:
             found.append(InputError(path, f"is {_INSTEAD[suffix]}"))
+        elif kind is None and suffix not in _OURS and not path.is_dir():
+            found.append(InputError(path, "is no C3D, CSV or bag by its suffix"))
     if found:
         raise InputErrors(found)
 

@@ -5,23 +5,40 @@ from typing import Annotated, Literal
 
 import typer
 
+from scenarios.files.errors import ScenarioError
+
+FORMATS = ("c3d", "csv", "bag")
+
 
 def import_(
-    kind: Annotated[Literal["c3d", "csv", "bag"], typer.Argument(metavar="FORMAT", help="Of the files.")],
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files are matched to trials by name.")],
-    mapping: Annotated[
-        Path,
-        typer.Option("--map", metavar="YAML", help="Mapping: frames, units, roles; see docs/recording.md."),
-    ],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")],
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[FORMAT] FILE...", help="Matched to trials by name; those of the mapping unless given."
+        ),
+    ] = None,
+    mapping: Annotated[Path | None, typer.Option("--map", metavar="YAML", help="Frames, units, trial roles.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The dataset folder to write.")] = None,
     add_to: Annotated[
         Path | None, typer.Option(metavar="DATASET", help="Add these instruments to the trials of this dataset.")
     ] = None,
+    init: Annotated[
+        Path | None, typer.Option(metavar="YAML", help="Draft this mapping from the files instead.")
+    ] = None,
+    urdf: Annotated[Path | None, typer.Option(metavar="URDF", help="Your robot, with --init.")] = None,
 ) -> None:
-    """Write a dataset from laboratory files."""
+    """Write a dataset from laboratory files, or draft the mapping that reads them (--init)."""
     from scenarios.steps import import_export
 
-    for note in import_export.import_files(kind, files, mapping, out, add_to):
+    given = list(files or [])
+    kind = str(given.pop(0)) if given and str(given[0]) in FORMATS else None
+    if init is not None:
+        typer.echo(import_export.init_mapping(given, init, urdf), nl=False)
+        typer.echo(f"\nMapping: {init}; check its lines marked CHOOSE", err=True)
+        return
+    if mapping is None or out is None:
+        raise ScenarioError("import: name a mapping with --map and a folder with --out; --init drafts a mapping")
+    for note in import_export.import_files(kind, given, mapping, out, add_to):
         typer.echo(note)
     typer.echo(f"Dataset: {out}")
 

@@ -8,7 +8,7 @@ An override is text, `path.to.field=value`, its value read as YAML.
 import datetime
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,6 +29,7 @@ def read(
     model: type[T],
     overrides: Sequence[str | Override] = (),
     beside: Mapping[str, Any] | None = None,
+    prepare: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> T:
     """Read, override and validate one file.
 
@@ -38,6 +39,7 @@ def read(
         overrides: `path.to.field=value` from the command line, or values of another file; applied before validation,
             in this order.
         beside: Types of further top-level keys, which are validated and then left out.
+        prepare: Writes out short forms of the file's values before they are validated.
 
     Raises:
         ScenarioError: Something is wrong; every finding, one a line.
@@ -45,6 +47,7 @@ def read(
     path = Path(path)
     tree = mapping(path)
     values = _plain(tree, str(path))
+    values = values if prepare is None else prepare(values)
     found, values = _split_beside(Source(str(path), tree, values), beside or {})
     adapter = TypeAdapter(model)
     applied = [given if isinstance(given, Override) else _override(given) for given in overrides]

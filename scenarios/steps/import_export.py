@@ -1,11 +1,14 @@
 """Laboratory files into a dataset folder, and out of one: the commands `import` and `export`."""
 
+import os
 from collections.abc import Sequence
+from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from scenarios.files import output_folder, yaml_file
 from scenarios.files.errors import ScenarioError
+from scenarios.steps import drawing_file
 
 if TYPE_CHECKING:
     from calibration.formats.mapping.channels import Reader
@@ -19,13 +22,13 @@ MAPPING = "mapping.yaml"
 
 
 def import_files(
-    kind: str, files: Sequence[Path], mapping: Path, out: Path, add_to: Path | None = None
+    kind: str | None, files: Sequence[Path], mapping: Path, out: Path, add_to: Path | None = None
 ) -> tuple[str, ...]:
-    """Write the dataset folder `out` from files of one format; return what was recognised in them.
+    """Write the dataset folder `out` from laboratory files; return what was recognised in them.
 
     Args:
-        kind: `c3d`, `csv` or `bag`.
-        files: The files; each belongs to the trial of its name.
+        kind: `c3d`, `csv` or `bag`; None: each by its suffix.
+        files: The files, those the mapping names where there are none; each belongs to the trial of its name.
         mapping: The mapping file.
         out: The dataset folder; an earlier dataset there is replaced.
         add_to: A dataset imported before whose trials gain these files' channels.
@@ -36,15 +39,114 @@ def import_files(
     """
     from calibration.formats.importer import import_files as write
     from calibration.formats.importer import refuse_foreign
-    from calibration.formats.mapping.mapping import Mapping, MappingFile
+    from calibration.formats.mapping.mapping import MappingFile
     from calibration.recording import load
 
+    described = read_mapping(mapping)
+    files = files or files_of(described.files, mapping)
     refuse_foreign(kind, files)
-    described = yaml_file.read(mapping, Mapping)
     source = MappingFile(mapping, described, _urdf(described, mapping))
     before = None if add_to is None else load(add_to)
     with output_folder.replacing(out, output_folder.DATASET) as new:
         return write(files, _reader(kind, source), source, new, before)
+
+
+def read_mapping(path: Path) -> "Mapping":
+    """The mapping of a file, its short forms written out.
+
+    Raises:
+        ScenarioError: It is malformed; all findings.
+    """
+    from calibration.formats.mapping.mapping import Mapping
+    from calibration.formats.mapping.short_form import written_out
+
+    def prepared(values: dict[str, Any]) -> dict[str, Any]:
+        values = dict(values)
+        if isinstance(values.get("bodies"), str):
+            values["bodies"] = drawing_file.bodies(path.parent / values["bodies"])
+        setup = values.get("setup")
+        if isinstance(setup, dict) and setup.get("wheels") == PACKAGED:
+            values["setup"] = setup | {"wheels": _wheels()}
+        return written_out(values)
+
+    return yaml_file.read(path, Mapping, prepare=prepared)
+
+
+def files_of(patterns: Sequence[str], mapping: Path) -> tuple[Path, ...]:
+    """The files a mapping names, patterns beside it.
+
+    Raises:
+        ScenarioError: It names none, or a pattern fits none.
+    """
+    if not patterns:
+        raise ScenarioError(f"{mapping}: files: none named there or on the command line")
+    found: dict[Path, None] = {}
+    for pattern in patterns:
+        fitting = sorted(mapping.parent.glob(pattern)) if not Path(pattern).is_absolute() else [Path(pattern)]
+        some = [p for p in fitting if p.suffix.lower() != ".csv" or not drawing_file.is_drawing(p)]
+        if not some:
+            raise ScenarioError(f"{mapping}: files: {pattern} fits no file in {mapping.parent.resolve().name}")
+        found |= dict.fromkeys(some)
+    return tuple(found)
+
+
+def init_mapping(files: Sequence[Path], out: Path, urdf: Path | None = None) -> str:
+    """Write a mapping file drafted from laboratory files; return its text.
+
+    Args:
+        files: All files of the session, of any formats; a table of marker bodies may be among them.
+        out: The mapping file.
+        urdf: The nominal robot; the one that comes with this program unless given.
+
+    Raises:
+        ScenarioError: `out` exists, or the URDF cannot be read.
+        InputError: A file cannot be read; all findings.
+    """
+    from calibration.formats.survey.draft import Drawing, draft, session_of
+
+    if out.exists():
+        raise ScenarioError(
+            f"{out}: exists; a mapping is written by hand from then on: name another file, or remove it"
+        )
+    drawn = [p for p in files if p.suffix.lower() == ".csv" and drawing_file.is_drawing(p)]
+    if len(drawn) > 1:
+        raise ScenarioError(f"{drawn[1]}: a second table of marker bodies; {drawn[0]} is one")
+    recordings = [p for p in files if p not in drawn]
+    drawing = None
+    if drawn:
+        drawing = Drawing(_beside(drawn[0], out), drawing_file.names(drawn[0]))
+    name = PACKAGED if urdf is None else _beside(urdf, out)
+    session = session_of(recordings, _robot(name, out), drawing)
+    wheels = PACKAGED if urdf is None and any(view.plates for view in session.views) else None
+    text = draft(session, name, _patterns(recordings, out), wheels)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(text, encoding="utf-8")
+    return text
+
+
+def _beside(path: Path, mapping: Path) -> str:
+    """A path as seen from the mapping's folder."""
+    return Path(os.path.relpath(path.resolve(), mapping.resolve().parent)).as_posix()
+
+
+def _patterns(files: Sequence[Path], mapping: Path) -> list[str]:
+    """Paths beside the mapping; all of one suffix in a folder as one pattern."""
+    found: dict[str, None] = {}
+    given = {p.resolve() for p in files}
+    for path in files:
+        like = set(path.resolve().parent.glob(f"*{path.suffix}")) if path.suffix else set()
+        like = {p for p in like if p.suffix.lower() != ".csv" or not drawing_file.is_drawing(p)}
+        every = len(like) > 1 and like <= given
+        found[_beside(path.parent / f"*{path.suffix}" if every else path, mapping)] = None
+    return list(found)
+
+
+def _wheels() -> list[dict[str, Any]]:
+    import mjcf
+
+    return [
+        {"name": w.name, "type": w.type, "centre": list(w.centre), "contact": list(w.contact)} for w in mjcf.wheels()
+    ]
 
 
 def export_files(kind: str, dataset: Path, out: Path, ros: int = 1) -> tuple[str, ...]:
@@ -64,6 +166,7 @@ def export_files(kind: str, dataset: Path, out: Path, ros: int = 1) -> tuple[str
     with output_folder.replacing(out, _exported(kind, [t.id for t in source.description.trials])) as new:
         mapping, notes = export_trials(kind, source, new, ros)
         yaml_file.write(new / MAPPING, mapping)
+        drawing_file.write(new / drawing_file.NAME, source.description.bodies)
     return notes
 
 
@@ -94,10 +197,28 @@ def _exported(kind: str, trials: Sequence[str]) -> output_folder.Kind:
         "bag": (".bag", ""),
     }
     files = {f"{trial}{suffix}" for trial in trials for suffix in suffixes[kind]}
-    return output_folder.Kind(f"{kind} export", MAPPING, frozenset(files | {MAPPING, "nominal.urdf"}))
+    return output_folder.Kind(
+        f"{kind} export", MAPPING, frozenset(files | {MAPPING, "nominal.urdf", drawing_file.NAME})
+    )
 
 
-def _reader(kind: str, mapping: "MappingFile") -> "Reader":
+def _reader(kind: str | None, mapping: "MappingFile") -> "Reader":
+    """Of one format, or of each file by its suffix."""
+    from calibration.formats.importer import format_of
+    from calibration.formats.mapping.channels import Reader, Recorded
+
+    if kind is not None:
+        return _reader_of(kind, mapping)
+
+    def read(paths: Sequence[Path]) -> Recorded:
+        kinds = dict.fromkeys(format_of(p) for p in paths)
+        parts = (_reader_of(k, mapping).read([p for p in paths if format_of(p) == k]) for k in kinds)
+        return reduce(Recorded.with_channels_of, parts)
+
+    return Reader(read, lambda path: _reader_of(format_of(path), mapping).stem(path))
+
+
+def _reader_of(kind: str, mapping: "MappingFile") -> "Reader":
     from calibration.formats.bag.read import bag_reader
     from calibration.formats.c3d.read import c3d_reader
     from calibration.formats.csv.read import csv_reader
@@ -113,11 +234,15 @@ def _reader(kind: str, mapping: "MappingFile") -> "Reader":
 
 
 def _urdf(mapping: "Mapping", path: Path) -> str:
-    if mapping.urdf == PACKAGED:
+    return _robot(mapping.urdf, path)
+
+
+def _robot(name: str, path: Path) -> str:
+    if name == PACKAGED:
         import mjcf
 
         return mjcf.urdf()
-    found = path.parent / mapping.urdf
+    found = path.parent / name
     try:
         return found.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from calibration.errors import InputError
-from calibration.formats.bag.messages import PREFIX, SUFFIXES, typestore
+from calibration.formats.bag.messages import JOINT_STATE, PREFIX, STATISTICS_NAMES, SUFFIXES, typestore
 from calibration.formats.mapping.channels import Joints, Reader, Recorded
 from calibration.formats.mapping.layouts import BagLayout
 
 _FIELDS = tuple(SUFFIXES)
+_FIRST = 200  # messages from which the names of joints are taken
 _COMPRESSION = "ompression"  # in every message of rosbags about one it does not know
 
 
@@ -61,6 +62,32 @@ def _messages(path: Path, topics: Sequence[str]) -> dict[str, list[Any]]:
     if empty:
         raise InputError(path, f"no messages on {empty}; the bag has {known}; correct the mapping file")
     return found
+
+
+def topics_of(path: Path) -> dict[str, tuple[str, set[str]]]:
+    """Message type and names of joints in the first messages of every topic of a bag.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    store = typestore(2)
+    from rosbags.highlevel import AnyReader
+
+    try:
+        with AnyReader([path], default_typestore=store) as bag:
+            kinds = {c.topic: c.msgtype for c in bag.connections}
+            named = [c for c in bag.connections if c.msgtype in (JOINT_STATE, STATISTICS_NAMES)]
+            names: dict[str, set[str]] = {c.topic: set() for c in bag.connections}
+            for k, (connection, _, raw) in enumerate(bag.messages(named)):
+                message = bag.deserialize(raw, connection.msgtype)
+                listed = message.name if connection.msgtype == JOINT_STATE else message.names
+                bare = (n.removeprefix(PREFIX) for n in listed)
+                names[connection.topic] |= {n.removesuffix(SUFFIXES["q_motor"]) for n in bare}
+                if k > _FIRST:
+                    break
+    except _unreadable() as error:
+        raise InputError(path, f"cannot be read as a ROS bag ({error}); truncated? copy it again") from error
+    return {topic: (kinds[topic], names[topic]) for topic in kinds}
 
 
 def _unreadable() -> tuple[type[Exception], ...]:

@@ -40,7 +40,7 @@ def read_plates(
     for name, mapped in layout.plates.items():
         if name not in known:
             raise InputError(file.path, f"plate {name!r} of the mapping is not in its setup, which has {sorted(known)}")
-        plate, channels = _plate(file, mapped, factor, analogs)
+        plate, channels = plate_of(file, mapped, factor, analogs)
         _check_place(file, name, plate, known[name])
         stored = moved_to(lab_wrench(plate, channels), plate.centre, np.array(known[name].centre))
         wrenches.append(stored if mapped.convention == "action" else -stored)
@@ -53,7 +53,7 @@ def read_plates(
     return Plates(t, tuple(layout.plates), np.stack(wrenches, axis=1)[:n], centre), tuple(notes)
 
 
-def _plate(file: C3dFile, mapped: C3dPlateMap, factor: float, analogs: np.ndarray) -> tuple[C3dPlate, np.ndarray]:
+def plate_of(file: C3dFile, mapped: C3dPlateMap, factor: float, analogs: np.ndarray) -> tuple[C3dPlate, np.ndarray]:
     """A plate's parameters and its six channels, SI; type 4 channels stay volts."""
     k, used = mapped.number - 1, int(np.ravel(file.parameter("FORCE_PLATFORM", "USED", [0]))[0])
     if k >= used:
@@ -75,7 +75,7 @@ def _plate(file: C3dFile, mapped: C3dPlateMap, factor: float, analogs: np.ndarra
     if plate.origin[2] > 0.0:
         raise InputError(
             file.path,
-            f"plate {mapped.number}: ORIGIN z is {1e3 * origin[2]:+.1f} mm, the transducer above the surface; "
+            f"plate {mapped.number}: ORIGIN z is {1e3 * plate.origin[2]:+.1f} mm, the transducer above the surface; "
             "if the program stores it the other way round, map `origin: surface_to_transducer`, else mend the file",
         )
     return plate, analogs[:, chosen]
@@ -133,8 +133,8 @@ def read_c3d(files: Sequence[Path], layout: C3dLayout, setup: Setup) -> Recorded
     if len(files) > 1:
         raise InputError(files[1], f"one C3D file a trial; {files[0]} has the same name")
     file = C3dFile(files[0])
-    factor = _length_unit(file)
-    rate, start, own = _times(file)
+    factor = length_unit(file)
+    rate, start, own = times_of(file)
     t = (start * rate + np.arange(file.header.frames)) / rate
     markers = _markers(file, layout, factor, t)
     plates, notes = read_plates(file, layout, setup, factor, start)
@@ -147,14 +147,15 @@ def read_c3d(files: Sequence[Path], layout: C3dLayout, setup: Setup) -> Recorded
     return Recorded(str(file.path), markers, plates=plates, dwells=dwells, together=together, notes=notes)
 
 
-def _length_unit(file: C3dFile) -> float:
+def length_unit(file: C3dFile) -> float:
+    """POINT:UNITS [m]."""
     units = file.parameter("POINT", "UNITS", [])
     if len(units) != 1 or units[0] not in LENGTHS:
         raise InputError(file.path, f"POINT:UNITS is {units}, expected mm or m; set it in the exporting program")
     return LENGTHS[units[0]]
 
 
-def _times(file: C3dFile) -> tuple[float, float, dict[str, float]]:
+def times_of(file: C3dFile) -> tuple[float, float, dict[str, float]]:
     """Marker rate [Hz], time of the first frame [s], and the file's own clocks."""
     rate = float(np.ravel(file.parameter("POINT", "RATE", [0.0]))[0])
     if not rate > 0.0:

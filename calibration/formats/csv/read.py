@@ -180,7 +180,7 @@ def _wrench(text: CsvText, channels: PlateChannels, plate: Plate) -> tuple[np.nd
     force = text.numbers(channels.force) * channels.signs
     moment = text.numbers(channels.moment, MOMENTS[channels.moment_unit])
     wrench = to_action(force, moment, channels, plate)
-    cop = text.numbers(channels.cop, LENGTHS[channels.cop_unit]) if channels.cop else None
+    cop = text.numbers(channels.cop, LENGTHS[channels.cop_unit], gaps=True) if channels.cop else None
     place = f"{text.path}: {', '.join((*channels.force, *channels.moment))}"
     return wrench, checked_against_cop(place, force, moment, cop, channels, plate)
 

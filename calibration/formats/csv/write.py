@@ -2,7 +2,8 @@
 
     <trial>.mocap.csv     t, <marker>_{x,y,z} [m]              <trial>.robot.csv   t, <joint>_{motor,link,...} [rad]
                                                                wrist_{Fx..Mz} [N, N.m] ACTION of the hand on the sensor
-    <trial>.plate.csv     t, <plate>_{Fx..Mz} [N, N.m] ACTION, lab axes, about the surface centre
+    <trial>.plate.csv     t, <plate>_{Fx..Mz} [N, N.m] ACTION, lab axes, about the surface centre;
+                          <plate>_COP{x,y,z} [m, lab], empty while it is not loaded
     <trial>.postures.csv  the means
 
 Numbers are written with the digits their stored precision has, so that reading them back gives the same bits.
@@ -13,11 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from calibration.formats.mapping.layouts import PlateChannels, WristChannels
+from calibration.numerics.wrench import centre_of_pressure
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.trial import Trial
 
 FIELDS = {"motor": "q_motor", "link": "q_link", "velocity": "v_motor", "effort": "effort", "command": "q_command"}
 _COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+_COP = ("COPx", "COPy", "COPz")
 WRIST = tuple(f"wrist_{c}" for c in _COMPONENTS)
 
 
@@ -34,9 +37,11 @@ def write_csv(folder: Path, trial: Trial) -> None:
             names, table = [*names, *WRIST], np.concatenate([table, trial.wrist_wrench], axis=1)
         _write(folder / f"{trial.id}.robot.csv", names, trial.t_robot, table)
     if len(trial.t_plate):
-        names = [f"{plate}_{c}" for plate in trial.plate for c in _COMPONENTS]
-        wrench = trial.plate_wrench.reshape(len(trial.t_plate), -1)
-        _write(folder / f"{trial.id}.plate.csv", names, trial.t_plate, wrench)
+        names = [f"{plate}_{c}" for plate in trial.plate for c in (*_COMPONENTS, *_COP)]
+        wrenches = trial.plate_wrench.swapaxes(0, 1)
+        cop = [centre_of_pressure(w, c) for w, c in zip(wrenches, trial.plate_centre, strict=True)]
+        both = np.concatenate([trial.plate_wrench, np.stack(cop, axis=1)], axis=2)
+        _write(folder / f"{trial.id}.plate.csv", names, trial.t_plate, both.reshape(len(both), -1))
 
 
 def write_means_csv(folder: Path, means: PostureMeans) -> None:
@@ -48,9 +53,9 @@ def write_means_csv(folder: Path, means: PostureMeans) -> None:
 
 def plate_columns(plate: str) -> PlateChannels:
     """How the mapping file describes a plate's columns."""
-    fx, fy, fz, mx, my, mz = (f"{plate}_{c}" for c in _COMPONENTS)
+    fx, fy, fz, mx, my, mz, x, y, z = (f"{plate}_{c}" for c in (*_COMPONENTS, *_COP))
     return PlateChannels(
-        force=(fx, fy, fz), moment=(mx, my, mz), convention="action", axes="lab", about="centre",
+        force=(fx, fy, fz), moment=(mx, my, mz), cop=(x, y, z), convention="action", axes="lab", about="centre",
         force_unit="N", moment_unit="N.m",
     )  # fmt: skip
 

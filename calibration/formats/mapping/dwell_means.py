@@ -6,6 +6,7 @@ Readings and markers must have been sampled together, on one clock; each rest lo
 (`postures.inner_windows`).
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +14,8 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.formats.mapping.channels import Joints, Markers, Means, Recorded
 from calibration.formats.mapping.mapping import MappedTrial, MappingFile
+from calibration.formats.mapping.rests import offset_between, rests
 from calibration.mocap.postures import BLOCKS, inner_windows
-from calibration.recording.schema import HAND
 
 _LEAST = 1e-6  # smallest standard deviation of a mean [m]
 
@@ -25,7 +26,7 @@ def rests_of(mapping: MappingFile, trial: MappedTrial, recorded: Recorded) -> Re
     Raises:
         InputError: Such a recording is not of static postures on one clock with the markers, or does not say when.
     """
-    hand = next((b for b in mapping.content.bodies if b.name == HAND), None)
+    hand = next((b for b in mapping.content.bodies if b.name == mapping.content.hand_name), None)
     joints, markers = recorded.joints, recorded.markers
     if hand is None or not 0 < len(hand.marker_names) < 3 or joints is None or markers is None:
         return recorded
@@ -38,6 +39,27 @@ def rests_of(mapping: MappingFile, trial: MappedTrial, recorded: Recorded) -> Re
         what = "shows no turn to tell the readings' clock from; sample both together, or put three markers on the hand"
         raise InputError(recorded.file, f"{few} {what}")
     return replace(recorded, markers=None, joints=None, plates=None, dwells=None, means=_means(joints, markers, dwells))
+
+
+def posture_means(trials: Sequence[Recorded], one_clock: bool) -> list[Recorded]:
+    """Continuous trials with dwells as the means over them, for where marker bodies are; those without are left out.
+
+    Args:
+        trials: What was recorded.
+        one_clock: Whether readings are on the markers' clock; else they are shifted to where their rests are dwells.
+    """
+    whole = [r for r in trials if r.dwells is not None and len(r.dwells) and r.joints and r.markers]
+    read = [rests(r.joints.t, r.joints.q_motor) for r in whole if r.joints]
+    offset = 0.0 if one_clock else offset_between([np.asarray(r.dwells) for r in whole], read)
+    if not np.isfinite(offset):
+        return []
+    return [
+        replace(
+            r, means=_means(replace(r.joints, t=r.joints.t + offset), r.markers, r.dwells), joints=None, markers=None
+        )
+        for r in whole
+        if r.joints and r.markers and r.dwells is not None
+    ]
 
 
 def _means(joints: Joints, markers: Markers, dwells: np.ndarray) -> Means:

@@ -13,6 +13,8 @@ from pydantic import Field, model_validator
 from calibration.errors import InputError
 from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable
 from calibration.recording.schema import (
+    BASE,
+    HAND,
     Body,
     Declaration,
     Kind,
@@ -117,6 +119,7 @@ class Mapping(Declaration):
         setup: The robot and its instruments, as in dataset.json.
         bodies: The marker bodies.
         trials: The trials.
+        files: The files, paths or patterns beside the mapping file, where none are named on the command line.
         reversed_effort: Joints whose drives count the motor current against the joint's own direction.
         csv: Kinds of CSV files.
         c3d: What is what in the C3D files.
@@ -127,10 +130,26 @@ class Mapping(Declaration):
     setup: Setup
     bodies: tuple[MappedBody, ...]
     trials: Annotated[tuple[MappedTrial, ...], Field(min_length=1)]
+    files: tuple[str, ...] = ()
     reversed_effort: tuple[str, ...] = ()
     csv: tuple[CsvTable, ...] = ()
     c3d: C3dLayout | None = None
     bag: BagLayout | None = None
+
+    @property
+    def base_name(self) -> str:
+        """Of the marker body on the base frame; empty where there is none."""
+        return self._name_of(BASE, self.setup.base_frame)
+
+    @property
+    def hand_name(self) -> str:
+        """Of the marker body on the tool frame; empty where there is none."""
+        return self._name_of(HAND, self.setup.tool_frame)
+
+    def _name_of(self, name: str, link: str) -> str:
+        if any(b.name == name for b in self.bodies):
+            return name
+        return next((b.name for b in self.bodies if b.link == link), "")
 
     @model_validator(mode="after")
     def _names_fit(self) -> "Mapping":

@@ -20,12 +20,13 @@ from scipy.spatial.transform import Rotation
 
 from calibration.errors import InputError, NotEnoughData
 from calibration.formats.mapping.channels import Recorded
+from calibration.formats.mapping.dwell_means import posture_means
 from calibration.formats.mapping.mapping import MappedBody, MappingFile
 from calibration.mocap.cluster_pose import body_poses
 from calibration.mocap.cluster_shape import cluster, misfit, of_one_shape
 from calibration.numerics.alignment import hand_eye, registration_start
 from calibration.numerics.lie import compose, inverse, to_vector
-from calibration.recording.schema import BASE, HAND, Body, Marker
+from calibration.recording.schema import Body, Marker
 from calibration.robot.chain import Chain
 
 _REST = 1.0  # [s]
@@ -80,25 +81,30 @@ def _fitted(
     mapping: MappingFile, chain: Chain, bodies: Lookup[str, Body], calibration: Sequence[Recorded]
 ) -> dict[str, Body]:
     """Base and hand with placements from the nominal robot at the postures."""
+    together = {name for r in calibration for name in r.together} | set(mapping.content.setup.mocap_clock)
     postures = [r for r in calibration if r.means is not None]
-    missing = [name for name in (BASE, HAND) if name not in bodies]
+    postures += posture_means(calibration, "robot" in together)
+    names = mapping.content.base_name, mapping.content.hand_name
+    missing = [link for name, link in zip(names, ("base_frame", "tool_frame"), strict=True) if name not in bodies]
     if missing or not postures:
-        place, why = ("bodies", f"no {missing[0]!r}") if missing else ("trials", "no calibration file of postures")
+        place, why = (
+            ("bodies", f"none on the {missing[0]}") if missing else ("trials", "no calibration file of postures")
+        )
         raise mapping.error(place, f"{why}; a fitted body is placed by base and hand in static postures")
-    base, hand = bodies[BASE], bodies[HAND]
+    base, hand = (bodies[name] for name in names)
     readings = [in_order(r, chain.measured) for r in postures]
     A = np.concatenate([inverse(chain.poses(q, base.link)) @ chain.poses(q, hand.link) for q in readings])
     placed = _pointed if hand.is_point else _posed
-    found = dict(zip((BASE, HAND), placed(mapping, bodies, A, postures), strict=True))
+    found = dict(zip(names, placed(mapping, base, hand, A, postures), strict=True))
     fitted = [b.name for b in mapping.content.bodies if b.fitted and b.name in found]
     return {n: bodies[n].model_copy(update={"placement": tuple(map(float, found[n]))}) for n in fitted}
 
 
 def _posed(
-    mapping: MappingFile, bodies: Lookup[str, Body], A: np.ndarray, postures: Sequence[Recorded]
+    mapping: MappingFile, base: Body, hand: Body, A: np.ndarray, postures: Sequence[Recorded]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Placements (6,) of base and hand from nominal poses A (n, 4, 4) of hand's link in the base's."""
-    B = np.concatenate([inverse(_poses(bodies[BASE], r)) @ _poses(bodies[HAND], r) for r in postures])
+    B = np.concatenate([inverse(_poses(base, r)) @ _poses(hand, r) for r in postures])
     try:
         X, Y = hand_eye(A, B)
     except NotEnoughData as error:
@@ -107,11 +113,11 @@ def _posed(
 
 
 def _pointed(
-    mapping: MappingFile, bodies: Lookup[str, Body], A: np.ndarray, postures: Sequence[Recorded]
+    mapping: MappingFile, base: Body, hand: Body, A: np.ndarray, postures: Sequence[Recorded]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Placements of base and hand where one marker of the hand is seen: its place, the hand not turned."""
-    names = [m.name for m in bodies[HAND].markers]
-    if len(names) > 1 or bodies[BASE].markers:
+    names = [m.name for m in hand.markers]
+    if len(names) > 1 or base.markers:
         raise mapping.error("bodies", "a hand of fewer than three markers is fitted by one, in the base's own frame")
     y = np.concatenate([_positions(r, names)[:, 0] for r in postures])
     good = np.isfinite(y).all(axis=1)

@@ -108,7 +108,7 @@ def _check_inside(place: str, wrench: np.ndarray, loaded: np.ndarray, plate: Pla
 def _disagreement(wrench: np.ndarray, loaded: np.ndarray, cop: np.ndarray, plate: Plate) -> float:
     """Median distance in the plane between computed and written CoP [m]."""
     d = (centre_of_pressure(wrench[loaded], np.array(plate.centre)) - cop[loaded])[:, :2]
-    return float(np.median(np.linalg.norm(d, axis=1)))
+    return float(np.nanmedian(np.linalg.norm(d, axis=1)))
 
 
 def _conventions(

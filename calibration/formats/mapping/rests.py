@@ -1,0 +1,117 @@
+"""Rests of an arm between its motions, from joint readings and markers.
+
+    d_i = |mean x over [t_i, t_i + w] - mean x over [t_i - w, t_i]|,     w = 0.15 s
+    a column is at rest where d_i < 5 sqrt(2 / n) sigma + floor,         n samples in w
+
+sigma is each column's noise, from the median of its second differences, which a smooth motion does not change; the
+floor, 1 mm or 1 mrad within w, is a slow settling. Every joint must rest, and of each body more than half of the
+markers that are seen: an exchanged label is not a motion. A rest lasts 0.7 s at least. The one a recording begins with
+is not counted: from which side its joints came was not recorded.
+
+Readings decide where there are any. With a clock of their own they are shifted by the offset at which their rests and
+the markers' overlap longest, over all trials together: to 0.05 s, a quarter of what a rest loses at both ends later.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calibration.formats.mapping.channels import Recorded
+from calibration.numerics.signals import GAP
+
+WINDOW = 0.15  # [s]
+LEAST = 0.7  # [s]
+FLOOR = 1e-3  # [m, rad]
+_SIGMAS = 5.0
+_GAUSS = 1.4826  # standard deviation over the median distance from the median
+
+
+def noise_of(x: np.ndarray) -> np.ndarray:
+    """Standard deviation (k,) of the samples x (n, k), equally spaced, about whatever smooth motion they follow."""
+    second = np.diff(x, n=2, axis=0)
+    known = np.isfinite(second).any(axis=0)
+    median = np.zeros(x.shape[1])
+    median[known] = np.nanmedian(np.abs(second[:, known]), axis=0)
+    return np.asarray(_GAUSS * median / np.sqrt(6.0))
+
+
+def rests(t: np.ndarray, x: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """Start and stop (r, 2) [s] of the rests of a recording.
+
+    Args:
+        t: (n,) [s].
+        x: (n, k) [m, rad]; NaN where not known.
+        group: (k,) number of the thing each column is of, at rest with more than half of its known columns; each
+            column is a thing of its own unless given.
+    """
+    group = np.arange(x.shape[1]) if group is None else group
+    half = max(2, round(WINDOW / float(np.median(np.diff(t))))) if len(t) > 1 else 1
+    if len(t) <= 2 * half or not x.shape[1]:
+        return np.zeros((0, 2))
+    change, seen = _changes(x, half)
+    slow = seen & (change < _SIGMAS * np.sqrt(2.0 / half) * noise_of(x) + FLOOR)
+    of_group = (group[:, None] == np.unique(group)).astype(float)  # (k, groups)
+    n_seen, n_slow = seen @ of_group, slow @ of_group
+    still = ((n_slow > 0.5 * n_seen) | (n_seen == 0)).all(axis=1) & seen.any(axis=1)
+    first, last = t[: len(t) - 2 * half + 1], t[2 * half - 1 :]
+    still &= last - first < 2.0 * WINDOW + GAP
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    # a smooth start stays below the threshold for half a window
+    ends = [(first[a], last[b - 1] - 0.5 * WINDOW) for a, b in edges.reshape(-1, 2) if a > 0]
+    return np.array([(start, stop) for start, stop in ends if stop - start >= LEAST]).reshape(-1, 2)
+
+
+def rests_of_markers(recorded: Recorded, bodies: Sequence[Sequence[str]]) -> np.ndarray:
+    """Rests (r, 2) [s, mocap clock] of the markers of these bodies."""
+    markers = recorded.markers
+    if markers is None:
+        return np.zeros((0, 2))
+    names = [name for body in bodies for name in body if name in markers.names]
+    owner = [k for k, body in enumerate(bodies) for name in body if name in markers.names]
+    p = markers.position[:, [markers.names.index(name) for name in names]]
+    return rests(markers.t, p.reshape(len(p), -1), np.repeat(np.array(owner, dtype=int), 3))
+
+
+def rests_of_trials(
+    trials: Sequence[Recorded], bodies: Sequence[Sequence[str]], one_clock: bool
+) -> tuple[np.ndarray, ...]:
+    """Rests (r, 2) [s, mocap clock] of each trial of a session.
+
+    Args:
+        trials: What was recorded.
+        bodies: Names of the markers of each body.
+        one_clock: Whether readings are on the markers' clock.
+    """
+    seen = [rests_of_markers(r, bodies) for r in trials]
+    read = [np.zeros((0, 2)) if r.joints is None else rests(r.joints.t, r.joints.q_motor) for r in trials]
+    offset = 0.0 if one_clock else offset_between(seen, read)
+    return tuple(b + offset if len(b) and np.isfinite(offset) else a for a, b in zip(seen, read, strict=True))
+
+
+def offset_between(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> float:
+    """What to add to the times of rests b (m, 2) [s] so that, over all trials, they overlap rests a (n, 2) longest.
+
+    Candidates bring the start of one rest to the start of another of its trial; NaN where there is none.
+    """
+    pairs = [(x, y) for x, y in zip(a, b, strict=True) if len(x) and len(y)]
+    if not pairs:
+        return float("nan")
+    candidates = np.concatenate([(x[:, None, 0] - y[None, :, 0]).ravel() for x, y in pairs])
+    totals = [sum(overlap(x, y + offset) for x, y in pairs) for offset in candidates]
+    return float(candidates[int(np.argmax(totals))])
+
+
+def overlap(a: np.ndarray, b: np.ndarray) -> float:
+    """How long [s] rests a (n, 2) and b (m, 2) are at the same time."""
+    start, stop = np.maximum(a[:, None, 0], b[None, :, 0]), np.minimum(a[:, None, 1], b[None, :, 1])
+    return float(np.clip(stop - start, 0.0, None).sum())
+
+
+def _changes(x: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of neighbouring window means (n - 2 half + 1, k), and where both have half of their samples."""
+    known, none = np.isfinite(x), np.zeros((1, x.shape[1]))
+    total = np.cumsum(np.concatenate([none, np.where(known, x, 0.0)]), axis=0)
+    count = np.cumsum(np.concatenate([none, known]), axis=0)
+    sums, counts = total[half:] - total[:-half], count[half:] - count[:-half]
+    means, often = sums / np.maximum(counts, 1.0), counts >= 0.5 * half
+    return np.abs(means[half:] - means[:-half]), often[half:] & often[:-half]

@@ -1,0 +1,1 @@
+"""What laboratory files show by themselves, and a mapping file drafted from it."""

@@ -1,0 +1,325 @@
+"""A mapping file drafted from laboratory files: what they show, and one marked line for each thing no file states.
+
+Standard deviations are those of the samples about their smooth motion, of posture means those of a rigid body's
+distances; a plate's centre, axes and size are the file's where it shows them.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+
+from calibration.errors import InputError, InputErrors
+from calibration.formats.mapping.channels import Means, Recorded
+from calibration.formats.mapping.rests import noise_of
+from calibration.formats.survey.bag_view import view_bag
+from calibration.formats.survey.bodies import FoundBody, found_bodies
+from calibration.formats.survey.c3d_view import view_c3d
+from calibration.formats.survey.csv_view import view_csv
+from calibration.formats.survey.robot import UrdfRobot, read_urdf
+from calibration.formats.survey.trials import kind_of, stem_of, suffixes
+from calibration.formats.survey.view import FileView, PlateView
+from calibration.mocap.cluster_shape import cluster, in_line
+from calibration.recording.trial import REST
+
+CHOOSE = "# CHOOSE"
+_PLAIN = re.compile(r"^[A-Za-z_][\w./-]*$")
+_WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
+_SIGMAS = {"marker": 2e-4, "encoder": 2e-5, "plate_force": 1.0, "plate_moment": 0.3}  # where no file shows them
+_LEAST = {"marker": 1e-5, "encoder": 1e-6, "plate_force": 1e-2, "plate_moment": 1e-3}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Marker bodies that somebody measured: `file` beside the mapping, and bodies with link and marker names."""
+
+    file: str
+    bodies: tuple[tuple[str, str, tuple[str, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Session:
+    """All files together.
+
+    Attributes:
+        robot: Of the URDF.
+        views: File by file.
+        tails: What follows a trial's name, by file name.
+        trials: Everything recorded in each trial, by its name.
+        bodies: Groups of labels, the one that moves least first.
+        alone: Labels of no body.
+        drawing: The measured bodies, None where nobody measured them.
+    """
+
+    robot: UrdfRobot
+    views: tuple[FileView, ...]
+    tails: dict[str, str]
+    trials: dict[str, Recorded]
+    bodies: tuple[FoundBody, ...]
+    alone: tuple[str, ...]
+    drawing: Drawing | None
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Joints between root and tool that were read; all of them where none was."""
+        read = {
+            n for r in self.trials.values() for n in (r.means.joints if r.means else r.joints.names if r.joints else ())
+        }
+        return self.robot.chain_to(self.robot.tool(read or self.robot.movable), read or self.robot.movable)
+
+    @property
+    def tool(self) -> str:
+        """The link of the hand: of the drawing's body that most joints carry, else the tip of the chain."""
+        if self.drawing is None:
+            return self.robot.tool(self.measured)
+        return max(
+            (link for _, link, _ in self.drawing.bodies), key=lambda x: len(self.robot.chain_to(x, self.measured))
+        )
+
+    @property
+    def has_readings(self) -> bool:
+        """Whether any joint was read."""
+        return any(r.means or r.joints for r in self.trials.values())
+
+
+def session_of(files: Sequence[Path], urdf: str, drawing: Drawing | None = None) -> Session:
+    """What the files show together.
+
+    Raises:
+        InputError: Some cannot be read; all findings.
+    """
+    robot, views, problems = read_urdf(urdf), [], []
+    for path in files:
+        try:
+            views.append(_view(path, robot))
+        except InputError as error:
+            problems.append(error)
+    if problems:
+        raise InputErrors(problems)
+    tails = suffixes(views)
+    by_trial: dict[str, list[Recorded]] = {}
+    for view in views:
+        by_trial.setdefault(stem_of(view, tails), []).append(view.recorded)
+    trials = {name: reduce(Recorded.with_channels_of, some) for name, some in sorted(by_trial.items())}
+    if drawing is None:
+        bodies, alone = found_bodies(list(trials.values()))
+    else:
+        bodies, alone = tuple(FoundBody(name, markers, 0.0) for name, _, markers in drawing.bodies), ()
+    return Session(robot, tuple(views), tails, trials, bodies, alone, drawing)
+
+
+def _view(path: Path, robot: UrdfRobot) -> FileView:
+    if path.suffix.lower() == ".c3d":
+        return view_c3d(path)
+    if path.suffix.lower() == ".csv":
+        return view_csv(path, robot)
+    return view_bag(path, robot)
+
+
+def draft(session: Session, urdf: str, files: Sequence[str], wheels: str | None = None) -> str:
+    """Text of the mapping file.
+
+    Args:
+        session: What the files show.
+        urdf: How the mapping names the robot.
+        files: Paths or patterns of the files beside the mapping.
+        wheels: How it names the robot's wheels, None where it has none.
+    """
+    lines = [
+        f"# Drafted from {len(session.views)} file(s), {len(session.trials)} trial(s). Lines marked CHOOSE state what",
+        "# no file does: check each. Then `tiago-twin process` this file. Fields: docs/recording.md.",
+        f"urdf: {flow(urdf)}",
+        f"files: {flow(list(files))}",
+        "setup:",
+        *(f"  {line}" for line in _setup(session, wheels)),
+        *_bodies(session),
+        *_trials(session),
+        *_layouts(session),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _setup(session: Session, wheels: str | None) -> Iterator[str]:
+    robot, names = session.robot, session.measured
+    tool = session.tool
+    yield f"robot: {flow(robot.name)}"
+    yield f"base_frame: {flow(robot.root)}"
+    yield f"tool_frame: {flow(tool)}"
+    joints = [r.joints for r in session.trials.values() if r.joints is not None]
+    linked = [n for n in names if any(np.isfinite(j.q_link[:, j.names.index(n)]).any() for j in joints if n in j.names)]
+    rate = float(np.median([1.0 / np.median(np.diff(j.t)) for j in joints])) if joints else 100.0
+    said = {"names": list(names), "prismatic": robot.prismatic(names), "link_encoders": linked, "rate": round(rate, 1)}
+    yield f"joints: {flow({k: v for k, v in said.items() if v})}"
+    if wheels is not None:
+        yield f"wheels: {flow(wheels)}"
+    plates = _plates(session)
+    if plates:
+        yield "plates:"
+    for p in plates:
+        place = [float(x) if np.isfinite(x) else "CHOOSE" for x in np.round(p.centre, 4) + 0.0]
+        size = [float(x) if np.isfinite(x) else "CHOOSE" for x in np.round(p.size, 4)]
+        known = np.isfinite([*p.centre, *p.size]).all()
+        note = "" if known else f"  {CHOOSE}: centre of its surface in the lab, its edges [m]"
+        axes = np.round(p.axes, 6) + 0.0
+        yield f"  - {flow({'name': p.name, 'centre': place, 'axes': axes.tolist(), 'size': size})}{note}"
+    yield (
+        f"# payload: {{link: {tool}, mass: 0.5, com: [0.0, 0.0, 0.0], tolerance: 0.02}}  {CHOOSE}: uncomment "
+        "if the hand carries a load [kg, m]"
+    )
+    if _in_base_frame(session):
+        yield f"marker_frame: base  {CHOOSE}: one body only, so positions must be in a frame fixed on the base"
+    yield f"sigmas: {flow(_sigmas(session))}"
+
+
+def _in_base_frame(session: Session) -> bool:
+    return session.has_readings and len(session.bodies) == 1 and session.drawing is None
+
+
+def _plates(session: Session) -> list[PlateView]:
+    return list({p.name: p for v in session.views for p in v.plates}.values())
+
+
+def _sigmas(session: Session) -> dict[str, float]:
+    """Standard deviations of a sample [m, rad, N, N.m]."""
+    found: dict[str, list[float]] = {name: [] for name in _SIGMAS}
+    for r in session.trials.values():
+        if r.markers is not None:
+            found["marker"].append(_at_rest(r.markers.t, r.markers.position.reshape(len(r.markers.t), -1)))
+        if r.joints is not None:
+            found["encoder"].append(float(np.max(noise_of(r.joints.q_motor))))
+        if r.means is not None:
+            found["marker"] += [max(sigma, _SIGMAS["marker"]) for sigma in _of_means(session, r.means)]
+    for view in session.views:
+        for p in view.plates:
+            sigma = noise_of(p.wrench)
+            found["plate_force"].append(float(np.median(sigma[:3])))
+            found["plate_moment"].append(float(np.median(sigma[3:])))
+    return {
+        name: float(f"{max(float(np.median(x)), _LEAST[name]) if x else _SIGMAS[name]:.2g}")
+        for name, x in found.items()
+    }
+
+
+def _at_rest(t: np.ndarray, x: np.ndarray) -> float:
+    """Median standard deviation of the columns of x (n, k) in the first second, when the robot rests."""
+    first = x[t <= t[0] + REST]
+    seen = np.isfinite(first).sum(axis=0) > 1
+    noise = np.nanstd(first[:, seen], axis=0, ddof=1) if seen.any() else np.zeros(0)
+    return float(np.median(np.maximum(noise, noise_of(x)[seen]))) if len(noise) else 0.0
+
+
+def _of_means(session: Session, means: Means) -> list[float]:
+    """Noise of each body's markers, from its distances [m]."""
+    shapes = [[means.markers.index(n) for n in b.markers if n in means.markers] for b in session.bodies]
+    p = [means.position[:, columns] for columns in shapes if len(columns) > 2]
+    return [cluster(x).sigma for x in p if not in_line(x)]
+
+
+def _bodies(session: Session) -> Iterator[str]:
+    if session.drawing is not None:
+        yield f"bodies: {flow(session.drawing.file)}"
+        return
+    base, tool = session.robot.root, session.tool
+    bodies = session.bodies
+    yield "bodies:"
+    if not bodies:
+        yield f"  []  {CHOOSE}: no markers in these files; name the bodies and their markers"
+    elif _in_base_frame(session):
+        yield f"  - {flow({'name': 'base', 'link': base, 'fitted': True})}"
+        yield f"  - {_body(bodies[0], tool, fitted=True)}"
+    elif session.has_readings:
+        yield f"  - {_body(bodies[0], base, fitted=True)}  {CHOOSE}: the base? it moves least"
+        yield f"  - {_body(bodies[-1], tool, fitted=True)}  {CHOOSE}: the hand? it moves most"
+    else:
+        x, y = _pressure(session)
+        standing = f"{{x: {x}, y: {y}, heading: CHOOSE}}"
+        what = "where the base frame stands at rest [m, rad, lab]"
+        text = _body(bodies[0], base).removesuffix("}")
+        yield f"  - {text}, standing: {standing}}}  {CHOOSE}: the base? it moves least; {what}"
+    left = [n for b in (bodies[1:-1] if session.has_readings else bodies[1:]) for n in b.markers] + [*session.alone]
+    if left:
+        yield f"  # not used: {', '.join(left)}"
+
+
+def _body(body: FoundBody, link: str, **more: bool) -> str:
+    return flow({"name": body.name, "link": link, "undrawn": list(body.markers)} | more)
+
+
+def _pressure(session: Session) -> tuple[float | str, float | str]:
+    """Where the centre of pressure is on average [m, lab]; a wheeled robot stands about there."""
+    for p in (p for v in session.views for p in v.plates):
+        w = np.nanmedian(p.wrench, axis=0)
+        place = p.centre[:2] + np.array([-w[4], w[3]]) / w[2]
+        if np.isfinite(place).all():
+            return round(float(place[0]), 3), round(float(place[1]), 3)
+    return "CHOOSE", "CHOOSE"
+
+
+def _trials(session: Session) -> Iterator[str]:
+    kinds: dict[str, list[str]] = {}
+    for name, recorded in session.trials.items():
+        kinds.setdefault(kind_of(recorded, session.bodies), []).append(name)
+    yield "trials:"
+    for kind, names in kinds.items():
+        yield f"  {kind}: {flow(names)}"
+    yield f"validation: []  {CHOOSE}: trials kept aside for the error: another motion, other postures"
+
+
+def _layouts(session: Session) -> Iterator[str]:
+    tables: dict[tuple[str, ...], FileView] = {}
+    others: dict[str, FileView] = {}
+    for view in session.views:
+        if view.kind == "csv":
+            tables.setdefault(view.layout, view)
+        else:
+            others.setdefault(view.kind, view)
+    if tables:
+        yield "csv:"
+    for layout, view in tables.items():
+        static = view.recorded.means is not None
+        lines = [f"suffix: {session.tails[view.path.name]}", *layout]
+        why = "of a posture's mean position of a marker [m]"
+        lines += [f"marker_std: {_sigmas(session)['marker']:g}  {CHOOSE}: {why}"] if static else []
+        yield from _nested(lines + list(_plate_lines(view)), view)
+    for kind, view in others.items():
+        yield f"{kind}:"
+        yield from (f"  {line}" for line in [*view.layout, *_plate_lines(view), *_unused(view)])
+
+
+def _nested(lines: list[str], view: FileView) -> Iterator[str]:
+    yield f"  - {lines[0]}"
+    yield from (f"    {line}" for line in [*lines[1:], *_unused(view)])
+
+
+def _plate_lines(view: FileView) -> Iterator[str]:
+    if view.plates:
+        yield "plates:"
+    for p in view.plates:
+        force = float(np.nanmedian(p.wrench[:, 2]))
+        why = (
+            f"whose wrench: Fz is {force:+.0f} N, z up"
+            if view.kind == "csv"
+            else f"whose wrench: {force:+.0f} N upwards"
+        )
+        yield f"  {flow(p.name)}: {{{p.layout}, convention: {p.convention}}}  {CHOOSE}: {why}"
+
+
+def _unused(view: FileView) -> Iterator[str]:
+    if view.left:
+        yield f"# not used: {', '.join(view.left[:12])}{', ...' if len(view.left) > 12 else ''}"
+
+
+def flow(value: object) -> str:
+    """A value in one line of YAML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{flow(k)}: {flow(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(flow(v) for v in value) + "]"
+    if isinstance(value, str) and (not _PLAIN.match(value) or value.lower() in _WORDS):
+        return "'" + value.replace("'", "''") + "'"
+    return str(value)
