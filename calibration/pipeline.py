@@ -24,6 +24,7 @@ from calibration.stages.clocks.stage import synchronise
 from calibration.stages.frames.arm_tool_stage import ARM_TOOL
 from calibration.stages.frames.base_rests import MOVES, read_stations
 from calibration.stages.frames.base_stage import BASE_FRAME
+from calibration.stages.geometry.cross_validation import cross_validated
 from calibration.stages.geometry.registration import REGISTRATION
 from calibration.stages.geometry.rows import GEOMETRY
 from calibration.stages.joints.correction import JointModels
@@ -47,6 +48,7 @@ def calibrate(
     progress: Progress | None = None,
     options: Options | None = None,
     plan_next: bool = False,
+    cross_validate: bool = False,
 ) -> Estimate:
     """Run the stages on the calibration trials.
 
@@ -58,6 +60,7 @@ def calibrate(
         progress: Called with stage and share done.
         options: What is chosen; None: the defaults.
         plan_next: Whether to search for the experiments that would reduce the uncertainty most.
+        cross_validate: Whether to report the hand's error at calibration postures left out in turn.
 
     Raises:
         NoSuchElement: A stage of that name does not exist.
@@ -95,8 +98,13 @@ def calibrate(
     if plan_next:
         tell("next experiments", 0.95)
         context = _with_plans(context, wanted)
+    estimate = _concluded(context)
+    if cross_validate and estimate.calibrated and context.data.postures is not None:
+        tell("cross-validation", 0.97)
+        found = cross_validated(lab.chain, lab.description, context.data.postures, estimate.models, estimate.main)
+        estimate = replace(estimate, verdicts=(*estimate.verdicts, *found))
     tell("done", 1.0)
-    return _concluded(context)
+    return estimate
 
 
 def _usual(dataset: Dataset) -> tuple[str, ...]:

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from calibration.stages.suspension.model import Suspension
 
 
+_GEOMETRY = ("geometry.", "encoder.", "frame.base.arm")
+
+
 @dataclass(frozen=True)
 class RobotNames:
     """What of the robot an estimate is about: the measured joints (columns of q) and the two frames."""
@@ -84,6 +87,12 @@ class Estimate:
     def calibrated(self) -> bool:
         """Whether the result may be used."""
         return self.status == "calibrated"
+
+    @property
+    def has_geometry(self) -> bool:
+        """Whether its main model moves a joint or a reading's zero, so that it has a calibrated URDF of its own."""
+        model = next((m for m in self.models if m.name == self.main), None)
+        return model is not None and any(p.name.startswith(_GEOMETRY) for p in model.parameters)
 
 
 def with_clocks(model: Model, clocks: Iterable[Clock]) -> Model:

@@ -61,8 +61,9 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
             estimate.urdf, estimate.robot.joints, estimate.robot.base_frame, estimate.robot.tool_frame
         )
         hand = hand_of(estimate.model(estimate.main), chain, np.zeros(12))
-        _replace_text(folder / CALIBRATED, calibrated_urdf(estimate.urdf, hand.chain))
-        _replace_text(folder / ZEROS, zeros_text(hand))
+        if estimate.has_geometry:
+            _replace_text(folder / CALIBRATED, calibrated_urdf(estimate.urdf, hand.chain))
+            _replace_text(folder / ZEROS, zeros_text(hand))
         _replace_text(folder / TABLE, parameters_text(estimate.models))
 
 

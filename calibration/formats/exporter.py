@@ -92,6 +92,8 @@ def _tables(
             wrist=wrist_columns() if wrist else None,
         ),
     ]
+    if any(isinstance(trial, Trial) and len(trial.dwell_start) for _, trial in trials):
+        tables.append(CsvTable(suffix=".dwells.csv", dwells=("start", "stop")))
     if description.plates:
         plates = {p.name: plate_columns(p.name) for p in description.plates}
         tables.append(CsvTable(suffix=".plate.csv", time=_T, plates=plates))

@@ -261,7 +261,7 @@ def refuse_foreign(kind: str | None, files: Sequence[Path]) -> None:
         elif suffix in _INSTEAD:
             found.append(InputError(path, f"is {_INSTEAD[suffix]}"))
         elif kind is None and suffix not in _OURS and not path.is_dir():
-            found.append(InputError(path, "is no C3D, CSV or bag by its suffix"))
+            found.append(InputError(path, "is no C3D, CSV or bag by its suffix; name recordings only"))
     if found:
         raise InputErrors(found)
 

@@ -19,6 +19,7 @@ from scenarios.commands import check as command_check
 from scenarios.commands import dataset as command_dataset
 from scenarios.commands import design as command_design
 from scenarios.commands import import_export, quicklook, video
+from scenarios.commands import process as command_process
 from scenarios.commands import reality as command_reality
 from scenarios.commands import show as command_show
 from scenarios.commands import study as command_study
@@ -191,6 +192,7 @@ export = app.command(epilog=_example("export urdf runs/short/estimate --out tiag
 dataset = app.command(epilog=_example("dataset swing20 -n 10 --out runs/swing20"))(command_dataset.dataset)
 design = app.command(epilog=_example("design short -n 30 --out postures.yaml"))(command_design.design)
 study = app.command(epilog=_example("study coverage short -n 20 --out runs/coverage"))(command_study.study)
+process = app.command(epilog=_example("process lab.yaml --out runs/lab"))(command_process.process)
 look = app.command(epilog=_example("look runs/short/dataset --out runs/look"))(quicklook.look)
 picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"))(video.picture)
 reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"))(command_reality.reality)

@@ -44,6 +44,7 @@ def looked_at(dataset: Dataset, entry: TrialEntry) -> Looked:
         trial,
         (
             *_clocks(trial),
+            *_rests(trial),
             *_markers(trial),
             *_shapes(trial, dataset.description.bodies),
             *_plates(trial),
@@ -83,6 +84,12 @@ def _clocks(trial: Trial) -> Iterator[str]:
         lost = f", {n} hole{'s' if n > 1 else ''} of up to {1e3 * step.max():.0f} ms" if n else ""
         steps = f"steps {1e3 * step.min():.2f}-{1e3 * step.max():.2f} ms"
         yield f"{name}: {t[-1] - t[0]:.1f} s at {1.0 / usual:.4g} Hz, {steps}{lost}"
+
+
+def _rests(trial: Trial) -> Iterator[str]:
+    length = trial.dwell_stop - trial.dwell_start
+    if len(length):
+        yield f"static postures: {len(length)} of {length.min():.1f}-{length.max():.1f} s"
 
 
 def _markers(trial: Trial | PostureMeans) -> Iterator[str]:

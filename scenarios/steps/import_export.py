@@ -43,6 +43,7 @@ def import_files(
     from calibration.recording import load
 
     described = read_mapping(mapping)
+    files = [p for p in files if p.suffix.lower() != ".csv" or not drawing_file.is_drawing(p)]
     files = files or files_of(described.files, mapping)
     refuse_foreign(kind, files)
     source = MappingFile(mapping, described, _urdf(described, mapping))
@@ -102,7 +103,9 @@ def init_mapping(files: Sequence[Path], out: Path, urdf: Path | None = None) -> 
         ScenarioError: `out` exists, or the URDF cannot be read.
         InputError: A file cannot be read; all findings.
     """
-    from calibration.formats.survey.draft import Drawing, draft, session_of
+    from calibration.formats.importer import refuse_foreign
+    from calibration.formats.survey.draft import draft
+    from calibration.formats.survey.session import Drawing, session_of
 
     if out.exists():
         raise ScenarioError(
@@ -112,6 +115,7 @@ def init_mapping(files: Sequence[Path], out: Path, urdf: Path | None = None) -> 
     if len(drawn) > 1:
         raise ScenarioError(f"{drawn[1]}: a second table of marker bodies; {drawn[0]} is one")
     recordings = [p for p in files if p not in drawn]
+    refuse_foreign(None, recordings)
     drawing = None
     if drawn:
         drawing = Drawing(_beside(drawn[0], out), drawing_file.names(drawn[0]))
@@ -181,8 +185,11 @@ def export_urdf(estimate: Path, out: Path) -> None:
 
     found = load_estimate(estimate)
     path = (estimate if estimate.is_dir() else estimate.parent) / CALIBRATED
-    if not found.calibrated or not path.is_file():
+    if not found.calibrated:
         raise NotCalibrated([v.message for v in found.verdicts if v.verdict == "refused"])
+    if not path.is_file():
+        why = [v.message for v in found.verdicts if v.stage == "geometry" and v.verdict == "missing"]
+        raise NotCalibrated([f"{estimate}: no geometry in this estimate, so no calibrated URDF", *why])
     if out.exists() and out.is_dir():
         raise ScenarioError(f"{out}: is a folder; name a file")
     with output_folder.updating(out.parent, [out.name]) as new:
@@ -192,7 +199,7 @@ def export_urdf(estimate: Path, out: Path) -> None:
 def _exported(kind: str, trials: Sequence[str]) -> output_folder.Kind:
     """Folders of exported files that may be replaced: those of the same trials."""
     suffixes = {
-        "csv": (".mocap.csv", ".robot.csv", ".plate.csv", ".postures.csv"),
+        "csv": (".mocap.csv", ".robot.csv", ".plate.csv", ".dwells.csv", ".postures.csv"),
         "c3d": (".c3d",),
         "bag": (".bag", ""),
     }

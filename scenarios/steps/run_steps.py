@@ -142,7 +142,7 @@ def calibrate(
     if unknown:
         raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
     with folder.replacing(out, folder.ESTIMATE) as new, one_blas_thread():
-        return _calibrate(Path(dataset), new, stages, options, progress, plan_next)
+        return _calibrate(Path(dataset), new, stages, options, progress, plan_next, cross_validate=stages is None)
 
 
 def options(**chosen: str | None) -> "Options":
@@ -216,12 +216,18 @@ def _calibrate(
     options: "Options | None",
     progress: Progress,
     plan_next: bool = False,
+    cross_validate: bool = False,
 ) -> "Estimate":
     import calibration
 
     progress("calibrate", "", 0.0)
     estimate = calibration.calibrate(
-        calibration.load(dataset), stages, lambda at, share: progress("calibrate", at, share), options, plan_next
+        calibration.load(dataset),
+        stages,
+        lambda at, share: progress("calibrate", at, share),
+        options,
+        plan_next,
+        cross_validate,
     )
     calibration.save_estimate(estimate, out)
     return estimate

@@ -44,6 +44,8 @@ def table_of(path: Path, tables: Sequence[CsvTable]) -> CsvTable:
 
 def _read(path: Path, table: CsvTable, setup: Setup) -> Recorded:
     text = read_text(path)
+    if table.dwells is not None:
+        return Recorded(str(path), dwells=_dwells(text, table.dwells), notes=_unused(text, table))
     position = _positions(text, table) if table.markers else None
     if table.time is None:
         q = np.stack([text.numbers([c.motor], _UNITS[c.unit])[:, 0] for c in table.joints.values()], axis=1)
@@ -137,6 +139,15 @@ def _positions(text: CsvText, table: CsvTable) -> np.ndarray:
     return found
 
 
+def _dwells(text: CsvText, columns: tuple[str, str]) -> np.ndarray:
+    """Start and stop (n, 2) [s] of each dwell."""
+    found = text.numbers(columns)
+    wrong = np.flatnonzero((found[:, 1] <= found[:, 0]) | (np.diff(found[:, 0], prepend=-np.inf) <= 0.0))
+    if len(wrong):
+        raise text.error(int(wrong[0]), columns[0], "a dwell begins before it ends and after the one before")
+    return found
+
+
 def _check_times(text: CsvText, column: str, t: np.ndarray) -> None:
     back = np.flatnonzero(~(np.diff(t) > 0.0))
     if len(back):
@@ -191,6 +202,7 @@ def _unused(text: CsvText, table: CsvTable) -> tuple[str, ...]:
     used |= {c for p in table.plates.values() for c in (*p.force, *p.moment, *(p.cop or ()))}
     used |= {*table.wrist.force, *table.wrist.moment} if table.wrist else set()
     used |= {table.time.column} if table.time else set()
+    used |= {*table.dwells} if table.dwells else set()
     left = [name for name in text.header if name not in used]
     return (f"{text.path.name}: columns not used: {', '.join(left)}",) if left else ()
 

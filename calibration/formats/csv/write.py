@@ -4,6 +4,7 @@
                                                                wrist_{Fx..Mz} [N, N.m] ACTION of the hand on the sensor
     <trial>.plate.csv     t, <plate>_{Fx..Mz} [N, N.m] ACTION, lab axes, about the surface centre;
                           <plate>_COP{x,y,z} [m, lab], empty while it is not loaded
+    <trial>.dwells.csv    start, stop of each static posture [s, markers' clock]
     <trial>.postures.csv  the means
 
 Numbers are written with the digits their stored precision has, so that reading them back gives the same bits.
@@ -36,6 +37,9 @@ def write_csv(folder: Path, trial: Trial) -> None:
         if np.isfinite(trial.wrist_wrench).any():
             names, table = [*names, *WRIST], np.concatenate([table, trial.wrist_wrench], axis=1)
         _write(folder / f"{trial.id}.robot.csv", names, trial.t_robot, table)
+    if len(trial.dwell_start):
+        both = np.stack([trial.dwell_start, trial.dwell_stop], axis=1)
+        _lines(folder / f"{trial.id}.dwells.csv", ["start", "stop"], both.astype(str))
     if len(trial.t_plate):
         names = [f"{plate}_{c}" for plate in trial.plate for c in (*_COMPONENTS, *_COP)]
         wrenches = trial.plate_wrench.swapaxes(0, 1)

@@ -97,6 +97,7 @@ class CsvTable(Declaration):
         joints: Columns of each joint.
         plates: Columns of each plate.
         wrist: Columns of the wrist's force-torque sensor, in a table of joints.
+        dwells: Columns of start and stop of each static posture [s, markers' clock], in a table of nothing else.
     """
 
     suffix: str = ".csv"
@@ -108,9 +109,14 @@ class CsvTable(Declaration):
     joints: dict[str, JointChannels] = {}
     plates: dict[str, PlateChannels] = {}
     wrist: WristChannels | None = None
+    dwells: tuple[str, str] | None = None
 
     @model_validator(mode="after")
     def _is_of_one_kind(self) -> "CsvTable":
+        if self.dwells is not None:
+            if self.time or self.marker_std or self.markers or self.joints or self.plates:
+                raise ValueError("a table of `dwells` has nothing else")
+            return self
         if (self.time is None) == (self.marker_std is None):
             raise ValueError("give `time` for samples, or `marker_std` for static postures")
         if self.time is None and (self.plates or not self.joints or not self.markers):

@@ -4,8 +4,8 @@
     a column is at rest where d_i < 5 sqrt(2 / n) sigma + floor,         n samples in w
 
 sigma is each column's noise, from the median of its second differences, which a smooth motion does not change; the
-floor, 1 mm or 1 mrad within w, is a slow settling. Every joint must rest, and of each body more than half of the
-markers that are seen: an exchanged label is not a motion. A rest lasts 0.7 s at least. The one a recording begins with
+floor, 1 mm or 1 mrad within w, is a slow settling. Every joint must rest, and of each body half of the markers
+that are seen: an exchanged label is not a motion. A rest lasts 0.7 s at least. The one a recording begins with
 is not counted: from which side its joints came was not recorded.
 
 Readings decide where there are any. With a clock of their own they are shifted by the offset at which their rests and
@@ -40,19 +40,22 @@ def rests(t: np.ndarray, x: np.ndarray, group: np.ndarray | None = None) -> np.n
 
     Args:
         t: (n,) [s].
-        x: (n, k) [m, rad]; NaN where not known.
-        group: (k,) number of the thing each column is of, at rest with more than half of its known columns; each
-            column is a thing of its own unless given.
+        x: Readings (n, k) or positions (n, k, 3) [rad, m]; NaN where not known.
+        group: (k,) number of the body each is of, at rest with half of those known; each is one of its own unless
+            given.
     """
     group = np.arange(x.shape[1]) if group is None else group
+    x = x.reshape(*x.shape[:2], -1)
     half = max(2, round(WINDOW / float(np.median(np.diff(t))))) if len(t) > 1 else 1
     if len(t) <= 2 * half or not x.shape[1]:
         return np.zeros((0, 2))
-    change, seen = _changes(x, half)
-    slow = seen & (change < _SIGMAS * np.sqrt(2.0 / half) * noise_of(x) + FLOOR)
+    change, seen = _changes(x.reshape(len(x), -1), half)
+    flat = change < _SIGMAS * np.sqrt(2.0 / half) * noise_of(x.reshape(len(x), -1)) + FLOOR
+    seen, flat = (np.asarray(a.reshape(len(a), *x.shape[1:]).all(axis=2)) for a in (seen, flat))
+    slow = seen & flat
     of_group = (group[:, None] == np.unique(group)).astype(float)  # (k, groups)
     n_seen, n_slow = seen @ of_group, slow @ of_group
-    still = ((n_slow > 0.5 * n_seen) | (n_seen == 0)).all(axis=1) & seen.any(axis=1)
+    still = np.asarray((n_slow >= 0.5 * n_seen).all(axis=1) & seen.any(axis=1))
     first, last = t[: len(t) - 2 * half + 1], t[2 * half - 1 :]
     still &= last - first < 2.0 * WINDOW + GAP
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
@@ -69,7 +72,7 @@ def rests_of_markers(recorded: Recorded, bodies: Sequence[Sequence[str]]) -> np.
     names = [name for body in bodies for name in body if name in markers.names]
     owner = [k for k, body in enumerate(bodies) for name in body if name in markers.names]
     p = markers.position[:, [markers.names.index(name) for name in names]]
-    return rests(markers.t, p.reshape(len(p), -1), np.repeat(np.array(owner, dtype=int), 3))
+    return rests(markers.t, p, np.array(owner, dtype=int))
 
 
 def rests_of_trials(

@@ -30,6 +30,7 @@ _FIELDS = {
     "effort": ("_effort", "_current"),
     "command": ("_command", "_target", "_setpoint"),
 }
+_DWELLS = re.compile(r"^(start|begin),(stop|end)$", re.IGNORECASE)
 _FAR, _TURNS = 30.0, 4.0 * np.pi
 _AGREES = 1e-3  # [m]
 
@@ -50,6 +51,9 @@ def view_csv(path: Path, robot: UrdfRobot) -> FileView:
         InputError: It cannot be read, or shows neither markers, joints nor plates.
     """
     text = read_text(path)
+    if len(text.header) == 2 and _DWELLS.match(",".join(text.header)):  # noqa: PLR2004
+        dwells = Recorded(str(path), dwells=text.numbers(text.header))
+        return FileView(path, "csv", dwells, (), (f"dwells: [{', '.join(text.header)}]",))
     timed = next((c for c in text.header if _TIME.match(c)), None)
     triples = list(_triples(c for c in text.header if c != timed))
     wrenches = {t.name: t for t in triples if _WRENCH.match(t.name)}
@@ -60,7 +64,7 @@ def view_csv(path: Path, robot: UrdfRobot) -> FileView:
             f"{path}:1:1", "no columns of markers (x, y, z), of the URDF's joints, or of forces and moments"
         )
     unit, t = (None, None) if timed is None else _times(text, timed)
-    lines, recorded = [], Recorded(str(path))
+    lines = []
     if timed is not None:
         lines.append(f"time: {{column: {timed}, unit: {unit}}}")
     used = {timed, *(c for m in markers for c in m.columns)}
@@ -71,10 +75,15 @@ def view_csv(path: Path, robot: UrdfRobot) -> FileView:
     used |= {c for of in joints.values() for c in of.values()}
     plates = tuple(_plates(text, wrenches))
     used |= {c for t in wrenches.values() for c in t.columns} if plates else set()
+    if not (markers or readings):
+        return FileView(path, "csv", Recorded(str(path)), plates, tuple(lines), _left(text, used))
     names = tuple(m.name for m in markers)
     recorded = _recorded(path, t, Markers(np.zeros(0), names, position) if markers else None, readings)
-    left = tuple(c for c in text.header if c not in used)
-    return FileView(path, "csv", recorded, plates, tuple(lines), left)
+    return FileView(path, "csv", recorded, plates, tuple(lines), _left(text, used))
+
+
+def _left(text: CsvText, used: set[str | None]) -> tuple[str, ...]:
+    return tuple(c for c in text.header if c not in used)
 
 
 def _recorded(path: Path, t: np.ndarray | None, markers: Markers | None, readings: Joints | None) -> Recorded:
@@ -82,12 +91,9 @@ def _recorded(path: Path, t: np.ndarray | None, markers: Markers | None, reading
         if markers is None or readings is None:
             raise InputError(path, "no time column, and not both markers and joints: it is no table of postures")
         return Recorded(str(path), means=Means(readings.names, readings.q_motor, markers.names, markers.position, 0.0))
-    found = Recorded(str(path))
-    timed = {
-        "markers": None if markers is None else Markers(t, markers.names, markers.position),
-        "joints": None if readings is None else Joints(t, readings.names, *_sides(readings)),
-    }
-    return Recorded(found.file, **timed)
+    at_markers = None if markers is None else Markers(t, markers.names, markers.position)
+    at_joints = None if readings is None else Joints(t, readings.names, *_sides(readings))
+    return Recorded(str(path), at_markers, at_joints)
 
 
 def _sides(j: Joints) -> tuple[np.ndarray, ...]:

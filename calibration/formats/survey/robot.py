@@ -78,7 +78,8 @@ class UrdfRobot:
 
     def _above(self, link: str) -> list[UrdfJoint]:
         """Joints from a link down to the root."""
-        by_child, found = {j.child: j for j in self.joints}, []
+        by_child = {j.child: j for j in self.joints}
+        found: list[UrdfJoint] = []
         while link in by_child and len(found) <= len(self.joints):
             found.append(by_child[link])
             link = by_child[link].parent

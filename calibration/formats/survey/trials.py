@@ -48,7 +48,7 @@ def _stems(name: str) -> Iterator[str]:
 
 def kind_of(recorded: Recorded, bodies: Sequence[FoundBody]) -> str:
     """static, sweep, swing, spin or drive."""
-    if recorded.means is not None:
+    if recorded.means is not None or recorded.dwells is not None:
         return "static"
     if bodies and recorded.markers is not None:
         moved = _base_motion(recorded.markers, bodies[0])

@@ -69,7 +69,7 @@ class Engines:
     def load(self, dataset):
         return Path(dataset)
 
-    def calibrate(self, dataset, stages=None, progress=None, options=None, plan_next=False):
+    def calibrate(self, dataset, stages=None, progress=None, options=None, plan_next=False, cross_validate=False):
         self.step("calibrate", dataset, stages)
         self.calls["options"] = (options,)
         self.calls["blas"] = blas_threads()

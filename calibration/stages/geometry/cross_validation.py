@@ -1,0 +1,148 @@
+"""Error of the hand at calibration postures that were left out in turn.
+
+    e_i = |p_B_H(q_i, theta_without_fold(i)) - p_i|       [m]
+    rmse = sqrt(mean e_i^2),   interval: the middle 95 % of its values over bootstrap samples of the postures
+
+Folds are random fifths of the postures. Marker bodies whose shape or place was taken from these very postures are not
+made again without them; tests/data's postures show what that leaves out. An interval over postures says nothing of
+another session.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.errors import CalibrationError
+from calibration.inference import Model
+from calibration.mocap.postures import Postures
+from calibration.recording import Description
+from calibration.robot.chain import Chain
+from calibration.robot.nominal_frames import nominal_frames
+from calibration.stages.geometry.gear_deflection import calibrate_gears
+from calibration.stages.geometry.guards import fewest
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.geometry.registration import register
+from calibration.stages.geometry.stage import STAGE, calibrate_geometry
+from calibration.verdict import Verdict
+
+FOLDS = 5
+_SAMPLES = 2000  # of the bootstrap
+_SHOWN = 4  # parameters worth looking at
+_FAR = 3.0  # standard deviations from nominal beyond which a parameter is worth looking at
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Errors at postures left out.
+
+    Attributes:
+        model: Row of the ladder.
+        error: (n,) distance of the hand or its point [m]; NaN where a fold could not be fitted.
+        residual: Root mean squared distance where all postures were fitted [m].
+    """
+
+    model: str
+    error: np.ndarray
+    residual: float
+
+    @property
+    def rmse(self) -> float:
+        """Root mean squared distance [m]."""
+        return _rms(self.error)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % of the rmse over samples of the postures [m]."""
+        e = self.error[np.isfinite(self.error)] ** 2
+        rows = np.random.default_rng(0).integers(len(e), size=(_SAMPLES, len(e)))
+        low, high = np.percentile(np.sqrt(e[rows].mean(axis=1)), (2.5, 97.5))
+        return float(low), float(high)
+
+
+def left_out_errors(
+    chain: Chain, description: Description, postures: Postures, names: tuple[str, ...]
+) -> tuple[LeftOut, ...]:
+    """Of `registration`, `model_2` and `full`, those of `names`; rows that could be fitted in no fold are absent."""
+    parts = np.array_split(np.random.default_rng(0).permutation(len(postures)), FOLDS)
+    found = []
+    for name in names:
+        whole = _errors(name, chain, description, postures, postures)
+        error = np.full(len(postures), np.nan)
+        for part in parts:
+            kept = np.setdiff1d(np.arange(len(postures)), part)
+            error[part] = _errors(name, chain, description, postures.rows(kept), postures.rows(part))
+        if np.isfinite(error).any():
+            found.append(LeftOut(name, error, _rms(whole)))
+    return tuple(found)
+
+
+def cross_validated(
+    chain: Chain, description: Description, postures: Postures, models: tuple[Model, ...], main: str
+) -> tuple[Verdict, ...]:
+    """The error of the main row beside the registration's, and parameters far from nominal, as findings.
+
+    Args:
+        chain: Nominal.
+        description: Of the dataset.
+        postures: Of the calibration.
+        models: Of the estimate.
+        main: The row that stands for the estimate.
+    """
+    row = main if main in _FITS else "model_2"
+    if row not in {m.name for m in models}:
+        return ()
+    needed = fewest(chain, postures.components)
+    if len(postures) * (FOLDS - 1) < needed * FOLDS:
+        what = f"{len(postures)} postures are too few to leave a fifth out: {needed} have to remain"
+        return (Verdict(STAGE, "warning", f"no cross-validated error: {what}; record more"),)
+    rows = {f.model: f for f in left_out_errors(chain, description, postures, ("registration", row))}
+    if row not in rows:
+        return (
+            Verdict(STAGE, "warning", f"no cross-validated error: no fold without a fifth could be fitted for {row}"),
+        )
+    best = rows[row]
+    low, high = best.interval
+    beside = f", registration {1e3 * rows['registration'].rmse:.2f} mm" if "registration" in rows else ""
+    n = int(np.isfinite(best.error).sum())
+    message = (
+        f"{row}: hand error at left-out postures {1e3 * best.rmse:.2f} mm rms (95 % interval {1e3 * low:.2f} to "
+        f"{1e3 * high:.2f}){beside}; residual {1e3 * best.residual:.2f} mm; {n} postures, {FOLDS} folds"
+    )
+    return (Verdict(STAGE, "ok", message), *_worth_looking_at(next(m for m in models if m.name == row)))
+
+
+def _errors(name: str, chain: Chain, description: Description, fitted: Postures, predicted: Postures) -> np.ndarray:
+    """Distances (n,) [m] at `predicted` of a row fitted to `fitted`, NaN where that must not be used."""
+    try:
+        model, said = _FITS[name](chain, description, fitted)
+    except CalibrationError:
+        return np.full(len(predicted), np.nan)
+    if any(v.verdict == "refused" for v in said):
+        return np.full(len(predicted), np.nan)
+    T = hand_of(model, chain, nominal_frames(chain, description)).poses(predicted.q)
+    p = T[:, :3, 3] + T[:, :3, :3] @ predicted.point
+    T_seen = predicted.T_base_hand
+    seen = T_seen[:, :3, 3] if predicted.components == 3 else T_seen[:, :3, 3] + T_seen[:, :3, :3] @ predicted.point
+    return np.asarray(np.linalg.norm(p - seen, axis=1))
+
+
+def _worth_looking_at(model: Model) -> tuple[Verdict, ...]:
+    """Parameters of the robot that are farthest from nominal, in standard deviations."""
+    mine = [p for p in model.parameters if p.status == "estimated" and p.name.startswith(("encoder.", "geometry."))]
+    far = sorted(
+        (p for p in mine if abs(p.value - p.nominal) > _FAR * p.sigma),
+        key=lambda p: -abs(p.value - p.nominal) / p.sigma,
+    )
+    if not far:
+        return ()
+    shown = ", ".join(
+        f"{p.name} {1e3 * (p.value - p.nominal):+.1f} +- {1e3 * p.sigma:.1f} m{p.unit}" for p in far[:_SHOWN]
+    )
+    return (Verdict(STAGE, "ok", f"farthest from nominal in standard deviations: {shown}"),)
+
+
+def _rms(error: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(error**2)))
+
+
+_FITS = {"registration": register, "model_2": calibrate_geometry, "full": calibrate_gears}
