@@ -5,16 +5,6 @@
 (R_i, p_i) is the tool's nominal pose, y_i the measured origin of the hand's body, t its place in the tool, (X, x) the
 laboratory in the robot's base: linear in all 15 unknowns while X is any matrix. Its determinant is the cube of the
 scale between robot and laboratory and tells wrong units and mirrored axes; its nearest rotation is the start of a fit.
-
-Rotations nearest to 3x3 matrices, many at once: those that maximise trace(R' B).
-
-    R = ((k + |B|^2) B + l cof(B) - B B' B) / (k l - det B),     k = (l^2 - |B|^2) / 2
-    (l^2 - |B|^2)^2 - 8 l det B - 4 |cof B|^2 = 0                l its largest root, s1 + s2 + sign(det B) s3
-
-(s singular values, |.| Frobenius norms, cof the matrix of cofactors). All roots are real, so that Newton's method falls
-monotonically from an upper bound; a matrix of rank 2 is as good as any. Where s2 + sign(det B) s3 is next to zero, many
-rotations are as near and the singular value decomposition chooses.
-Reference: Markley, Journal of the Astronautical Sciences 1993 (FOAM).
 """
 
 from dataclasses import dataclass
@@ -29,9 +19,6 @@ _MANY = 100  # postures that are enough for a start
 _ROUNDS = 8  # of weighing by the inverse of the distance left: the sum of distances is minimised, not of squares
 _FLAT = 1e-12  # eigenvalues of the normal equations below this share of the largest are zero [-]
 _TRIMMED = 4.0  # distances beyond this many medians are left out in the end
-_STEPS = 100
-_STILL = 1e-15  # relative step of the root [-]
-_CLEAR = 1e-5  # smallest denominator over l^3 for which rounding does not matter [-]
 _TURNED = 1e-3  # second singular value of the arm's turns over the first, below which they share one axis [-]
 _ODD = 3.0  # times the median distance left, beyond which a posture is wrong
 _FEWEST = 4  # postures
@@ -70,8 +57,7 @@ def registration_start(T_tool: np.ndarray, T_lab_hand: np.ndarray, oriented: boo
     rows = residual <= _TRIMMED * max(np.median(residual), 1e-12)
     X = x[3:12].reshape(3, 3)
     det = float(np.linalg.det(X))
-    U, _, Vt = np.linalg.svd(X)
-    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    R = nearest_rotations(X[None])[0]
     # With the rotation known, the two translations are linear.
     C = np.concatenate([T_tool[:, :3, :3], np.broadcast_to(-np.eye(3), (n, 3, 3))], axis=2)
     e = y @ R.T + b
@@ -86,45 +72,7 @@ def registration_start(T_tool: np.ndarray, T_lab_hand: np.ndarray, oriented: boo
 
 
 def nearest_rotations(B: np.ndarray) -> np.ndarray:
-    """R (n, 3, 3) with the largest trace(R' B) of matrices B (n, 3, 3)."""
-    cofactors = _cofactors(B)
-    det, squared = (B[:, 0] * cofactors[:, 0]).sum(axis=1), (B * B).sum(axis=(1, 2))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = _largest_root(det, squared, 4.0 * (cofactors * cofactors).sum(axis=(1, 2)))
-        k = 0.5 * (root * root - squared)
-        below = k * root - det
-        R = (k + squared)[:, None, None] * B + root[:, None, None] * cofactors - B @ (np.swapaxes(B, 1, 2) @ B)
-        R /= below[:, None, None]
-        R = 1.5 * R - 0.5 * R @ (np.swapaxes(R, 1, 2) @ R)  # orthogonal to the last digit
-    clear = below > _CLEAR * root**3
-    if not clear.all():
-        R[~clear] = _decomposed(B[~clear])
-    return R
-
-
-def _largest_root(det: np.ndarray, squared: np.ndarray, fourth: np.ndarray) -> np.ndarray:
-    """Largest root (n,) of (l^2 - squared)^2 - 8 l det - fourth = 0; NaN where all are zero."""
-    root, eight = np.sqrt(3.0 * squared), 8.0 * det
-    for _ in range(_STEPS):
-        m = root * root - squared
-        step = (m * m - root * eight - fourth) / (4.0 * root * m - eight)
-        root = root - step
-        if not (np.abs(step) > _STILL * root).any():
-            break
-    return root
-
-
-def _cofactors(B: np.ndarray) -> np.ndarray:
-    """cof(B) (n, 3, 3), with B' cof(B) = det(B) I: rows are cross products of the other rows."""
-    C = np.empty_like(B)
-    for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            C[:, i, a] = B[:, j, b] * B[:, l, c] - B[:, j, c] * B[:, l, b]
-    return C
-
-
-def _decomposed(B: np.ndarray) -> np.ndarray:
-    """The same by singular values."""
+    """R (n, 3, 3) with the largest trace(R' B) of matrices B (n, 3, 3): U diag(1, 1, det(U V')) V' of B = U S V'."""
     U, _, Vt = np.linalg.svd(B)
     U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
     return np.asarray(U @ Vt)
@@ -143,12 +91,9 @@ def start(M: np.ndarray, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             f"{len(M)} postures turn the arm about one axis only; a turn of arm base "
             "and tool about it cannot be told apart"
         )
-    U, _, Vt = np.linalg.svd(a.T @ b)
-    R_X = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    R_X = nearest_rotations((a.T @ b)[None])[0]
     R_Y = Rotation.from_matrix(np.swapaxes(R_X @ A[:, :3, :3], 1, 2) @ M[:, :3, :3]).mean().as_matrix()
-    left = np.concatenate([np.broadcast_to(np.eye(3), (len(A), 3, 3)), R_X @ A[:, :3, :3]], axis=2).reshape(-1, 6)
-    p = np.linalg.lstsq(left, (M[:, :3, 3] - A[:, :3, 3] @ R_X.T).ravel(), rcond=None)[0]
-    return compose(R_X, p[:3]), compose(R_Y, p[3:])
+    return _with_translations(R_X, R_Y, A, M)
 
 
 def hand_eye(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
