@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from calibration.evaluation.results import Evaluation
     from calibration.pipeline import calibrate
     from calibration.prediction.compensator import Compensator
-    from calibration.prediction.predicted_trial import Prediction
     from calibration.prediction.predictor import predictions
     from calibration.recording.dataset import Dataset, load
+    from calibration.stages.geometry.from_arrays import fit_geometry
 
 __all__ = [
     "CalibrationError",
@@ -24,9 +24,9 @@ __all__ = [
     "Dataset",
     "Estimate",
     "Evaluation",
-    "Prediction",
     "calibrate",
     "evaluate",
+    "fit_geometry",
     "load",
     "load_estimate",
     "predictions",
@@ -41,9 +41,9 @@ _MODULES = {
     "evaluation.results": ("Evaluation",),
     "pipeline": ("calibrate",),
     "prediction.compensator": ("Compensator",),
-    "prediction.predicted_trial": ("Prediction",),
     "prediction.predictor": ("predictions",),
     "recording.dataset": ("Dataset", "load"),
+    "stages.geometry.from_arrays": ("fit_geometry",),
 }
 
 

@@ -122,7 +122,7 @@ def stacked(parts: Sequence[Linearised], columns: Sequence[np.ndarray], theta: n
     for part, mine in zip(parts, columns, strict=True):
         rows, of = slice(row, row + len(part.r)), part.r.shape[1]
         r[rows, :of] = part.r
-        J[rows, :of, mine] = part.J.transpose(2, 0, 1)
+        J[rows, :of, mine] = part.J
         B[rows, :of, source : source + part.B.shape[2]] = part.B
         for k in range(of, d):
             B[rows, k, sources + k] = 1.0

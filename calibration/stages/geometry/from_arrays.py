@@ -7,14 +7,13 @@ errors and the priors' widths (`evidence`). Postures that no error of the robot 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from calibration.errors import NotCalibrated, NotEnoughData, ShapeError
-from calibration.inference.identifiability import Identifiability, identifiability
-from calibration.inference.map_estimate import Fit, spread
-from calibration.inference.outliers import robust_fit
+from calibration.inference.identifiability import Identifiability
+from calibration.inference.map_estimate import Fit
 from calibration.inference.parameters import ParameterSet
 from calibration.mocap.cluster_shape import Cluster, cluster, in_line
 from calibration.mocap.postures import Postures
@@ -26,16 +25,15 @@ from calibration.robot.chain import Chain, chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
 from calibration.robot.parameter_block import Known, joint_lengths, parameters_of
-from calibration.stages.geometry.gear_deflection import with_gears_averaged
-from calibration.stages.geometry.guards import unusable_data, unusable_fit
-from calibration.stages.geometry.hand_residual import HAND_NAMES, NoiseModel, hand_problem
+from calibration.stages.geometry.gear_deflection import fit_gears
+from calibration.stages.geometry.guards import unusable_data
+from calibration.stages.geometry.hand_residual import HAND_NAMES, NoiseModel
 from calibration.stages.geometry.parameters import hand_model, reading_names
 from calibration.verdict import Verdict
 
 _STAGE = "geometry"
 _LEAST = 1e-6  # [m, rad] smallest noise of a measured pose
 _FIXED = 1e-6  # [rad]
-_SPREAD = 720  # components from which rank and combinations are told
 
 
 @dataclass(frozen=True)
@@ -133,27 +131,17 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     start = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
     if refused := list(unusable_data(chain, postures.q, start, 6 if oriented else 3)):
         raise NotCalibrated(refused)
-    tau = chain.gravity_torques(postures.q)
     nominal, reading = hand_model(chain, start.frames), widths.reading * joint_lengths(chain)
-    parameters = _parameters(nominal, widths, tau, oriented)
+    less, more = _parameters(nominal, widths, chain.gravity_torques(postures.q), oriented)
     pose = np.array([widths.position, widths.orientation][: 1 + oriented])
-    errors = NoiseModel(reading, 1e-2 * reading, pose)
-    found = robust_fit(
-        lambda some: hand_problem(nominal, parameters, postures.rows(some), errors, tau[some]),
-        len(postures),
-        3 + 3 * oriented,
-        parameters.nominal,
-    )
-    some = spread(len(found.fit.at.r), 3 + 3 * oriented, _SPREAD)
-    known = identifiability(found.fit.rows_white(some), parameters)
-    if refused := list(unusable_fit(nominal, parameters, found, known, len(postures))):
-        raise NotCalibrated(refused)
-    fit = with_gears_averaged(found.fit, parameters, nominal)
-    left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~found.kept].tolist()}))
-    verdicts = _verdicts(left_out, len(q), known, parameters)
-    return GeometryFit(
-        nominal.with_theta(fit.theta, parameters.names), parameters, fit, markers, left_out, verdicts, known
-    )
+    found = fit_gears(nominal, less, more, postures, NoiseModel(reading, 1e-2 * reading, pose))
+    if found.rejected:
+        raise NotCalibrated(found.rejected)
+    used = found.robust.kept
+    left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~used].tolist()}))
+    verdicts = _verdicts(left_out, len(q), found.known, found.parameters)
+    hand = nominal.with_theta(found.fit.theta, found.parameters.names)
+    return GeometryFit(hand, found.parameters, found.fit, markers, left_out, verdicts, found.known)
 
 
 def _verdicts(
@@ -183,8 +171,8 @@ def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarra
     return Postures(q[usable], body.T[usable], covariance, np.zeros(int(usable.sum()))), body.xyz, usable
 
 
-def _parameters(hand: HandModel, widths: Widths, tau: np.ndarray, oriented: bool) -> ParameterSet:
-    """Everything, frames without a prior; what a single point cannot tell of the hand's rotation stays at zero."""
+def _parameters(hand: HandModel, widths: Widths, tau: np.ndarray, oriented: bool) -> tuple[ParameterSet, ParameterSet]:
+    """Without and with backlash. Frames have no prior, but the hand's rotation, fixed where only a point was seen."""
     tolerances = Tolerances(
         joint_translation=widths.translation,
         joint_rotation=widths.rotation,
@@ -195,10 +183,10 @@ def _parameters(hand: HandModel, widths: Widths, tau: np.ndarray, oriented: bool
         link_mass=1.0,
         link_com=1.0,
     )
-    blocks = [block for block in hand.blocks if not isinstance(block, BacklashPreload)]
-    found = parameters_of(blocks, Known(hand.nominal, tolerances, tau, widths.deflection))
-    tolerance = found.tolerance.copy()
-    frames = found.indices(hand.block(Frames).names)
-    tolerance[frames] = np.inf
-    tolerance[frames[9:]] = np.inf if oriented else _FIXED
-    return replace(found, tolerance=tolerance)
+    known = Known(hand.nominal, tolerances, tau, widths.deflection)
+    more = parameters_of(hand.blocks, known)
+    less = parameters_of([b for b in hand.blocks if not isinstance(b, BacklashPreload)], known)
+    frames, width = more.indices(hand.block(Frames).names), np.full(12, np.inf)
+    width[9:] = np.inf if oriented else _FIXED
+    less.tolerance[frames], more.tolerance[frames] = width, width
+    return less, more

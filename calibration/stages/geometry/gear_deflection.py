@@ -11,12 +11,12 @@ A fit averaged over which gears give under load: most of a robot's do not, and a
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.inference.identifiability import identifiability
-from calibration.inference.map_estimate import Fit
+from calibration.inference.identifiability import Identifiability, identifiability
+from calibration.inference.map_estimate import Fit, spread
 from calibration.inference.model_averaging import averaged, log_bayes_factor
 from calibration.inference.outliers import RobustFit
 from calibration.inference.parameters import Model, ParameterSet
@@ -40,6 +40,7 @@ from calibration.stages.geometry.stage import STAGE, fit_robustly, left_out
 from calibration.verdict import Verdict
 
 _HAND = np.array([5e-4, 1e-3])  # random errors of the hand's position [m] and rotation [rad] to begin with
+_SPREAD = 720  # components from which rank and combinations are found
 _STRONG = np.log(20.0)  # evidence called strong by Kass and Raftery, JASA 1995
 
 
@@ -49,17 +50,46 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
     parameters, more = (make(chain, description, tau) for make in (compliance_parameters, full_parameters))
     hand, reading = hand_model(chain, nominal_frames(chain, description)), reading_sigma(chain, description)
     errors = NoiseModel(reading, 1e-2 * reading, _HAND[: postures.components // 3])
+    found = fit_gears(hand, parameters, more, postures, errors)
+    model = model_of("full", chain, found.parameters, found.fit)
+    if found.rejected:
+        return model, tuple(Verdict(STAGE, "refused", message) for message in found.rejected)
+    return model, (*left_out(postures, found.robust), *_findings(model, hand))
+
+
+@dataclass(frozen=True)
+class GearFit:
+    """A fit of geometry and gears.
+
+    Attributes:
+        fit: Averaged over which gears are compliant and have backlash.
+        robust: Before averaging, with the postures it is of.
+        parameters: With backlash, unless the postures speak strongly against it.
+        known: Rank and combinations.
+        rejected: Why it must not be used.
+    """
+
+    fit: Fit
+    robust: RobustFit
+    parameters: ParameterSet
+    known: Identifiability
+    rejected: tuple[str, ...]
+
+
+def fit_gears(
+    hand: HandModel, parameters: ParameterSet, more: ParameterSet, postures: Postures, errors: NoiseModel
+) -> GearFit:
+    """Fit `parameters`, and `more` of them, with backlash, unless the postures speak strongly against it."""
     found = fit_robustly(hand, parameters, postures, errors)
-    known = identifiability(found.fit.J_white, parameters)
-    refused = [Verdict(STAGE, "refused", m) for m in unusable_fit(hand, parameters, found, known, len(postures))]
-    if not refused and _evidence_for_backlash(found, hand, more, postures) > -_STRONG:
+    some = spread(len(found.fit.at.r), postures.components, _SPREAD)
+    known = identifiability(found.fit.rows_white(some), parameters)
+    rejected = tuple(unusable_fit(hand, parameters, found, known, len(postures)))
+    if not rejected and _evidence_for_backlash(found, hand, more, postures) > -_STRONG:
         again = fit_robustly(hand, more, postures, errors)
         if again.fit.converged:
             parameters, found = more, again
-    model = model_of("full", chain, parameters, with_gears_averaged(found.fit, parameters, hand))
-    if refused:
-        return model, tuple(refused)
-    return model, (*left_out(postures, found), *_findings(model, hand))
+            known = identifiability(found.fit.rows_white(some[some < len(found.fit.at.r)]), parameters)
+    return GearFit(_averaged(found.fit, parameters, hand), found, parameters, known, rejected)
 
 
 def _evidence_for_backlash(found: RobustFit, hand: HandModel, more: ParameterSet, postures: Postures) -> float:
@@ -84,7 +114,7 @@ def _findings(model: Model, hand: HandModel) -> Iterator[Verdict]:
             yield Verdict(STAGE, "ok", f"{what}: {told or 'none'}")
 
 
-def with_gears_averaged(fit: Fit, parameters: ParameterSet, hand: HandModel) -> Fit:
+def _averaged(fit: Fit, parameters: ParameterSet, hand: HandModel) -> Fit:
     """The fit with theta and covariance averaged; `at`'s residuals and derivatives stay those of all gears giving."""
     asked = np.array(parameters.indices(averaged_names(hand)))
     width = np.sqrt(parameters.prior.factor(fit.widths.prior)[asked]) * parameters.tolerance[asked]
