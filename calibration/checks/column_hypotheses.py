@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from calibration.numerics.lie import inverse, rotation_vector
-from calibration.numerics.signals import Signal, body_rates, even, low_passed
+from calibration.numerics.signals import Signal, body_rates, even, interpolate_columns, low_passed
 from calibration.numerics.time_delay import coarse_lag
 from calibration.robot.chain import Chain
 
@@ -86,7 +86,7 @@ class Shown:
             good &= (s > self.s[0]) & (s < self.s[-1])
         rows = np.flatnonzero(good)
         rows = rows[:: max(1, len(rows) // most)]
-        at = np.stack([np.interp(s[rows], self.s, c) for c in q.T], axis=1) if len(self.t) else q[rows]
+        at = interpolate_columns(s[rows], self.s, q) if len(self.t) else q[rows]
         return chain.poses(at), self.T[rows]
 
 

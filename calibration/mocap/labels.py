@@ -30,7 +30,9 @@ from itertools import combinations, permutations
 import numpy as np
 
 from calibration.mocap.cluster_pose import body_poses
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import rotation_vector
+from calibration.numerics.signals import interpolate_columns
 from calibration.recording.dataset import Dataset
 from calibration.recording.schema import Body, Role, TrialEntry
 from calibration.recording.trial import Trial
@@ -77,25 +79,28 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
     return (replace(trial, marker_position=position) if done else trial), tuple(done)
 
 
-def relabelled_trial(dataset: Dataset, entry: TrialEntry) -> Trial:
+def relabelled_trial(dataset: Dataset, entry: TrialEntry) -> MeasuredTrial:
     """Read one continuous trial, exchanged marker labels corrected.
 
     Raises:
         InputError: As `Dataset.read`.
     """
-    return with_right_labels(dataset.description.bodies, dataset.read(entry))[0]
+    description = dataset.description
+    return MeasuredTrial.of(description, with_right_labels(description.bodies, dataset.read(entry))[0])
 
 
-def relabelled_trials(dataset: Dataset, role: Role, *kinds: str) -> Iterator[tuple[TrialEntry, Trial]]:
+def relabelled_trials(dataset: Dataset, role: Role, *kinds: str) -> Iterator[tuple[TrialEntry, MeasuredTrial]]:
     """Read the continuous trials of a role one after the other, exchanged marker labels corrected."""
     for entry, trial in dataset.trials(role, *kinds):
-        yield entry, with_right_labels(dataset.description.bodies, trial)[0]
+        yield entry, MeasuredTrial.of(dataset.description, with_right_labels(dataset.description.bodies, trial)[0])
 
 
 def _of_one_shape(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Markers (n, m, 3) set right or masked where they have not the cluster's shape."""
     misfit = _misfit(xyz, p)
     rows = np.flatnonzero(misfit > max(_limit(xyz), _CLEAR * float(np.median(misfit))))
+    if not len(rows):
+        return p
     out = p.copy()
     out[rows] = _mended(xyz, p[rows], _places(t, p, rows))
     return out
@@ -127,7 +132,7 @@ def _places(t: np.ndarray, p: np.ndarray, wrong: np.ndarray) -> np.ndarray:
             continue
         after = np.clip(np.searchsorted(seen, wrong), 1, max(len(seen) - 1, 1))
         apart = np.abs(t[wrong] - t[seen[[after - 1, np.minimum(after, len(seen) - 1)]]]).min(axis=0)
-        at = np.stack([np.interp(t[wrong], t[seen], p[seen, k, axis]) for axis in range(3)], axis=1)
+        at = interpolate_columns(t[wrong], t[seen], p[seen, k])
         out[:, k] = np.where(apart[:, None] <= _NEAR, at, np.nan)
     return out
 

@@ -16,17 +16,17 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import BodyPoses, body_poses, point_of_means, poses_of, poses_of_means, still_poses
-from calibration.numerics.lie import adjoint, compose, inverse, skew, to_vector
-from calibration.numerics.signals import GAP
+from calibration.mocap.cluster_pose import BodyPoses, body_poses, point_of_means, poses_of_means, still_poses
+from calibration.mocap.measured_trial import MeasuredTrial, hand_covariance
+from calibration.numerics.lie import compose, inverse, skew, to_vector
+from calibration.numerics.signals import GAP, interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body, Description
-from calibration.recording.trial import Trial
+from calibration.recording.trial import REST, Trial
 
 _MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
 BLOCKS = 4
-_REST = 1.0  # [s] at the start of every trial
 _log = logging.getLogger(__name__)
 
 
@@ -122,8 +122,7 @@ def _poses(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarray
     """T_base_hand (n, 4, 4), covariance (n, 6, 6) of its local twist, squared distances (n, m) of markers [m2]."""
     hand = poses_of_means(body, means)
     T = inverse(base.T) @ hand.T
-    Ad = adjoint(inverse(T))
-    S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
+    S = hand_covariance(T, base.covariance, hand.covariance)
     return T, S, (np.concatenate([base.residual, hand.residual], axis=1) ** 2).sum(axis=2)
 
 
@@ -139,37 +138,31 @@ def _points(base: BodyPoses, means: PostureMeans, body: Body) -> tuple[np.ndarra
 
 def passing_postures(description: Description, trials: Iterable[Trial], robot: Clock, spacing: float) -> Postures:
     """Postures passed through every `spacing` [s] of these trials, one sample each, their first second left out."""
-    found = [_passed(description, trial, robot, spacing) for trial in trials]
+    found = [_passed(MeasuredTrial.of(description, trial), robot, spacing) for trial in trials]
     motion = np.repeat(np.arange(len(found)), [len(of_trial[1]) for of_trial in found])
     T, q, S, misfit, label = (np.concatenate(x) for x in zip(*found, strict=True))
     good = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
-    S = S * description.sigmas.marker**2
     return Postures(q, T, S, misfit, label, motion=motion).rows(good)
 
 
-def _passed(description: Description, trial: Trial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
+def _passed(trial: MeasuredTrial, robot: Clock, spacing: float) -> tuple[np.ndarray, ...]:
     rows = passed_rows(trial.t_mocap, spacing)
-    passed = replace(trial, t_mocap=trial.t_mocap[rows], marker_position=trial.marker_position[rows])
-    base, hand = (poses_of(body, passed) for body in (description.base_body, description.hand_body))
-    T = inverse(base.T) @ hand.T
-    Ad = adjoint(inverse(T))
-    S = hand.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)
     t = trial.t_mocap[rows]
     label = np.array([f"{trial.id} at {after:.1f} s" for after in t - trial.t_mocap[0]], dtype=str)
-    return T, readings_at(trial, robot, t, trial.q_motor), S, np.zeros(len(rows)), label
+    q = readings_at(trial, robot, t, trial.q_motor)
+    return trial.T_base_hand[rows], q, trial.covariance(rows), np.zeros(len(rows)), label
 
 
 def passed_rows(t: np.ndarray, spacing: float) -> np.ndarray:
     """A sample every `spacing` of times t (n,) [s], the first second left out."""
-    rows = np.searchsorted(t, np.arange(t[0] + _REST, t[-1], spacing))
+    rows = np.searchsorted(t, np.arange(t[0] + REST, t[-1], spacing))
     return np.unique(rows[rows < len(t)])  # arange may pass its end by rounding
 
 
 def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray) -> np.ndarray:
     """Readings (m, n_joints) taken at `t_robot`, at mocap times t (n,) [s], linear; NaN outside it and in holes."""
     s = robot.from_mocap(t)
-    columns = (np.interp(s, trial.t_robot, q, left=np.nan, right=np.nan) for q in readings.T)
-    found = np.stack(list(columns), axis=1)
+    found = interpolate_columns(s, trial.t_robot, readings, np.nan)
     after = np.clip(np.searchsorted(trial.t_robot, s), 1, len(trial.t_robot) - 1)
     found[np.diff(trial.t_robot)[after - 1] > GAP] = np.nan
     return found
@@ -190,8 +183,7 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
         if not np.isfinite(T).all():
             _log.info("%s: base or hand not seen throughout dwell %d", trial.id, k)
             continue
-        Ad = adjoint(inverse(T[0]))
-        covariance = (hand.covariance[0] + Ad @ base.covariance[0] @ Ad.T) / len(seen)
+        covariance = hand_covariance(T[:1], base.covariance[:1], hand.covariance[:1])[0] / len(seen)
         misfit = np.sqrt(np.nanmean(np.concatenate([base.residual[0], hand.residual[0]]) ** 2) * 3.0)
         yield (
             trial.q_motor[rows].mean(axis=0),

@@ -60,6 +60,11 @@ def low_passed(signal: Signal, cutoff: float) -> Signal:
     return Signal(signal.t, sosfiltfilt(sos, signal.x, axis=0, padlen=pad), signal.valid)
 
 
+def interpolate_columns(at: np.ndarray, t: np.ndarray, x: np.ndarray, outside: float | None = None) -> np.ndarray:
+    """Columns x (n, c) at t (n,), linear, at times `at` (m,); beyond the ends `outside`, or the end's value if None."""
+    return np.stack([np.interp(at, t, column, left=outside, right=outside) for column in x.T], axis=1)
+
+
 def body_rates(t: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Angular velocity in the body's axes (n - 1, 3) [rad/s] at mid times, from rotations R (n, 3, 3) at t [s].
 

@@ -108,9 +108,10 @@ def turned(R: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def path_of(model: pin.Model, start: int, end: int) -> Path:
-    """The path in a model between two frames by their ids; `start` must not move."""
+    """The path in a model between two frames by their ids; `end` is carried by all joints that carry `start`."""
     frame = model.frames[end]
-    ids = [i for i in model.supports[frame.parentJoint] if i != 0]
+    carrying = list(model.supports[model.frames[start].parentJoint])
+    ids = [i for i in model.supports[frame.parentJoint] if i not in carrying]
     fixed = [model.jointPlacements[i].homogeneous for i in ids] + [frame.placement.homogeneous]
     fixed[0] = model.frames[start].placement.inverse().homogeneous @ fixed[0]
     S = unit_twists(model)[ids].reshape(-1, 6)

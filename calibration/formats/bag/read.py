@@ -15,6 +15,7 @@ from calibration.errors import InputError
 from calibration.formats.bag.messages import JOINT_STATE, PREFIX, STATISTICS_NAMES, SUFFIXES, typestore
 from calibration.formats.mapping.channels import Joints, Reader, Recorded
 from calibration.formats.mapping.layouts import BagLayout
+from calibration.numerics.signals import interpolate_columns
 
 _FIELDS = tuple(SUFFIXES)
 _FIRST = 200  # messages from which the names of joints are taken
@@ -109,7 +110,7 @@ def _states(path: Path, layout: BagLayout, messages: dict[str, list[Any]]) -> Jo
         fields[field] = np.full((len(t), len(names)), np.nan)
         if topic is not None:
             s, (x,) = _table(path, topic, messages, names, ("position",), required=[])
-            at = [np.interp(t, s, column, left=np.nan, right=np.nan) for column in x.T]
+            at = list(interpolate_columns(t, s, x, np.nan).T)
             fields[field] = np.stack(at, axis=1)
     return Joints(t, tuple(layout.joints), **fields)
 
@@ -177,7 +178,7 @@ def _wrist(path: Path, topic: str, layout: BagLayout, messages: dict[str, list[A
     both = ([m.wrench.force, m.wrench.torque] for m in messages[topic])
     w = np.array([[getattr(part, axis) for part in two for axis in "xyz"] for two in both])
     sign = 1.0 if layout.wrist_convention == "action" else -1.0
-    return sign * np.stack([np.interp(t, s, column, left=np.nan, right=np.nan) for column in w.T], axis=1)
+    return sign * interpolate_columns(t, s, w, np.nan)
 
 
 def _seconds(message: Any) -> float:

@@ -27,9 +27,9 @@ from calibration.mocap.cluster_shape import cluster, misfit, of_one_shape
 from calibration.numerics.alignment import hand_eye, registration_start
 from calibration.numerics.lie import compose, inverse, to_vector
 from calibration.recording.schema import Body, Marker
+from calibration.recording.trial import REST
 from calibration.robot.chain import Chain
 
-_REST = 1.0  # [s]
 _FEWEST = 6  # postures that place a point
 
 
@@ -73,7 +73,7 @@ def _positions(recorded: Recorded, names: Sequence[str], rest: bool = False) -> 
         raise InputError(recorded.file, f"markers {missing} of an undrawn body are not in the file")
     p = group.position[:, [known.index(name) for name in names]]
     if rest and recorded.markers is not None:
-        p = p[recorded.markers.t <= recorded.markers.t[0] + _REST]
+        p = p[recorded.markers.t <= recorded.markers.t[0] + REST]
     return p
 
 

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
-from calibration.numerics.lie import inverse
-from calibration.numerics.signals import Signal, body_rates, even, low_passed, play
+from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.signals import Signal, body_rates, even, interpolate_columns, low_passed, play
 from calibration.numerics.time_delay import Pair, coarse_lag
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -39,10 +38,9 @@ class Motion:
 
 def robot_motions(description: Description, chain: Chain, trials: Sequence[Trial]) -> Iterator[Motion]:
     """Angular velocity of the hand in the base, of every trial that shows one."""
-    base, hand = description.base_body, description.hand_body
     for trial in trials:
         try:
-            T_base_hand = inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
+            T_base_hand = MeasuredTrial.of(description, trial).T_base_hand
             y = low_passed(even(*body_rates(trial.t_mocap, T_base_hand[:, :3, :3])), _CUTOFF)
             x, nuisance = _robot_rates(chain, trial)
         except NotEnoughData as error:
@@ -62,7 +60,7 @@ def _aligned(y: Signal, x: Signal) -> Signal:
     adds to a speed near zero, which is where backlash shows.
     """
     s = y.t - coarse_lag(_speed(y), _speed(x))
-    at = np.stack([np.interp(s, x.t, column, left=0.0, right=0.0) for column in x.x.T], axis=1)
+    at = interpolate_columns(s, x.t, x.x, 0.0)
     U, _, Vt = np.linalg.svd(y.x.T @ at)
     return replace(y, x=y.x @ U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
 
@@ -102,7 +100,7 @@ def plate_motions(
             joints = JointMotion(robot.to_mocap(trial.t_robot), trial.q_motor)
             if model is not None:
                 joints = link_angles(model, description, trial, robot)
-            x, (y, nuisance) = plate_moments(trial), model_moments(parts, description, trial, joints)
+            x, (y, nuisance) = plate_moments(trial), model_moments(parts, MeasuredTrial.of(description, trial), joints)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             continue

@@ -23,12 +23,14 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
-from calibration.numerics.lie import from_vector, inverse, mean, to_vector
-from calibration.numerics.signals import RATE, Signal, even, low_passed
+from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.lie import from_vector, inverse, mean, skew, to_vector
+from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
 from calibration.numerics.time_delay import Pair, coarse_lag
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import Trial
+from calibration.robot.floating_base import configurations, root_wrenches
+from calibration.robot.kinematics import path_of
 
 _CUTOFF = 4.0  # [Hz]
 _DECIMATED = 0.01  # [s] plate samples averaged together
@@ -99,66 +101,61 @@ def plate_moments(trial: Trial) -> Signal:
     return low_passed(even(t, moment[:n, :2].reshape(-1, size, 2).mean(axis=1)), _CUTOFF)
 
 
-def model_moments(
-    parts: Sequence[Carrier], description: Description, trial: Trial, joints: JointMotion
-) -> tuple[Signal, np.ndarray]:
+def model_moments(parts: Sequence[Carrier], trial: MeasuredTrial, joints: JointMotion) -> tuple[Signal, np.ndarray]:
     """The same from masses and motion, on the mocap clock, and what errors of the masses would add (n, k, 2).
 
     Raises:
         NotEnoughData: A body is not in view for long enough.
     """
-    order = [description.joint_names.index(name) for name in list(parts[0].model.names)[2:]]
+    order = [trial.description.joint_names.index(name) for name in list(parts[0].model.names)[2:]]
     q = low_passed(even(joints.t, joints.q[:, order]), _CUTOFF)
     found = [_carried(part, trial, q) for part in parts]
     whole, valid = sum(m[:, 0] for m, _ in found), np.logical_and.reduce([q.valid, *(v for _, v in found)])
     return Signal(q.t, np.asarray(whole), valid), np.concatenate([m[:, 1:] for m, _ in found], axis=1)
 
 
-def _carried(part: Carrier, trial: Trial, q: Signal) -> tuple[np.ndarray, np.ndarray]:
+def _carried(part: Carrier, trial: MeasuredTrial, q: Signal) -> tuple[np.ndarray, np.ndarray]:
     """Moments (n, 11, 2) of what a body carries and of unit errors of its link's inertial parameters; validity (n,)."""
     rows = np.append(np.arange(0, len(q.t) - 1, _STRIDE), len(q.t) - 1)
     T_lab_link, valid = _link_poses(part.body, trial, q.t)
     T = T_lab_link @ inverse(_root_to_link(part, q.x))
     rates, turns, link_turns = np.gradient(q.x, 1.0 / RATE, axis=0), _body_twists(T), _body_twists(T_lab_link)
     accelerations, pushes, link_pushes = (np.gradient(v, 1.0 / RATE, axis=0) for v in (rates, turns, link_turns))
-    model, data, neutral, found = part.model, part.model.createData(), pin.neutral(part.model), []
-    for row in rows:
-        at = pin.integrate(model, neutral, np.append(np.zeros(6), q.x[row]))
-        at[:7] = pin.SE3ToXYZQUAT(pin.SE3(T[row]))
-        v, a = np.append(turns[row], rates[row]), np.append(pushes[row], accelerations[row])
-        whole = _action(T[row], trial) @ pin.rnea(model, data, at, v, a)[:6]
-        felt = pin.Motion(link_pushes[row]) - pin.SE3(T_lab_link[row]).actInv(model.gravity)
-        rigid = _action(T_lab_link[row], trial) @ pin.bodyRegressor(pin.Motion(link_turns[row]), felt)
-        found.append(np.concatenate([whole[None], rigid.T]))
-    return CubicSpline(rows, np.array(found))(np.arange(len(q.t))), valid
+    at = configurations(part.model, T[rows], q.x[rows])
+    v, a = np.hstack([turns, rates])[rows], np.hstack([pushes, accelerations])[rows]
+    whole = _action(T[rows], trial) @ root_wrenches(part.model, at, v, a)[..., None]
+    R = T_lab_link[rows, :3, :3]
+    felt = link_pushes[rows]
+    felt[:, :3] -= part.model.gravity.linear @ R
+    Y = np.array([pin.bodyRegressor(pin.Motion(v), pin.Motion(a)) for v, a in zip(link_turns[rows], felt, strict=True)])
+    found = np.concatenate([np.swapaxes(whole, 1, 2), np.swapaxes(_action(T_lab_link[rows], trial) @ Y, 1, 2)], axis=1)
+    return CubicSpline(rows, found)(np.arange(len(q.t))), valid
 
 
 def _action(T_lab_frame: np.ndarray, trial: Trial) -> np.ndarray:
-    """Rows (2, 6): wrench that holds links, in a frame's axes -> moments Mx, My of its reaction on the plate."""
-    centre = trial.plate_centre[0]
-    return -pin.SE3(T_lab_frame[:3, :3], T_lab_frame[:3, 3] - centre).dualAction[3:5]
+    """Rows (n, 2, 6): wrench that holds links, in a frame's axes -> moments Mx, My of its reaction on the plate."""
+    R, p = T_lab_frame[:, :3, :3], T_lab_frame[:, :3, 3] - trial.plate_centre[0]
+    return -np.concatenate([skew(p) @ R, R], axis=2)[:, :2]
 
 
-def _link_poses(body: Body, trial: Trial, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _link_poses(body: Body, trial: MeasuredTrial, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """T_lab_link (n, 4, 4) at t with the link where the body's markers are, smooth, and validity (n,)."""
-    T = poses_of(body, trial).T @ inverse(from_vector(np.array(body.placement)))
+    T = trial.poses(body).T @ inverse(from_vector(np.array(body.placement)))
     if not np.isfinite(T).any():
         raise NotEnoughData(f"{trial.id}: body {body.name!r} is never in view")
     middle = mean(T)
     moved = low_passed(even(trial.t_mocap, to_vector(inverse(middle) @ T)), _CUTOFF)
-    columns = [np.interp(t, moved.t, c) for c in moved.x.T]
+    at = interpolate_columns(t, moved.t, moved.x)
     valid = np.interp(t, moved.t, moved.valid.astype(float), 0.0, 0.0) == 1.0
-    return middle @ from_vector(np.stack(columns, axis=1)), valid
+    return middle @ from_vector(at), valid
 
 
 def _root_to_link(part: Carrier, q: np.ndarray) -> np.ndarray:
-    """T_root_link (n, 4, 4) at joint positions q (n, k)."""
-    model, data, link = part.model, part.model.createData(), part.model.getFrameId(part.body.link)
-    neutral, T = pin.neutral(model), np.empty((len(q), 4, 4))
-    for k, row in enumerate(q):
-        pin.forwardKinematics(model, data, pin.integrate(model, neutral, np.append(np.zeros(6), row)))
-        T[k] = data.oMi[1].actInv(pin.updateFramePlacement(model, data, link)).homogeneous
-    return T
+    """T_root_link (n, 4, 4) at joint positions q (n, k), columns in the model's order."""
+    model, link = part.model, part.model.getFrameId(part.body.link)
+    path = path_of(model, model.getFrameId(model.names[1]), link)
+    joints = list(model.supports[model.frames[link].parentJoint])[2:]
+    return path.placed(q[:, [i - 2 for i in joints]]).T
 
 
 def _body_twists(T: np.ndarray) -> np.ndarray:
@@ -173,7 +170,7 @@ def plate_axes(pairs: Sequence[Pair]) -> np.ndarray:
     for pair in pairs:
         y, x = _centred(pair.y), _centred(pair.x)
         s = y.t - coarse_lag(_length(y), _length(x))
-        at = np.stack([np.interp(s, x.t, column, left=0.0, right=0.0) for column in x.x.T], axis=1)
+        at = interpolate_columns(s, x.t, x.x, 0.0)
         C += y.x.T @ at
     U, _, Vt = np.linalg.svd(C)
     Q = U @ Vt

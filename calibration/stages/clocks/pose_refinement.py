@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import Postures, passing_postures, static_postures
 from calibration.numerics.lie import inverse, rotation_vector
 from calibration.numerics.time_delay import Lag
@@ -100,7 +101,9 @@ def refined_lags(robot: Provisional, description: Description, trials: Sequence[
     lags = []
     for trial in trials:
         try:
-            lags.append(_refined(robot, read_samples(description, trial, clock, calm=True), trial.id, clock))
+            lags.append(
+                _refined(robot, read_samples(MeasuredTrial.of(description, trial), clock, calm=True), trial.id, clock)
+            )
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
     return lags
@@ -113,7 +116,7 @@ def link_angles(robot: Provisional, description: Description, trial: Trial, cloc
 
     Joints that are not on the way to the hand keep their readings.
     """
-    x = read_samples(description, trial, clock, calm=False)
+    x = read_samples(MeasuredTrial.of(description, trial), clock, calm=False)
     J, D = robot.hand.joint_jacobians(x.q), robot.play**2
     r = _residuals(x.T, robot.hand.poses(x.q))
     C = x.covariance + (J * D) @ np.swapaxes(J, 1, 2)

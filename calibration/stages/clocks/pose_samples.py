@@ -11,12 +11,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import BodyPoses, poses_of
-from calibration.numerics.lie import adjoint, inverse
-from calibration.numerics.signals import RATE, Signal, even, low_passed, play
+from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed, play
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description
-from calibration.recording.trial import Trial
 
 HALF_WIDTHS = (1e-4, 4e-4)  # [rad, m]
 _CUTOFF = 6.0  # [Hz] of the readings, for their rates
@@ -46,28 +43,24 @@ class Samples:
     covariance: np.ndarray
 
 
-def read_samples(description: Description, trial: Trial, clock: Clock, calm: bool) -> Samples:
+def read_samples(trial: MeasuredTrial, clock: Clock, calm: bool) -> Samples:
     """Every other sample, without jerky motion if only `calm` ones are wanted.
 
     Raises:
         NotEnoughData: Base and hand are hardly in view, or nothing is calm.
     """
-    base, hand = poses_of(description.base_body, trial), poses_of(description.hand_body, trial)
-    s, T = clock.from_mocap(trial.t_mocap), inverse(base.T) @ hand.T
+    s, T = clock.from_mocap(trial.t_mocap), trial.T_base_hand
     slow = low_passed(even(trial.t_robot, trial.q_motor), _CUTOFF)
     rates = np.gradient(slow.x, 1.0 / RATE, axis=0)
-    q, v = _at(s, trial.t_robot, trial.q_motor), _at(s, slow.t, rates)
-    lost = np.stack([_at(s, slow.t, play(slow.x, np.full(q.shape[1], w)) - slow.x) for w in HALF_WIDTHS], axis=2)
+    q = interpolate_columns(s, trial.t_robot, trial.q_motor, np.nan)
+    v = interpolate_columns(s, slow.t, rates, np.nan)
+    gaps = (play(slow.x, np.full(q.shape[1], w)) - slow.x for w in HALF_WIDTHS)
+    lost = np.stack([interpolate_columns(s, slow.t, gap, np.nan) for gap in gaps], axis=2)
     wanted = np.interp(s, slow.t, (_is_calm(slow, rates) | (not calm)).astype(float), 0.0, 0.0) == 1.0
     rows = np.flatnonzero(wanted & np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]
     if len(rows) < _ENOUGH:
         raise NotEnoughData("base and hand are hardly in view, or all motion is jerky")
-    covariance = _covariances(T, base, hand, rows, description)
-    return Samples(trial.t_mocap[rows], q[rows], v[rows], lost[rows], T[rows], covariance)
-
-
-def _at(s: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(s, t, column, left=np.nan, right=np.nan) for column in x.T], axis=1)
+    return Samples(trial.t_mocap[rows], q[rows], v[rows], lost[rows], T[rows], trial.covariance(rows))
 
 
 def _is_calm(slow: Signal, rates: np.ndarray) -> np.ndarray:
@@ -75,11 +68,3 @@ def _is_calm(slow: Signal, rates: np.ndarray) -> np.ndarray:
     jerked = np.abs(np.gradient(rates, 1.0 / RATE, axis=0)).max(axis=1) > _JERK
     near = maximum_filter1d(jerked.astype(float), 2 * int(_AFTER * RATE) + 1)
     return (near == 0.0) & slow.valid
-
-
-def _covariances(
-    T: np.ndarray, base: BodyPoses, hand: BodyPoses, rows: np.ndarray, description: Description
-) -> np.ndarray:
-    Ad = adjoint(inverse(T[rows]))
-    C = hand.covariance[rows] + Ad @ base.covariance[rows] @ np.swapaxes(Ad, 1, 2)
-    return description.sigmas.marker**2 * C

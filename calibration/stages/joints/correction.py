@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.errors import NoSuchElement, ShapeError
-from calibration.numerics.signals import RATE, even, low_passed
+from calibration.numerics.signals import RATE, even, interpolate_columns, low_passed
 from calibration.robot.hand import HandModel
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.joints.model import JointModel
@@ -92,7 +92,7 @@ def velocities(t: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Velocities (n, k) [rad/s, m/s] of q (n, k) at t (n,) [s], zero-phase."""
     smooth = low_passed(even(t, q), _CUTOFF)
     v = np.gradient(smooth.x, 1.0 / RATE, axis=0)
-    return np.stack([np.interp(t, smooth.t, column) for column in v.T], axis=1)
+    return interpolate_columns(t, smooth.t, v)
 
 
 @dataclass(frozen=True)

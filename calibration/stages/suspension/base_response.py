@@ -22,7 +22,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import skew
 from calibration.numerics.signals import CUTOFF, RATE, even, low_passed
 from calibration.recording.clock import Clock
@@ -98,7 +98,7 @@ def sway_of(description: Description, trial: Trial, rest: Rest, load: Load, cuto
         NotEnoughData: Markers or wrench are missing.
     """
     forcing = forcing_of(load, float(trial.t_mocap[0]))
-    found = low_passed(even(trial.t_mocap, rest.displacement(poses_of(description.base_body, trial).T)), cutoff)
+    found = low_passed(even(trial.t_mocap, rest.displacement(MeasuredTrial.of(description, trial).base.T)), cutoff)
     keep = (found.t >= forcing.t[0]) & (found.t <= forcing.t[-1])
     if keep.sum() < 2.0 * RATE:
         raise NotEnoughData(f"{trial.id}: base markers and wrench overlap for less than two seconds")

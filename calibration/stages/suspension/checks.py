@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from calibration.numerics.lie import adjoint
-from calibration.numerics.signals import RATE, Signal, low_passed
+from calibration.numerics.signals import RATE, Signal, interpolate_columns, low_passed
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST
 from calibration.stages.suspension.base_response import Forcing, Sway
@@ -99,7 +99,7 @@ def _slow(plate: Sequence[Forcing], dynamics: Sequence[Forcing]) -> list[tuple[n
         to_plate = adjoint(p.T_0_plate).T  # of a wrench: Ad(T_0_plate)' maps it from frame 0
         slow_p, slow_d = slow_p @ to_plate.T, slow_d @ to_plate.T
         inside = (d.t >= p.t[0]) & (d.t <= p.t[-1])
-        at = np.stack([np.interp(d.t[inside], p.t, column) for column in slow_p.T], axis=1)
+        at = interpolate_columns(d.t[inside], p.t, slow_p)
         rows.append((at, slow_d[inside]))
     return rows
 

@@ -11,7 +11,6 @@ Both wrenches are low-passed at 10 Hz without delay, like the displacement: the 
 0.1 s has its energy below 10 Hz, and what is above is the motion capture's noise. Nothing of 2.5 Hz would slip.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +23,7 @@ from calibration.numerics.wrench import in_frame
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
+from calibration.robot.floating_base import configurations, root_wrenches
 from calibration.robot.laboratory import Laboratory
 
 _DECIMATED = 0.005  # [s] plate samples averaged together
@@ -72,12 +72,14 @@ def dynamics_load(lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarr
     spline = CubicSpline(q.t, q.x)
     T_0_root = _root_in_base(model, description)
     root = pin.SE3(T_lab_0) * T_0_root
-    start = np.concatenate([pin.SE3ToXYZQUAT(root), np.zeros(model.nq - 7)])
-    w = _root_wrenches(model, start, q.x, spline(q.t, 1), spline(q.t, 2)) @ T_0_root.dualAction.T
+    at = configurations(model, np.tile(root.homogeneous, (len(q.t), 1, 1)), q.x)
+    still = np.zeros((len(q.t), 6))
+    v, a = (np.hstack([still, spline(q.t, order)]) for order in (1, 2))
+    w = root_wrenches(model, at, v, a) @ T_0_root.dualAction.T
     data, M = model.createData(), np.zeros((6, 6))
     rows = np.linspace(0, len(q.t) - 1, _MASS_SAMPLES).astype(int)
-    for x in q.x[rows]:
-        M += pin.crba(model, data, _configuration(model, start, x))[:6, :6] / len(rows)
+    for x in at[rows]:
+        M += pin.crba(model, data, x)[:6, :6] / len(rows)
     M = T_0_root.dualAction @ (np.triu(M) + np.triu(M, 1).T) @ T_0_root.inverse().action
     weight = float(M[0, 0] * np.linalg.norm(description.gravity))
     com = np.array([M[2, 4] * -1.0, M[2, 3], M[0, 4]]) / M[0, 0]
@@ -87,23 +89,3 @@ def dynamics_load(lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarr
 def _root_in_base(model: pin.Model, description: Description) -> pin.SE3:
     """T_base_root, root = the body of the free flyer."""
     return model.frames[model.getFrameId(description.base_frame)].placement.inverse()
-
-
-def _configuration(model: pin.Model, start: np.ndarray, x: np.ndarray) -> np.ndarray:
-    if model.nq - 7 == len(x):
-        return np.concatenate([start[:7], x])
-    neutral = pin.neutral(model)
-    neutral[:7] = start[:7]
-    return pin.integrate(model, neutral, np.concatenate([np.zeros(6), x]))
-
-
-def _root_wrenches(
-    model: pin.Model, start: np.ndarray, q: np.ndarray, v: np.ndarray, a: Sequence[np.ndarray] | np.ndarray
-) -> np.ndarray:
-    """Wrench of the world on the root (n, 6), root axes, about the root's origin."""
-    data, still = model.createData(), np.zeros(6)
-    out = np.empty((len(q), 6))
-    for k, (q_k, v_k, a_k) in enumerate(zip(q, v, a, strict=True)):
-        full = _configuration(model, start, q_k)
-        out[k] = pin.rnea(model, data, full, np.concatenate([still, v_k]), np.concatenate([still, a_k]))[:6]
-    return out

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibration.errors import ShapeError
 from calibration.inference.parameters import Combination, Parameter
-from calibration.numerics.signals import RATE
+from calibration.numerics.signals import RATE, interpolate_columns
 from calibration.stages.suspension.base_response import Forcing
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.modal_response import Modes, modes_of, predicted
@@ -70,10 +70,10 @@ class Suspension:
         if wrench.shape != (len(t), 6):
             raise ShapeError("wrench", wrench.shape, (len(t), 6))
         grid = t[0] + np.arange(int(np.ceil((t[-1] - t[0]) * RATE - 1e-6)) + 1) / RATE
-        w = np.stack([np.interp(grid, t, column) for column in wrench.T], axis=1)
+        w = interpolate_columns(grid, t, wrench)
         none = np.zeros((6, 6))
         x = self.displaced(Forcing(grid, w, np.zeros(6), none, self.tangent, np.eye(4)), "plate")
-        return np.stack([np.interp(t, grid, column) for column in x.T], axis=1)
+        return interpolate_columns(t, grid, x)
 
     def displaced(self, forcing: Forcing, source: Source) -> np.ndarray:
         """Displacement (n, 6) [m, rad] under a forcing, axes that are not moved at zero."""

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import compose, from_vector, inverse, mean, to_vector
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
@@ -51,7 +51,7 @@ def rest_of(description: Description, trial: Trial, T_base_B: np.ndarray) -> Res
     """
     body = description.base_body
     early = trial.t_mocap <= trial.t_mocap[0] + REST
-    T_lab_B = poses_of(body, trial).T[early]
+    T_lab_B = MeasuredTrial.of(description, trial).base.T[early]
     if not np.isfinite(T_lab_B).any():
         raise NotEnoughData(f"{trial.id}: body {body.name!r} is not seen in the first second of the trial")
     return rest_at(description, mean(T_lab_B), T_base_B)
