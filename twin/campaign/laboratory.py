@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,8 +11,18 @@ from twin.campaign.robot import Robot, links_seen, sample
 from twin.campaign.second_session import moved, remounted
 from twin.config.twin import SampledConfig, TwinConfig, sampled_config
 from twin.defects.defect import Defect
+from twin.fields.names import TORSO
+from twin.instruments.clock import Clock
+from twin.instruments.force_plate import ForcePlates, sample_plate
+from twin.instruments.instrument import Instrument
+from twin.instruments.motion_capture import MotionCapture
+from twin.instruments.motion_capture import volume as calibrated_volume
+from twin.instruments.robot_log import RobotLog
+from twin.instruments.wrist_sensor import sample_wrist
 from twin.motions.motion import Motion
+from twin.random_streams import generator
 from twin.simulation.build import Twin, build
+from twin.simulation.force_plates import PlateGrid
 from twin.simulation.gear_limits import check_meshes
 from twin.simulation.kinematic import kinematic_states
 from twin.simulation.rollout import simulate
@@ -38,6 +49,32 @@ class Laboratory:
     robot: Robot
     twin: Twin
     T_lab_base: np.ndarray
+
+    @cached_property
+    def motion_capture(self) -> MotionCapture:
+        """The motion capture, its volume calibrated."""
+        i = self.config.instruments
+        volume = calibrated_volume(i.mocap, generator(self.seed, "volume"))
+        return MotionCapture(self.robot.clusters, self.robot.loose, volume, i.mocap, i.marker_noise, i.mocap_rate)
+
+    @cached_property
+    def instruments(self) -> tuple[Instrument, ...]:
+        """Every instrument, sampled from streams of their own names."""
+        i, late = self.config.instruments, self.config.instruments.mocap.latency
+        per_ampere = {TORSO: self.config.torso.force_per_ampere}
+        per_ampere |= {name: joint.torque_per_ampere for name, joint in self.config.arm.items()}
+        wrist = None if i.wrist is None else sample_wrist(i.wrist, generator(self.seed, "wrist"))
+        clock, plate_clock = (
+            Clock(n, c.offset, c.drift) for n, c in (("robot", i.robot_clock), ("plate", i.plate_clock))
+        )
+        names, sigma = PlateGrid(i.plate_grid).names, np.repeat([i.plate_force_noise, i.plate_moment_noise], 3)
+        plates = tuple(sample_plate(n, i.plate, generator(self.seed, "plate", n)) for n in names)
+        return (
+            RobotLog(self.robot.encoders, per_ampere, i.current_quantum, i.log, clock, i.robot_rate, wrist, late),
+            ForcePlates(plates, sigma, plate_clock, i.plate_rate, late),
+            self.motion_capture,
+            *(x.sample(generator(self.seed, "instrument", str(k))) for k, x in enumerate(i.further)),
+        )
 
     def with_defects(self, *defects: Defect) -> "Laboratory":
         """The laboratory with the robot changed; see `Robot.with_defects`."""
@@ -76,6 +113,9 @@ def second_session(lab: Laboratory) -> Laboratory:
 
 def built(config: SampledConfig, defects: Sequence[Defect], links: Sequence[str]) -> Twin:
     """Build the robot with these defects and check that its gear stiffness suits the time step."""
-    twin = build(mjcf.spec(), defects, links, config.timestep)
+    spec = mjcf.spec()
+    for instrument in config.instruments.further:
+        instrument.sense(spec)
+    twin = build(spec, defects, links, config.timestep)
     check_meshes(twin.model, config.arm)
     return twin

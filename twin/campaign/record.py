@@ -20,15 +20,15 @@ from twin import truth
 from twin.base_tests.gravity_stiffness import gravity_stiffness
 from twin.base_tests.slip_load import slip_loads
 from twin.campaign.dataset_description import describe_dataset
-from twin.campaign.instrument_constants import constants
 from twin.campaign.laboratory import EPOCH, Laboratory, laboratory, second_session
-from twin.campaign.measure import instrument_errors, measure, plate_centre
+from twin.campaign.measure import measure
 from twin.campaign.second_session import CONFIRMATION, session_parameters
 from twin.config.twin import TwinConfig
 from twin.defects.wheels.rolling_wheel import rolling_parameters
 from twin.defects.wheels.stiffness import spatial_stiffness
 from twin.motions.motion import Motion
 from twin.motions.schedule import schedule
+from twin.simulation.force_plates import plate_centre
 from twin.simulation.kinematic import arm_frame
 from twin.truth import Parameter
 
@@ -106,9 +106,8 @@ def _write_truth(lab: Laboratory, later: Laboratory | None, folder: Path) -> Non
     robot = lab.robot
     K, C = spatial_stiffness(robot.wheels)
     parameters: list[Parameter] = list(lab.twin.truth)
-    for source in (*robot.encoders, *robot.clusters, *robot.loose, *instrument_errors(lab)):
+    for source in lab.instruments:
         parameters += source.parameters()
-    parameters += constants(lab.config)
     if "wheels" in lab.config.campaign.driving.forms:
         parameters += (p for wheel in robot.wheels for p in rolling_parameters(wheel.name))
     if lab.config.campaign.driving.forms:

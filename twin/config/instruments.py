@@ -8,15 +8,19 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails
 
 from twin.fields.names import OF_KEY, BodyName, of_another_body, refuse
-from twin.fields.values import STRICT, Positive, Rate, in_order
+from twin.fields.values import STRICT, OneOfKind, Positive, Rate, in_order
+from twin.instruments import INSTRUMENTS
 from twin.instruments.clock import ClockSetting
 from twin.instruments.encoder import LinkEncoders, MotorEncoders
 from twin.instruments.force_plate import PlateErrors
+from twin.instruments.instrument import Instrument
 from twin.instruments.markers import MarkerBody
 from twin.instruments.motion_capture import MocapErrors
 from twin.instruments.robot_log import LogErrors
 from twin.instruments.wrist_sensor import WristSensor
 from twin.simulation.force_plates import PlatePlace
+
+AnyInstrument = Annotated[Instrument, OneOfKind(INSTRUMENTS)]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -42,6 +46,7 @@ class Instruments:
         plate_place: Where that square lies.
         log: With the robot's log.
         wrist: The force-torque sensor of the wrist; null: none.
+        further: Instruments of any kind that `twin.instruments` knows.
     """
 
     bodies: Annotated[dict[BodyName, MarkerBody], in_order(get_args(BodyName))]
@@ -62,6 +67,7 @@ class Instruments:
     plate_grid: tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]] = (1, 1)
     plate_place: PlatePlace = field(default_factory=PlatePlace)
     wrist: WristSensor | None = field(default_factory=WristSensor)
+    further: tuple[AnyInstrument, ...] = ()
 
     def __post_init__(self) -> None:
         """Each marker of the laboratory has a name of its own."""

@@ -7,9 +7,7 @@ and any value that is given as a distribution (`twin.fields.distributions`).
 
 from collections.abc import Iterator
 from dataclasses import field, fields
-from functools import reduce
-from operator import or_
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -25,13 +23,10 @@ from twin.defects.inertia import Payload
 from twin.defects.wheels.base import Base
 from twin.fields.distributions import sampled
 from twin.fields.names import OF_KEY, refuse, unknown
-from twin.fields.values import STRICT
+from twin.fields.values import STRICT, OneOfKind
 from twin.motions.campaign import Campaign
 
-if TYPE_CHECKING:
-    AnyDefect = Defect
-else:
-    AnyDefect = Annotated[reduce(or_, DEFECTS), Field(discriminator="kind")]
+AnyDefect = Annotated[Defect, OneOfKind(DEFECTS)]
 
 
 @dataclass(frozen=True, config=STRICT)

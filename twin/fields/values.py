@@ -83,6 +83,22 @@ def in_order(names: Iterable[str]) -> AfterValidator:
 
 
 @dataclass(frozen=True)
+class OneOfKind:
+    """Annotation of a value of one of several classes, which its field `kind` tells.
+
+    Attributes:
+        classes: Dataclasses with a default for `kind`.
+    """
+
+    classes: tuple[type, ...]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Choose by kind; none, where there is no class."""
+        choices = {vars(c)["kind"]: handler.generate_schema(c) for c in self.classes}
+        return core_schema.tagged_union_schema(choices or {"": core_schema.none_schema()}, discriminator="kind")
+
+
+@dataclass(frozen=True)
 class Keyed:
     """Annotation of a mapping whose values hold their own key: a file gives it once, as the key.
 

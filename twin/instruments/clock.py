@@ -1,6 +1,10 @@
-"""Clocks: each instrument reads its own.
+"""Clocks: each instrument reads its own, and stamps what it measures with a latency.
 
-t_mocap = t (1 + drift) + offset        true time of the campaign is the mocap clock's
+    shown by instrument i at true time t + latency_i:  (t + latency_i - offset_i) / (1 + drift_i)
+
+The campaign's clock is the motion capture's: its stamps are true times of exposure plus its latency. So
+
+    t_mocap = t_i (1 + drift_i) + offset_i + latency_mocap - latency_i
 """
 
 from dataclasses import dataclass
@@ -53,13 +57,6 @@ class Clock:
         return Parameter(f"{name}.offset", "s", self.offset), Parameter(f"{name}.drift", "-", self.drift)
 
 
-@dataclass(frozen=True)
-class Latency:
-    """From the instant an instrument measures to its stamp: value [s]."""
-
-    instrument: str
-    value: float
-
-    def parameters(self) -> tuple[Parameter, ...]:
-        """The latency."""
-        return (Parameter(f"latency.{self.instrument}", "s", self.value),)
+def latency(instrument: str, value: float) -> tuple[Parameter, ...]:
+    """From the instant an instrument measures to its stamp [s], if there is one."""
+    return (Parameter(f"latency.{instrument}", "s", value),) if value else ()

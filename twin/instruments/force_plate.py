@@ -8,7 +8,7 @@ the gain matrix with crosstalk, r the drift of the offset since the campaign's s
 sqrt(2) / (2 pi cutoff) at low frequency, which no time stamp knows.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydantic.dataclasses import dataclass as validated
@@ -16,7 +16,10 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from twin.defects.defect import Defect
 from twin.fields.values import STRICT, FixedNonNegative, NonNegative
+from twin.instruments.clock import Clock, latency
+from twin.instruments.instrument import Channels, Instrument, Streams, Timing
 from twin.instruments.sampling import averaged
+from twin.simulation.states import States
 from twin.truth import Parameter
 
 
@@ -142,3 +145,44 @@ def rounded(samples: np.ndarray, resolution: np.ndarray) -> np.ndarray:
     """Samples (n, 6) in whole steps (6,); 0: as they are."""
     step = np.where(resolution > 0.0, resolution, 1.0)
     return np.where(resolution > 0.0, np.round(samples / step) * step, samples)
+
+
+@dataclass(frozen=True)
+class ForcePlates(Instrument):
+    """The plates of one laboratory, on one clock.
+
+    Attributes:
+        plates: Each with its errors.
+        sigma: White noise per sample (6,) [N, N.m].
+        clock: The plates'.
+        rate: [Hz].
+        mocap_latency: Of the motion capture, to whose stamps the truth refers [s].
+    """
+
+    plates: tuple[PlateDefect, ...]
+    sigma: np.ndarray
+    clock: Clock
+    rate: float
+    mocap_latency: float
+
+    def measure(self, states: States, timing: Timing, streams: Streams) -> Channels:
+        """Wrenches (n, n_plates, 6), one plate after the other in the stream of their noise."""
+        stamps, true = self.clock.ticks(timing.start, timing.stop, self.rate)
+        at = Sampling(true, timing.epoch, self.rate, self.sigma, states.T_lab_plates[0, :3, :3])
+        rng, t = streams("plate"), states.t + timing.start
+        each = zip(np.moveaxis(states.plates, 1, 0), self.plates, strict=True)
+        wrench = np.stack([measured(at, t, dense, plate, rng) for dense, plate in each], axis=1)
+        names, centres = tuple(p.name for p in self.plates), states.T_lab_plates[:, :3, 3]
+        return {"plate": names, "t_plate": stamps, "plate_wrench": wrench, "plate_centre": centres}
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of clock, filter, noise and each plate; the clock against the motion capture's, latencies included."""
+        delay = self.plates[0].delay
+        clock = replace(self.clock, offset=self.clock.offset + self.mocap_latency - delay)
+        return (
+            *clock.parameters(),
+            *latency("plate", delay),
+            *(p for plate in self.plates for p in plate.parameters()),
+            Parameter("plate.force_noise", "N", float(self.sigma[0])),
+            Parameter("plate.moment_noise", "N.m", float(self.sigma[3])),
+        )

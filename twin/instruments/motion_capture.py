@@ -18,8 +18,11 @@ from pydantic.dataclasses import dataclass as validated
 from twin.defects.defect import Defect
 from twin.fields.distributions import DRAWN
 from twin.fields.values import STRICT, FixedNonNegative, FixedPositive, NonNegative, Vector3
-from twin.instruments.markers import Cluster
-from twin.instruments.sampling import windows, within
+from twin.instruments.clock import Clock, latency
+from twin.instruments.instrument import Channels, Instrument, Streams, Timing
+from twin.instruments.markers import Cluster, LooseMarker
+from twin.instruments.sampling import interpolate, interpolate_poses, windows, within
+from twin.simulation.states import States
 from twin.truth import Parameter
 
 ARM = ("arm_2_link", "arm_4_link", "arm_6_link", "gripper_grasping_frame")
@@ -137,3 +140,66 @@ def marker_positions(T_lab_link: np.ndarray, cluster: Cluster) -> np.ndarray:
 def measured(positions: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
     """Positions with white noise of sigma [m] per axis."""
     return positions + sigma * rng.normal(size=positions.shape)
+
+
+@dataclass(frozen=True)
+class MotionCapture(Instrument):
+    """The motion capture of one laboratory and the markers it sees.
+
+    Attributes:
+        clusters: Marker bodies.
+        loose: Markers that hang.
+        volume: Its calibrated volume.
+        errors: What else it gets wrong.
+        noise: Per axis [m].
+        rate: [Hz].
+    """
+
+    clusters: tuple[Cluster, ...]
+    loose: tuple[LooseMarker, ...]
+    volume: Volume
+    errors: MocapErrors
+    noise: float
+    rate: float
+    of_force = False
+
+    @property
+    def markers(self) -> tuple[str, ...]:
+        """Names of all markers."""
+        return tuple(m for c in self.clusters for m in c.marker_names)
+
+    def true_positions(self, poses: dict[str, np.ndarray], t: np.ndarray) -> np.ndarray:
+        """Positions (n, n_markers, 3) [m, lab] from poses of links (n, 4, 4) at t (n,) [s from the epoch]."""
+        p = np.concatenate([marker_positions(poses[c.link], c) for c in self.clusters], axis=1)
+        for marker in self.loose:
+            p = marker.moved(t, self.markers, p)
+        return p
+
+    def measure(self, states: States, timing: Timing, streams: Streams) -> Channels:
+        """Positions (n, n_markers, 3), NaN where hidden."""
+        late, body = self.errors.latency, tuple(c.name for c in self.clusters for _ in c.marker_names)
+        stamps, _ = Clock("mocap").ticks(timing.start + late, timing.stop + late, self.rate)
+        t = stamps - late - timing.start
+        poses = {c.link: interpolate_poses(t, states.t, states.poses[c.link]) for c in self.clusters}
+        true = self.true_positions(poses, stamps - late - timing.epoch)
+        seen = measured(self.volume.distorted(true), self.noise, streams("mocap"))
+        if self.errors.cameras:
+            arm = np.stack([interpolate(t, states.t, states.poses[link][:, :3, 3]) for link in ARM], axis=1)
+            seen[hidden(true, arm, self.errors)] = np.nan
+        seen = relabelled(stamps, seen, body, self.errors, streams("labels"))
+        return {"marker": self.markers, "marker_body": body, "t_mocap": stamps, "marker_position": seen}
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of the markers, the volume and the cameras; what is off unless a scenario names it, where it is on."""
+        e = self.errors
+        found = [("noise", "m", self.noise), ("swaps", "1/min", e.swaps)]
+        found += [("bias_length", "m", e.bias_length)] if e.bias else []
+        found += [("swap_duration", "s", e.swap_duration)] if e.swaps else []
+        found += [("arm_radius", "m", e.arm_radius)] if e.cameras else []
+        for k, camera in enumerate(e.cameras, 1):
+            found += [(f"camera_{k}.{axis}", "m", x) for axis, x in zip("xyz", camera, strict=True)]
+        return (
+            *(p for source in (*self.clusters, *self.loose, self.volume) for p in source.parameters()),
+            *latency("mocap", e.latency),
+            *(Parameter(f"mocap.{n}", unit, value) for n, unit, value in found if value or n.startswith("camera")),
+        )

@@ -3,17 +3,21 @@
 Stamps jitter about the ticks of the robot's clock, messages are lost, velocity passes a first-order low-pass.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic.dataclasses import dataclass as validated
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from twin.fields.values import STRICT, FixedNonNegative, FixedPositive, NonNegative
+from twin.instruments.clock import Clock, latency
 from twin.instruments.encoder import Encoder
+from twin.instruments.instrument import Channels, Instrument, Streams, Timing
 from twin.instruments.sampling import interpolate, windows, within
+from twin.instruments.wrist_sensor import WristDefect, wrist_samples
 from twin.motions.swings import JOINTS
 from twin.simulation.states import States
+from twin.truth import Parameter
 
 _MOST = 0.45  # of the interval between ticks that a stamp may be off [-]
 
@@ -38,48 +42,71 @@ class LogErrors:
 
 
 @dataclass(frozen=True)
-class RobotLog:
-    """Samples (n, 8) of every joint and (n, 6) of the wrist; see `calibration.recording.Trial` for the fields."""
-
-    q_motor: np.ndarray
-    q_link: np.ndarray
-    v_motor: np.ndarray
-    effort: np.ndarray
-    q_command: np.ndarray
-    wrist_wrench: np.ndarray
-
-
-@dataclass(frozen=True)
-class Drives:
-    """What the drives report beside their encoders.
+class RobotLog(Instrument):
+    """The log of one robot, the wrist's sensor included.
 
     Attributes:
-        per_ampere: Force or torque over current (8,) [N/A, N.m/A].
-        quantum: Step of the current [A].
-        velocity_cutoff: Of the velocity's low-pass [Hz]; 0: none.
+        encoders: Of its joints.
+        per_ampere: Force or torque over current by joint [N/A, N.m/A].
+        current_quantum: [A].
+        errors: Of the log.
+        clock: The robot's; stamps of a log that is late are late.
+        rate: [Hz].
+        wrist: The wrist's sensor, if there is one.
+        mocap_latency: Of the motion capture, to whose stamps the truth refers [s].
     """
 
-    per_ampere: np.ndarray
-    quantum: float
-    velocity_cutoff: float
+    encoders: tuple[Encoder, ...]
+    per_ampere: dict[str, float]
+    current_quantum: float
+    errors: LogErrors
+    clock: Clock
+    rate: float
+    wrist: WristDefect | None
+    mocap_latency: float
+    of_force = False
 
+    def measure(self, states: States, timing: Timing, streams: Streams) -> Channels:
+        """Samples of every joint (n, 8) and of the wrist (n, 6)."""
+        clock = replace(self.clock, offset=self.clock.offset - self.errors.latency)
+        stamps, true = clock.ticks(timing.start, timing.stop, self.rate)
+        t, step = true - timing.start, self.current_quantum
+        current = interpolate(t, states.t, states.torque) / np.array([self.per_ampere[j] for j in JOINTS])
+        wrench = np.full((len(t), 6), np.nan)
+        if self.wrist is not None:
+            wrench = wrist_samples(t, self.rate, states.t, states.wrist, self.wrist, streams("wrist"))
+        samples = {
+            "q_motor": _read(interpolate(t, states.t, states.motor), self.encoders, "motor"),
+            "q_link": _read(interpolate(t, states.t, states.link), self.encoders, "link"),
+            "v_motor": interpolate(t, states.t, _low_passed(states, self.errors.velocity_cutoff)),
+            "effort": np.round(current / step) * step,
+            "q_command": interpolate(t, states.t, states.command),
+            "wrist_wrench": wrench,
+        }
+        rng = streams("robot")
+        samples["t_robot"] = stamped(stamps, self.rate, self.errors, rng)
+        there = received(samples["t_robot"], self.errors, rng)
+        return {"joint": JOINTS, **{name: values[there] for name, values in samples.items()}}
 
-def measured(
-    t: np.ndarray, states: States, encoders: tuple[Encoder, ...], drives: Drives, wrench: np.ndarray | None = None
-) -> RobotLog:
-    """The log at true times t (n,) [s from the first set-point]; `wrench` (n, 6) is what the wrist's sensor reads."""
-
-    def sampled(values: np.ndarray) -> np.ndarray:
-        return interpolate(t, states.t, values)
-
-    return RobotLog(
-        q_motor=_read(sampled(states.motor), encoders, "motor"),
-        q_link=_read(sampled(states.link), encoders, "link"),
-        v_motor=sampled(_slowed(states, drives.velocity_cutoff)),
-        effort=np.round(sampled(states.torque) / drives.per_ampere / drives.quantum) * drives.quantum,
-        q_command=sampled(states.command),
-        wrist_wrench=np.full((len(t), 6), np.nan) if wrench is None else wrench,
-    )
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of encoders, drives, clock, log and wrist; the clock against the motion capture's, latencies included."""
+        e, late = self.errors, self.mocap_latency
+        clock = replace(self.clock, offset=self.clock.offset - e.latency + late)
+        gears = ((n, "force", "N/A") if n == JOINTS[0] else (n, "torque", "N.m/A") for n in JOINTS)
+        log = [
+            ("jitter", "s", e.jitter),
+            ("velocity_cutoff", "Hz", e.velocity_cutoff),
+            ("dropouts", "1/min", e.dropouts),
+        ]
+        log += [("dropout_duration", "s", e.dropout_duration)] if e.dropouts else []
+        return (
+            *(p for source in (*self.encoders, clock) for p in source.parameters()),
+            *latency("robot", e.latency),
+            *(Parameter(f"gear.{n}.{of}_per_ampere", unit, self.per_ampere[n]) for n, of, unit in gears),
+            Parameter("log.current_quantum", "A", self.current_quantum),
+            *(Parameter(f"log.{name}", unit, value) for name, unit, value in log if value),
+            *(() if self.wrist is None else self.wrist.parameters()),
+        )
 
 
 def stamped(t: np.ndarray, rate: float, errors: LogErrors, rng: np.random.Generator) -> np.ndarray:
@@ -89,15 +116,14 @@ def stamped(t: np.ndarray, rate: float, errors: LogErrors, rng: np.random.Genera
     return t + np.clip(errors.jitter * rng.normal(size=len(t)), -_MOST / rate, _MOST / rate)
 
 
-def kept(t: np.ndarray, log: RobotLog, errors: LogErrors, rng: np.random.Generator) -> tuple[np.ndarray, RobotLog]:
-    """The messages that were not lost."""
+def received(t: np.ndarray, errors: LogErrors, rng: np.random.Generator) -> np.ndarray:
+    """Whether the message of each stamp (n,) was not lost."""
     if not errors.dropouts:
-        return t, log
-    there = ~within(t, windows(t, errors.dropouts, errors.dropout_duration, rng))
-    return t[there], RobotLog(**{f.name: getattr(log, f.name)[there] for f in fields(log)})
+        return np.ones(len(t), dtype=bool)
+    return ~within(t, windows(t, errors.dropouts, errors.dropout_duration, rng))
 
 
-def _slowed(states: States, cutoff: float) -> np.ndarray:
+def _low_passed(states: States, cutoff: float) -> np.ndarray:
     """Motor velocity (n, 8) through dv/dt = 2 pi cutoff (v_motor - v)."""
     if not cutoff:
         return states.motor_velocity

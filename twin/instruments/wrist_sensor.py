@@ -73,7 +73,7 @@ def sample_wrist(sensor: WristSensor, rng: np.random.Generator) -> WristDefect:
     )
 
 
-def measured(
+def wrist_samples(
     t: np.ndarray, rate: float, grid: np.ndarray, wrench: np.ndarray, defect: WristDefect, rng: np.random.Generator
 ) -> np.ndarray:
     """Samples (n, 6) at times t (n,) [s] of the dense wrench (m, 6) at times grid (m,) [s]; `rate` in [Hz]."""

@@ -148,6 +148,21 @@ def T_lab_plate(nominal: mujoco.MjsBody, place: PlatePlace) -> np.ndarray:
     return T
 
 
+def plate_centre(model: mujoco.MjModel) -> np.ndarray:
+    """Surface centre of the whole square in the lab (3,) [m]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return data.site(PLATE).xpos.copy()
+
+
+def plate_poses(model: mujoco.MjModel) -> np.ndarray:
+    """T_lab_plate (n_plates, 4, 4) of each plate's surface centre; their axes are the same."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    centres = np.array([data.site(name).xpos for name in plate_sites(model) or (PLATE,)])
+    return np.asarray(transform(centres, np.tile(model.body(PLATE).quat, (len(centres), 1))))
+
+
 def add_plates(spec: mujoco.MjSpec) -> None:
     """A sensor on each body that bears a plate's site: the plate, and the parts of one that is cut in several."""
     for site in spec.sites:

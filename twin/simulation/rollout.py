@@ -12,11 +12,12 @@ from twin.simulation import wrist_sensor
 from twin.simulation.base_joint import anchored, floor_wrench
 from twin.simulation.build import Twin
 from twin.simulation.checks import check
-from twin.simulation.force_plates import PLATE, on_plate, plate_sites
+from twin.simulation.force_plates import PLATE, on_plate, plate_poses, plate_sites
 from twin.simulation.setpoints import RolloutInputs, driven, prepare
 from twin.simulation.states import States
 from twin.transforms import states_with_their_sensors, transform
 
+SENSOR = "instrument."  # begins the name of a sensor of an instrument of one's own
 _log = logging.getLogger(__name__)
 
 
@@ -62,8 +63,14 @@ def _unpack(inputs: RolloutInputs, links: tuple[str, ...], states: np.ndarray, s
         poses={name: _pose(model, sensors, name) for name in links},
         wrench=wrench,
         plates=np.stack(each, axis=1),
+        T_lab_plates=plate_poses(model),
         wrist=wrist_sensor.on_wrist(model, sensors, push),
+        sensors={n.removeprefix(SENSOR): wrist_sensor.sensed(model, sensors, [n]) for n in _of_instruments(model)},
     )
+
+
+def _of_instruments(model: mujoco.MjModel) -> list[str]:
+    return [name for i in range(model.nsensor) if (name := model.sensor(i).name).startswith(SENSOR)]
 
 
 def _pose(model: mujoco.MjModel, sensors: np.ndarray, link: str) -> np.ndarray:

@@ -8,7 +8,6 @@ from scipy.stats import chi2
 
 from twin import motions
 from twin.campaign import EPOCH, laboratory, measure
-from twin.campaign.measure import instrument_errors
 from twin.instruments import force_plate, motion_capture
 from twin.instruments.force_plate import PlateErrors
 from twin.instruments.motion_capture import MocapErrors
@@ -47,7 +46,7 @@ def plain(recorded):
 
 
 def truth_of(lab, **errors):
-    return {p.name: p.value for source in instrument_errors(with_errors(lab, **errors)) for p in source.parameters()}
+    return {p.name: p.value for source in with_errors(lab, **errors).instruments for p in source.parameters()}
 
 
 def test_nothing_is_wrong_unless_it_is_named(lab):

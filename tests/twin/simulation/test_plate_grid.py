@@ -8,7 +8,6 @@ import pytest
 from calibration.numerics.wrench import centre_of_pressure
 from twin import motions
 from twin.campaign import describe_dataset, laboratory, measure
-from twin.campaign.measure import instrument_errors
 from twin.errors import RobotFell
 from twin.instruments.force_plate import PlateErrors
 from twin.motions import CALIBRATION_SWINGS
@@ -64,7 +63,7 @@ def test_plates_are_recorded_declared_and_worn_each_for_itself(lab, states, moti
     assert trial.plate == tuple(p.name for p in declared) == ("plate1", "plate2")
     np.testing.assert_allclose(trial.plate_centre, [p.centre for p in declared])
     assert all(p.size == (0.45, 0.9) for p in declared)
-    gains = {p.name: p.value for e in instrument_errors(lab) for p in e.parameters() if "gain_33" in p.name}
+    gains = {p.name: p.value for e in lab.instruments for p in e.parameters() if "gain_33" in p.name}
     for k, name in enumerate(trial.plate):
         ratio = trial.plate_wrench[:500, k, 2].mean() / states.plates[:500, k, 2].mean()
         assert ratio == pytest.approx(gains[f"plate.{name}.gain_33"], abs=3e-4)
