@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 
@@ -72,6 +73,29 @@ def test_a_defect_is_a_file_and_a_line(tree):
     )
     true = recorded(tree, "twin.defects=[{kind: added_mass, link: arm_5_link, mass: {uniform: [0.2, 0.3]}}]")
     assert 0.2 < true["added_mass.arm_5_link.mass"] < 0.3 and true["added_mass.arm_5_link.x"] == 0.0
+
+
+def test_an_instrument_is_a_file_a_line_and_its_channels(tree):
+    (tree / "twin/instruments/gyroscope.py").write_text(recipe("instrument"), encoding="utf-8")
+    face = tree / "twin/instruments/__init__.py"
+    text = face.read_text(encoding="utf-8")
+    text = text.replace("...] = ()", "...] = (Gyroscope,)")
+    text = text.replace(
+        "from twin.instruments.instrument",
+        "from twin.instruments.gyroscope import Gyroscope\nfrom twin.instruments.instrument",
+    )
+    face.write_text(text, encoding="utf-8")
+    layout = tree / "calibration/recording/trial.py"
+    text = layout.read_text(encoding="utf-8").replace("_LABELS = ", f"{recipe('channel')}_LABELS = ", 1)
+    last = "    wrist_wrench: np.ndarray = field(default_factory=lambda: _empty(0, 6))\n"
+    layout.write_text(text.replace(last, last + recipe("channel-fields")), encoding="utf-8")
+    true = recorded(tree, "twin.instruments.further=[{kind: gyroscope, bias: 1.0e-3, noise: 1.0e-5}]")
+    with netCDF4.Dataset(tree / "out/dataset/trials/xyz.nc") as file:
+        seen, t = (np.array(file[name][:]) for name in ("base_angular_velocity", "t_gyroscope"))
+        assert (file["base_angular_velocity"].units, file["t_gyroscope"].clock) == ("rad/s", "mocap")
+    zero = [true[f"gyroscope.zero.{axis}"] for axis in "xyz"]
+    assert np.ptp(seen, axis=0).max() > 1e-3 and (true["gyroscope.noise"], len(t)) == (1e-5, len(seen))
+    np.testing.assert_allclose(seen[(t - t[0]) < 0.5].mean(axis=0), zero, atol=1e-4)
 
 
 def test_a_motion_is_an_entry(tree):

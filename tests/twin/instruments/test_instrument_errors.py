@@ -52,7 +52,9 @@ def truth_of(lab, **errors):
 def test_nothing_is_wrong_unless_it_is_named(lab):
     clocks = {f"clock.{i}.{v}" for i in ("robot", "plate") for v in ("offset", "drift")}
     wrist = {f"wrist.{of}_{what}" for of in ("force", "moment") for what in ("noise", "resolution")}
-    assert set(truth_of(lab)) == clocks | wrist
+    noise = {"mocap.noise", "plate.force_noise", "plate.moment_noise", "log.current_quantum"}
+    parts = ("encoder.", "frame.", "marker.", "gear.")
+    assert {name for name in truth_of(lab) if not name.startswith(parts)} == clocks | wrist | noise
 
 
 def test_stamps_jitter_by_what_is_said_and_never_go_back(lab, plain, recorded):
