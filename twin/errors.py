@@ -16,7 +16,7 @@ class UnknownElement(TwinError):
 
 
 class Diverged(TwinError):
-    """A simulation that left the numbers.
+    """The simulation diverged: a state is not finite, or implausibly fast.
 
     Attributes:
         trial: The trial concerned.
@@ -37,17 +37,17 @@ class RobotFell(TwinError):
 
 
 class BaseVibrates(TwinError):
-    """A robot that does not come to rest before its trial: the solver overshoots, step for step.
+    """The base vibrates before its trial: the solver overshoots at every step.
 
     Attributes:
         trial: The trial concerned.
-        joint: What shakes most, by its kinetic energy; `root`: the base itself.
+        joint: What vibrates most, by its kinetic energy; `root`: the base itself.
     """
 
     def __init__(self, trial: str, flips: tuple[float, float], joint: str) -> None:
         self.trial, self.joint = trial, joint
         super().__init__(
-            f"trial {trial!r}: the base shakes before the motion begins, from step to step by {flips[0]:.2g} m/s2 and "
+            f"trial {trial!r}: the base vibrates before the motion, from step to step by {flips[0]:.2g} m/s2 and "
             f"{flips[1]:.2g} rad/s2, most of all joint {joint!r}; lower the stiffness or damping named by that "
             "joint (root: of the wheels or their contacts) or the time step"
         )

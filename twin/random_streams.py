@@ -1,4 +1,4 @@
-"""Random streams by name: the same root seed and name give the same numbers, whatever else was drawn before."""
+"""Random streams by name: the same root seed and name give the same numbers, whatever else was sampled before."""
 
 import zlib
 

@@ -82,7 +82,7 @@ def read_trial(path: Path) -> TruthTrial:
 
 
 def _numbers(value: np.ndarray) -> object:
-    """Nested lists; null for what is infinite, a stiffness where nothing gives."""
+    """Nested lists; null for what is infinite, a stiffness where nothing is compliant."""
     found = np.asarray(value, dtype=float).astype(object)
     found[np.isinf(np.asarray(value, dtype=float))] = None
     return found.tolist()

@@ -6,7 +6,7 @@
 b_i what wheel i carries of the base, along e_z, W = sum_i b_i, c the centre of mass of what is carried, about the base
 frame's origin, for a displacement t and a rotation theta of the base. Forces of bushings turn with the base; those of
 the floor act where the wheel stands, and a braked wheel of radius rho that tilts with the base rolls on by rho theta.
-The base sags under its weight by b / k_z: the floor is as much nearer to its origin (last sum; A, k: `twin.stiffness`).
+The base sags under its weight by b / k_z: the floor is as much nearer to its origin (last sum; A, k of `stiffness`).
 """
 
 from collections.abc import Sequence

@@ -1,14 +1,14 @@
 """Load and release test of a base, as a workshop would do it: small known wrenches, read the deflection.
 
     load:     S = [x_j] [w_j]^-1,  K_total = S^-1                 x_j half the change between w_j and -w_j, at rest
-    gravity:  K_total = K + g K',  so that loads at two gravities tell K and K_gravity = g K' apart
+    gravity:  K_total = K + g K',  so that loads at two gravities separate K and K_gravity = g K'
     release:  K_total int(phi x) = C (x_0 + int(dphi/dt x)),     phi = (1 - s)^2 (1 + 2 s - 15 s^2),  s = t / T
 
 about base_footprint's origin at rest, in its axes, linear then angular. The last line weighs M x'' + C x' + K x = 0
 with a slow phi: phi(0) = 1, phi'(0) = phi(1) = phi'(1) = 0, so that masses come in by 36 / (omega T)^2 only, 0.3 % at
 4 Hz; its integral is zero, so that the nanometres friction leaves do not count. Positions are taken where the
 integrator evaluates the springs, at the start of each step. Loads are followed under a damping towards the lab, which
-is gone where nothing moves; the release is without it. The upper body is held.
+is gone where nothing moves; the release is without it. The upper body is fixed.
 """
 
 from dataclasses import dataclass
@@ -30,9 +30,9 @@ _WRENCHES = np.diag([FORCE] * 3 + [MOMENT] * 3)
 _OIL = 15.0  # [1/s] rate at which the damping of the test takes motion out, below the slowest mode's frequency
 _SETTLE, _LOAD, _RELEASE = 2.0, 0.9, 5.0  # [s]
 _HEAVIER = 1.5  # share of gravity at which the load test is repeated; less might let a wheel slip
-_INERTIA, _DAMPING = 1e5, 1e7  # of joints that are held [kg.m2, N.m.s/rad]
+_INERTIA, _DAMPING = 1e5, 1e7  # of joints that are fixed [kg.m2, N.m.s/rad]
 _RIGID = np.array([2e-8] * 3 + [1e-6] * 3)  # compliance that counts as none [m/N, rad/(N.m)]
-_RELEASES, _LATE = 4, 200  # releases until rest, at most; samples that tell rest
+_RELEASES, _LATE = 4, 200  # releases until rest, at most; samples in which rest is judged
 _UNEVEN = 0.01  # share by which a deflection may differ from its opposite, or from what it was a little earlier
 _LATER = 0.1  # [s]
 _AT_REST = 1e-3  # share of a deflection that may be left after a release
@@ -46,7 +46,7 @@ class Stiffness(NamedTuple):
     """What a load test finds.
 
     Attributes:
-        K: (6, 6) stiffness of the suspension [N/m, N, N.m/rad]; infinite on the diagonal where nothing gives.
+        K: (6, 6) stiffness of the suspension [N/m, N, N.m/rad]; infinite on the diagonal where nothing is compliant.
         K_gravity: (6, 6) what weight and preload add to it.
     """
 
@@ -56,7 +56,7 @@ class Stiffness(NamedTuple):
 
 @dataclass(frozen=True)
 class Bench:
-    """A robot on the test bench, its upper body held.
+    """A robot on the test bench, its upper body fixed.
 
     Attributes:
         model: In oil: the base is damped towards the lab.
@@ -166,7 +166,7 @@ def compliance(b: Bench) -> np.ndarray:
 
 
 def bench(twin: Twin, gravity: float = 1.0) -> Bench:
-    """A twin at rest on the plate under a share of gravity, upper body held.
+    """A twin at rest on the plate under a share of gravity, upper body fixed.
 
     Raises:
         Restless: It does not come to rest.
@@ -194,7 +194,7 @@ def bench(twin: Twin, gravity: float = 1.0) -> Bench:
 
 
 def _check_guides(model: mujoco.MjModel) -> None:
-    """A spring beside Coulomb's friction does not move under a small load: what is felt then is not the spring."""
+    """A spring beside Coulomb's friction does not move under a small load: the test would not measure the spring."""
     sprung = model.jnt_stiffness[model.dof_jntid] > 0.0
     for d in np.flatnonzero(sprung & (model.dof_frictionloss > 0.0)):
         name, rubs = model.joint(model.dof_jntid[d]).name, model.dof_frictionloss[d]

@@ -2,11 +2,11 @@
 
     floor's reaction = -w(t)
 
-The plate feels the weight and inertia of the whole robot. So what is driven has neither: gravity is off, the upper
+The plate measures the weight and inertia of the whole robot. So what is driven has neither: gravity is off, the upper
 body is gone, and of the base a few kilograms are left for the integrator; its modes then lie above 50 Hz, and what
 remains below is the wheels' springs, dampers and friction. w acts on the base frame's origin as it moves: less than
 1 N.m of moment while the base moves by less than a millimetre. A wrench that friction cannot hold moves the base
-without end: nothing tells it when to stop.
+without end: no force stops it.
 """
 
 from collections.abc import Sequence
@@ -68,7 +68,7 @@ def replay(twin: Twin, pull: WrenchHistory) -> np.ndarray:
 
     Args:
         twin: A `carriage`.
-        pull: The wrench; its first value is held for `SETTLE` before.
+        pull: The wrench; its first value acts for `SETTLE` before.
 
     Raises:
         Diverged: A state is not finite.

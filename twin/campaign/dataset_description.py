@@ -1,4 +1,4 @@
-"""What the laboratory is told: dataset.json, from datasheet values only."""
+"""The description of a dataset, dataset.json, from datasheet values only."""
 
 from typing import cast
 

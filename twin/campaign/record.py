@@ -55,7 +55,7 @@ def record(
         watch: Called with each trial once it is written, by the thread that made it.
 
     Raises:
-        TwinError: The simulation failed; said where.
+        TwinError: The simulation failed; the message names the trial.
     """
     lab = laboratory(config, seed)
     for folder in ("dataset/trials", "truth/trials"):

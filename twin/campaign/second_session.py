@@ -1,4 +1,4 @@
-"""Another session with the same robot: base moved, markers remounted, encoders homed anew.
+"""Another session with the same robot: base moved, markers remounted, encoders homed again.
 
 Streams are named after the session, so that it changes nothing of the first one.
 """
@@ -18,7 +18,7 @@ CONFIRMATION = "confirmation"
 
 
 def remounted(config: RobotConfig, robot: Robot, seed: int, session: str = CONFIRMATION) -> Robot:
-    """The robot with its markers remounted, none loose, and its motors homed anew; link encoders are absolute."""
+    """The robot with its markers remounted, none loose, and its motors homed again; link encoders are absolute."""
 
     def homed(encoder: Encoder) -> Encoder:
         if encoder.side != "motor" or encoder.prismatic:

@@ -1,4 +1,4 @@
-"""What a scenario says about the robot above its base: drive trains, encoders, and what differs from robot to robot.
+"""The robot above its base as a scenario describes it: drive trains, encoders, and what differs from robot to robot.
 
 SI units.
 """
@@ -49,7 +49,7 @@ _HELD = {1: (9000.0, 3.0, 0.4), 3: (6000.0, 2.0, 0.5), 5: (1000.0, 0.4, 3.0), 7:
 FRICTION_HELD: dict[ArmName, GearFriction] = {
     name: GearFriction(name, *_HELD[k - 1 + k % 2]) for k, name in enumerate(ARM, 1)
 }
-"""Links held with the friction the URDF states, 1 N.m, and geared wrist joints with more than the gravity they carry,
+"""Friction of the links as the URDF states it, 1 N.m, and geared wrist joints with more than the gravity they carry,
 1.2 N.m and as much again of payload; slip such that the unloaded loop is 0.7-0.8 mrad wide, 2 arc minutes, a
 strain-wave catalogue's hysteresis loss."""
 
@@ -77,7 +77,7 @@ class Torso:
 
 @dataclass(frozen=True, config=STRICT)
 class Widths:
-    """What differs from one robot of the series to the next, standard deviations unless said.
+    """What differs from one robot of the series to the next, standard deviations unless stated.
 
     Attributes:
         placement_translation: Each joint placement, per axis [m].

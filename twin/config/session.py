@@ -12,7 +12,7 @@ class Session:
     Attributes:
         base_translation: Half width of the base's move, per axis [m].
         base_rotation: Half width of its turn [rad].
-        encoder_zero: Standard deviation of a motor encoder's zero after homing anew [rad]: three steps of the absolute
+        encoder_zero: Standard deviation of a motor encoder's zero after homing again [rad]: three steps of the absolute
             encoder it is homed by.
     """
 

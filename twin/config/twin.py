@@ -1,4 +1,4 @@
-"""What a scenario says about a robot and its laboratory: magnitudes, widths and instruments.
+"""A robot and its laboratory as a scenario describes them: magnitudes, widths and instruments.
 
 SI units. Every field is validated here once; nothing downstream checks it again. Magnitudes of one robot are values,
 what differs between robots is sampled: placements from zero-mean normals, offsets and gaps within +-spread of theirs,
@@ -68,7 +68,7 @@ class RobotConfig:
     defects: tuple[AnyDefect, ...] = ()
 
     def __post_init__(self) -> None:
-        """What one field says fits what the others say."""
+        """Check fields against one another."""
         refuse("RobotConfig", [*self._loose(), *self._unheld(), *self._ungrounded()])
 
     def _loose(self) -> Iterator[InitErrorDetails]:
@@ -103,7 +103,7 @@ class RobotConfig:
 
 @dataclass(frozen=True, config=STRICT)
 class TwinConfig(RobotConfig):
-    """What a scenario says: nominal values and distributions; all a laboratory may be told."""
+    """The values of a scenario: nominal ones and distributions, which a dataset may describe."""
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -1,11 +1,11 @@
-"""A differential: two motors drive two joints together, so that either one's play and offset shows on both.
+"""A differential: two motors drive two joints together, so that either one's backlash and offset shows on both.
 
     m_1 = q_a + q_b        m_2 = q_a - q_b         motors, from joint positions; q_a = (m_1 + m_2) / 2
     mesh i: delta_i = m_i(links) - m_i(motors), |delta_i| <= gap_i / 2 but for the mesh's spring K_i
 
 The motors are alike, so their inertia and servos are diagonal in joint coordinates too: the rotors of both joints stay
 as two `Gear`s put them, and only the meshes are coupled. Torque follows from virtual work, t_a = t_1 + t_2,
-t_b = t_1 - t_2: with K_i half of what the joints' own gears have, each joint is as stiff as before. The free play of
+t_b = t_1 - t_2: with K_i half of what the joints' own gears have, each joint is as stiff as before. The backlash of
 the pair is a diamond, |q_a + q_b| <= gap_1 / 2 and |q_a - q_b| <= gap_2 / 2, about the motors' positions.
 
 Friction in a mesh (`gear_friction`) has half of its joint's spring k_i and slider s_i. While joint b bears no torque

@@ -22,7 +22,7 @@ _IMPEDANCE = 0.02
 _ROTOR_MASS = 1e-4  # [kg] a moving body must have some
 _ROTOR_INERTIA = 1e-8  # [kg.m2] of the body itself; the rotor's real inertia is its armature
 _DAMPING_RATIO = 1.2  # servo velocity gain over sqrt(kp J), where none is given
-_OPEN = 1e-9  # [rad] half width that stands for no play at all
+_OPEN = 1e-9  # [rad] half width in place of no backlash at all
 
 
 def rotor_joint(joint_name: str) -> str:
@@ -110,7 +110,7 @@ class Gear(Defect):
 
 @dataclass(frozen=True, config=STRICT)
 class DirectDrive(Defect):
-    """A sliding joint whose motor is fixed to it without play: the torso's spindle.
+    """A sliding joint whose motor is fixed to it without backlash: the torso's spindle.
 
     Attributes:
         joint_name: The joint.

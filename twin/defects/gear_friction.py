@@ -1,11 +1,11 @@
-"""Friction that holds a drive train's play, and a mesh that winds up along one way and unwinds along another.
+"""Gear friction: a link that stays within its backlash, and a mesh with hysteresis.
 
     mesh:   tau = K_e dz(delta; gap) + J(delta)          delta = q_l - q_m
             J = k (delta - s),  ds/dt != 0 only while |J| = t_y      a spring in series with a slider (Jenkins element)
     link:   Coulomb friction grows by `holding`: the link stays in the gap while load and t_y together are below it
 
 The slope of the mesh in contact is K_e + k after each reversal and K_e once the slider slips. Without load torque to
-tell the flank, motion decides it: the link follows its motor as a play operator does. k and t_y are a tendon's
+select the flank, motion does: the link follows its motor as a play operator does. k and t_y are a tendon's
 elasto-plastic spring. Reference: Lampaert, Al-Bender, Swevers, IEEE MMAR 2003 (Maxwell-slip elements).
 """
 

@@ -1,4 +1,4 @@
-"""Joint placements that are not where the datasheet says.
+"""Joint placements that differ from the datasheet's.
 
     M_j <- M_j exp6(xi_j)
 

@@ -1,9 +1,9 @@
-"""Values of a scenario that are drawn anew for each robot.
+"""Values of a scenario that are sampled for each robot.
 
     {normal: [mean, sd]}     cut at 3 sd on either side        {uniform: [low, high]}
 
-As a number an uncertain value is its mean: what a datasheet says, and what the laboratory is told. `drawn` replaces it
-by one robot's own, from a stream named after its place in the scenario, so that no draw depends on another.
+As a number a random value is its mean: the datasheet's value, and what dataset.json describes. `sampled` replaces it by
+one robot's own, from a stream named after its place in the scenario, so that no sample depends on another.
 """
 
 from collections.abc import Callable, Mapping
@@ -126,7 +126,7 @@ DRAWN = Drawn()
 
 
 def sampled(values: T, seed: int, *path: str) -> T:
-    """The same values with every uncertain one replaced by its draw; `path` is where they stand in the scenario."""
+    """The same values with every random one replaced by its sample; `path` is their place in the scenario."""
     if isinstance(values, RandomValue):
         return values.distribution.sample(generator(seed, "value", ".".join(path)))  # type: ignore[return-value]
     if is_dataclass(values) and not isinstance(values, type):

@@ -1,4 +1,4 @@
-"""Types of the values a scenario gives: SI numbers with limits.
+"""Types of the values of a scenario: SI numbers with limits.
 
 What describes the robot or its instruments may have a distribution (`twin.fields.distributions`); what a person decides
 or declares, the campaign and the datasheet, is `Fixed`.
@@ -84,7 +84,7 @@ def in_order(names: Iterable[str]) -> AfterValidator:
 
 @dataclass(frozen=True)
 class OneOfKind:
-    """Annotation of a value of one of several classes, which its field `kind` tells.
+    """Annotation of a value of one of several classes, named by its field `kind`.
 
     Attributes:
         classes: Dataclasses with a default for `kind`.
@@ -100,7 +100,7 @@ class OneOfKind:
 
 @dataclass(frozen=True)
 class Keyed:
-    """Annotation of a mapping whose values hold their own key: a file gives it once, as the key.
+    """Annotation of a mapping whose values contain their own key: a file states it once, as the key.
 
     Attributes:
         field: The field of each value that is its key.
@@ -119,7 +119,7 @@ class Keyed:
         return {k: {self.field: k, **v} if isinstance(v, Mapping) else v for k, v in values.items()}
 
     def _without_key(self, values: Any, handler: SerializerFunctionWrapHandler) -> Any:
-        """Nor the kind, which the mapping's own field tells."""
+        """Nor the kind, which the name of the mapping implies."""
         left_out = (self.field, "kind")
         return {k: {n: x for n, x in v.items() if n not in left_out} for k, v in handler(values).items()}
 

@@ -25,7 +25,7 @@ from twin.truth import Parameter
 
 @validated(frozen=True, config=STRICT)
 class PlateErrors:
-    """Of the force plate, in its own axes; widths are standard deviations of what is drawn for one plate.
+    """Of the force plate, in its own axes; widths are standard deviations between plates.
 
     Attributes:
         gain: Of each diagonal entry of the gain matrix about 1 [-].

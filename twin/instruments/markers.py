@@ -121,7 +121,7 @@ class MarkerBody:
 def _without_rigid_part(points: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     """Points (n, 3) moved onto `nominal` as one rigid body: a body's frame is where its nominal markers fit best.
 
-    Markers of one nominal place, or a single one, tell no rotation: these are only shifted.
+    Markers of one nominal place, or a single one, define no rotation: these are only shifted.
     """
     p, q = points.mean(axis=0), nominal.mean(axis=0)
     if (nominal == nominal[0]).all():

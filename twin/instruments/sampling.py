@@ -1,6 +1,6 @@
 """From dense states at the simulation's steps to samples at an instrument's times.
 
-Things that happen to a recording now and then: a Poisson process of short events.
+Events of a recording, lost messages or exchanged labels, are a Poisson process.
 """
 
 import numpy as np

@@ -19,7 +19,7 @@ from twin.truth import Parameter
 
 @validated(frozen=True, config=STRICT)
 class WristSensor:
-    """The force-torque sensor between wrist and hand, read with the encoders; widths are of what is drawn for one.
+    """The force-torque sensor between wrist and hand, read with the encoders; widths are between sensors.
 
     Attributes:
         force_noise: Per axis and sample [N].

@@ -76,7 +76,7 @@ class Campaign:
         calibration_postures: Number of.
         validation_postures: Number of.
         given_postures: Calibration postures [m, rad] as `tiago-twin design` chooses them, the lift first, instead of
-            `calibration_postures` drawn ones.
+            `calibration_postures` sampled ones.
         given_approaches: For each of them the sign of each joint's last motion before it rests, by way of a point
             0.05 rad (the lift 5 mm) before it; 0: it does not matter. Empty: straight from the last.
         sweep: Duration of each one-joint sweep [s]; 0: no sweeps.
@@ -85,9 +85,9 @@ class Campaign:
         pause: Between trials, on every clock [s].
         payloads: Further masses [kg] with which the first validation swing is repeated.
         push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
-        confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed anew.
+        confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed again.
         driving: Trials in which the base moves.
-        carried: Whether every trial is without physics, joints and base where they are told to be.
+        carried: Whether every trial is without physics, joints and base where they are commanded to be.
         motions: Motions of one's own by the names of their trials.
         only: Trials to record beside these, `sweeps` for those of one joint; empty: all but `FURTHER_SWINGS`. A
             confirmation repeats those of validation.

@@ -51,7 +51,7 @@ def _group(motion: Motion) -> str:
 
 
 def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Motion, ...]:
-    """The second session: a few postures to register the markers anew, then what is asked for of validation."""
+    """The second session: a few postures to register the remounted markers, then the validation trials asked for."""
     q = sample_postures(nominal, _REGISTRATION_POSTURES + 1, generator(seed, "postures", REGISTRATION))
     register = motions.static_postures(f"{REGISTRATION}_confirmation", "confirmation", q, campaign)
     swings = _swings("confirmation", campaign.validation_swing, VALIDATION_SWINGS, campaign)
@@ -63,7 +63,7 @@ def _confirmation(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tup
 
 
 def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
-    """The given postures, from the first of them on, or drawn ones."""
+    """The given postures, from the first of them on, or sampled ones."""
     if not campaign.given_postures:
         return _statics("postures", "calibration", campaign.calibration_postures, nominal, seed, campaign)
     q = np.array([campaign.given_postures[0], *campaign.given_postures])
@@ -74,7 +74,7 @@ def _calibration_postures(nominal: mujoco.MjModel, seed: int, campaign: Campaign
 def _statics(
     id: str, role: schema.Role, n: int, nominal: mujoco.MjModel, seed: int, campaign: Campaign
 ) -> tuple[Motion, ...]:
-    """The first posture is where the trial starts, the n that follow are dwelt in; not drawn unless asked for."""
+    """The first posture is where the trial starts, the n that follow are dwelt in; not sampled unless asked for."""
     if not _asked(campaign, id.replace("_confirmation", "_validation")):
         return ()
     q = sample_postures(nominal, n + 1, generator(seed, "postures", role))

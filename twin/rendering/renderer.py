@@ -1,6 +1,6 @@
 """Pictures by a graphics driver without a screen (EGL), where there is one; many times faster than casting rays.
 
-`Frames` draws a model's states from one view; without a driver it casts rays (`twin.raycast`) and says so once.
+`Frames` draws a model's states from one view; without a driver it casts rays (`raycaster`) and logs it once.
 """
 
 import logging

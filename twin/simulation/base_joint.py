@@ -1,6 +1,6 @@
-"""How the base stands in a model: floating on a free joint, or hung on the six joints of `twin.defects.anchored`.
+"""The base joint of a model: free, or the six joints of `twin.defects.wheels.anchored_base`.
 
-anchored:  T_lab_base = T_0 R_x(theta_x) R_y(theta_y) R_z(theta_z) Trans(s),     T_0 where it was put down
+anchored:  T_lab_base = T_0 R_x(theta_x) R_y(theta_y) R_z(theta_z) Trans(s),     T_0 where it was placed
 """
 
 import mujoco

@@ -1,9 +1,9 @@
-"""What makes a simulated trial unusable: numbers that run away, a robot that shakes, tips over or leaves its plate.
+"""What makes a simulated trial unusable: numbers that run away, a base that vibrates, tips over or leaves its plate.
 
-A base at rest shakes where its acceleration changes from step to step, rms of (v[k+1] - 2 v[k] + v[k-1]) / h. Sound
-ones change it by 5e-6 to 2e-4 m/s2, where gears held by friction still ring by 0.013 m/s2 and 0.09 rad/s2 at most;
+A base at rest vibrates where its acceleration changes from step to step, rms of (v[k+1] - 2 v[k] + v[k-1]) / h. Sound
+ones change it by 5e-6 to 2e-4 m/s2, where gears with friction still ring by 0.013 m/s2 and 0.09 rad/s2 at most;
 solvers that overshoot by 0.45 m/s2 and up.
-MuJoCo resets a simulation that runs away to the model's first posture, with finite numbers; its clock tells.
+MuJoCo resets a simulation that runs away to the model's first posture, with finite numbers; its clock shows it.
 """
 
 import mujoco

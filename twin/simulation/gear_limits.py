@@ -4,7 +4,7 @@
 
 m is what rotor and link turn against each other with, the mass that the soft limit adds included, at its least over the
 postures of the arm; of meshes that share joints, a differential's, 1 / m is the sum over all. In contact a step is
-dv = -h (K p + D v) / m, dp = h v: unstable beyond kappa + 2 delta = 4. Within the play the link bounces, and penetrates
+dv = -h (K p + D v) / m, dp = h v: unstable beyond kappa + 2 delta = 4. Within the backlash the link bounces, and enters
 by the part of a step it happens to have: half of an oscillation in contact must last two steps, kappa <= 2, or bounces
 gain speed over these parts' mean: from kappa = 2.3 on at delta = 0.02, from 2.7 on at 0.2. Between two flanks a link
 with less damping can meet one part again and again, and gain within the limit too: 3 times at kappa = 1.5. The spring

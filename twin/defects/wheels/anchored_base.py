@@ -1,9 +1,9 @@
 """The base as Nguyen et al. (Humanoids 2024) model it: every wheel a 6D spring-damper to the floor, and no contact.
 
     F_i = Kt_i dr_i + Ct_i d(dr_i)/dt,   M_i = Ktheta_i theta + Ctheta_i dtheta/dt,   dr_i = s + theta x r_i
-    sum_i (F_i, M_i + r_i x F_i) = K (s, theta) + C d(s, theta)/dt,   as in `twin.stiffness`
+    sum_i (F_i, M_i + r_i x F_i) = K (s, theta) + C d(s, theta)/dt,   as in `stiffness`
 
-linear in the base's displacement s along its own axes and in its angles theta, from where it is put down. The base
+linear in the base's displacement s along its own axes and in its angles theta, from where it is placed. The base
 hangs on six joints, angles before slides; K and C are springs and dampers of fixed tendons along their eigenvectors,
 since a tendon of length e'x with stiffness k pulls with e k e'x. The forces are those of wheels suspended in the base's
 axes that act on fixed points of the floor.

@@ -6,7 +6,7 @@ M = k_r phi + c_r dphi/dt         hinges about the hub, where the wheel can turn
 Where friction holds a wheel of mass m, MuJoCo finds the friction for m alone and then steps with m + h c, since
 damping is implicit. The excess h c dv of a step is taken up by the contact's own damping of slip, dv_w/dt = -b v_w:
 the wheel runs ahead by c / (m b) of the base's speed, and its spring takes h k / (m b) of the damping away (10 % at a
-caster, 1 ms). `tune_held` gives that back.
+caster, 1 ms). `tune_held` restores that.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ _NONE = (0.0, 0.0, 0.0)
 
 
 class BushingTooStiff(TwinError):
-    """A bushing so stiff that its wheel, held by friction, would follow the base within a step."""
+    """A bushing so stiff that its wheel, which sticks, would follow the base within a step."""
 
     def __init__(self, wheel: str, stiffness: float, limit: float) -> None:
         super().__init__(

@@ -19,7 +19,7 @@ HELD = (0, 1, 5)
 
 
 def spatial_stiffness(wheels: Sequence[Wheel]) -> tuple[np.ndarray, np.ndarray]:
-    """K and C (6, 6) of wheels that hold on the floor; infinite on the diagonal where nothing gives."""
+    """K and C (6, 6) of wheels that stick to the floor; infinite on the diagonal where nothing is compliant."""
     K, C = np.zeros((6, 6)), np.zeros((6, 6))
     for wheel in wheels:
         A, k, c = lever(wheel), *springs(wheel)

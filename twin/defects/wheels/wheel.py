@@ -2,7 +2,7 @@
 
     contact:   bushing and contact    sticks, slips and leaves a permanent offset
     anchored:  bushing alone          its lower end fixed in the floor: linear, see `anchored_base`
-    rigid:     contact alone          compliant in heave and tilt, held by friction in the floor's plane
+    rigid:     contact alone          compliant in heave and tilt, rigid in the floor's plane
 
 Drives are braked: they do not roll, see `rolling_wheel` for those that do. Casters slide as they stand or, with a
 turning force f, turn first, against the friction of bearings and scrub instead of Coulomb's law:
@@ -143,7 +143,7 @@ def _pose_in_base(found: mujoco.MjsBody) -> np.ndarray:
 
 
 def let_turn(hub: mujoco.MjsBody, wheel: str, axes: np.ndarray, force: float) -> None:
-    """Add the slides along axes (2, 3) of the body that stands on the floor, each held by a force [N]."""
+    """Add the slides along axes (2, 3) of the body on the floor, each with a dry friction [N]."""
     for axis, letter in zip(axes, DIRECTIONS, strict=False):
         hub.add_joint(
             name=f"{wheel}.turn_{letter}",
