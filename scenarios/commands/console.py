@@ -39,12 +39,13 @@ def progress() -> Iterator[Progress]:
 
 @contextmanager
 def _bars(console: Console) -> Iterator[Progress]:
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
     steps: dict[str, TaskID] = {}
     step_name, at_what = (TextColumn(text, markup=False) for text in ("{task.description:<10}", "{task.fields[at]}"))
-    with Bars(step_name, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), at_what, console=console) as bars:
+    times = TimeElapsedColumn(), TimeRemainingColumn()
+    with Bars(step_name, BarColumn(), TaskProgressColumn(), *times, at_what, console=console) as bars:
 
         def show(step: str, at: str, fraction: float) -> None:
             if step not in steps:

@@ -71,8 +71,9 @@ def list_scenarios() -> None:
     from scenarios import steps
     from scenarios.files import registry
 
+    width = max(map(len, registry.names()), default=0)
     for name in registry.names():
-        typer.echo(f"{name}  {steps.load(name).description}")
+        typer.echo(f"{name:{width}}  {steps.load(name).description}")
 
 
 @app.command(epilog=_example("run humanoids2024 --seed 7 --set twin.arm.arm_6_joint.gap=0.012"))

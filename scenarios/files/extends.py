@@ -1,5 +1,6 @@
 """A scenario file that says what differs from another scenario, which may itself be such a file."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,23 +22,25 @@ class Extension(BaseModel):
     """A scenario that is another one but for some values.
 
     Attributes:
-        name: Its name.
-        description: One line.
+        name: Its name; the file's unless given.
+        description: One line; the other one's unless given.
         extends: The other one: a name from `tiago-twin list`, or a file, beside this one or from the current folder.
         set: Values by `path.to.field`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
-    description: str
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")] | None = None
+    description: str | None = None
     extends: str
-    set: dict[Annotated[str, AfterValidator(_path)], Any]
+    set: Annotated[dict[Annotated[str, AfterValidator(_path)], Any], Field(default_factory=dict)]
 
     def overrides(self, file: str, tree: CommentedMap) -> list[Override]:
         """Its values as they are put into the other one; `tree` is what `file` holds."""
-        named = [Override(name, getattr(self, name), file, tree) for name in ("name", "description")]
-        return [*named, *(Override(path, value, file, tree["set"]) for path, value in self.set.items())]
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", Path(file).stem)
+        named = [Override("name", stem, file, tree)] if self.name is None else []
+        given = [Override(key, value, file, tree) for key in ("name", "description") if (value := getattr(self, key))]
+        return [*named, *given, *(Override(path, value, file, tree["set"]) for path, value in self.set.items())]
 
 
 def resolve(path: Path) -> tuple[Path, list[Override]]:

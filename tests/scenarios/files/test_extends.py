@@ -38,6 +38,15 @@ def test_values_come_one_file_after_the_other_and_the_command_line_last(tmp_path
     assert mine.twin.departures == other.twin.departures and mine.twin.gear_form == "friction_held"
 
 
+def test_a_file_may_say_only_what_differs(tmp_path):
+    path = tmp_path / "my robot.yaml"
+    path.write_text("extends: short\nset: {seed: 9}\n", encoding="utf-8")
+    mine, other = steps.load(path), steps.load("short")
+    assert (mine.name, mine.seed, mine.description) == ("my_robot", 9, other.description)
+    path.write_text("extends: short\n", encoding="utf-8")
+    assert steps.load(path).twin == other.twin
+
+
 @pytest.mark.parametrize(
     ("values", "finding"),
     [
