@@ -119,15 +119,7 @@ class Placements(ParameterBlock):
 class EncoderZeros(ReadingError):
     """Zero of each motor-side reading."""
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One a joint."""
-        return tuple(f"encoder.{joint}.motor.offset" for joint in self.joints)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """An angle's, or a length's where a joint slides."""
-        return tuple("rad" if length == 1.0 else "m" for length in self.lengths)
+    pattern: ClassVar[str] = "encoder.{}.motor.offset"
 
     def tolerance(self, known: Known) -> np.ndarray:
         """Of the encoders."""
@@ -141,18 +133,10 @@ class EncoderZeros(ReadingError):
 class Compliance(ReadingError):
     """Compliance of each gear under gravity torque."""
 
+    pattern: ClassVar[str] = "gear.{}.compliance"
+    unit: ClassVar[tuple[str, str]] = ("rad/(N.m)", "m/N")
     loaded: ClassVar[bool] = True
     averaged: ClassVar[bool] = True
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One a joint."""
-        return tuple(f"gear.{joint}.compliance" for joint in self.joints)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Reading over torque."""
-        return tuple("rad/(N.m)" if length == 1.0 else "m/N" for length in self.lengths)
 
     def tolerance(self, known: Known) -> np.ndarray:
         """What turns each joint by `deflection` at the largest of its torques."""
@@ -166,18 +150,9 @@ class Compliance(ReadingError):
 class BacklashPreload(ReadingError):
     """Backlash of each gear that gravity preloads to one side."""
 
+    pattern: ClassVar[str] = "backlash.{}.gap"
     loaded: ClassVar[bool] = True
     averaged: ClassVar[bool] = True
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One a joint."""
-        return tuple(f"backlash.{joint}.gap" for joint in self.joints)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """As the readings'."""
-        return tuple("rad" if length == 1.0 else "m" for length in self.lengths)
 
     def tolerance(self, known: Known) -> np.ndarray:
         """Half of it as wide as the datasheet's play."""

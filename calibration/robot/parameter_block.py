@@ -116,7 +116,23 @@ class ParameterBlock:
 
 
 class ReadingError(ParameterBlock):
-    """One parameter a joint, linear in its reading: e_j = theta_j f_j(q, tau)."""
+    """One parameter a joint, linear in its reading: e_j = theta_j f_j(q, tau).
+
+    Subclasses state the names' pattern, the units of joints that turn and that slide, and f.
+    """
+
+    pattern: ClassVar[str]
+    unit: ClassVar[tuple[str, str]] = ("rad", "m")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One a joint."""
+        return tuple(self.pattern.format(joint) for joint in self.joints)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """By whether a joint turns or slides."""
+        return tuple(self.unit[length != 1.0] for length in self.lengths)
 
     def shape(self, q: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """f (n, k)."""
