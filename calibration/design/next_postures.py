@@ -27,7 +27,7 @@ from calibration.design.collisions import shapes_of
 from calibration.design.information import dwell_noise, prospect, told_directions
 from calibration.design.plan import Plan, Task, plan
 from calibration.errors import NotEnoughData
-from calibration.inference.marginal_likelihood import Widths, evidence
+from calibration.inference.marginal_likelihood import Hyperparameters, log_marginal
 from calibration.inference.parameters import Model, ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.recording.experiment import ExperimentPlan, Sigma
@@ -96,7 +96,11 @@ def record_next(
     remedy = _remedy(found, known, lost, short)
     sigma = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in remedy.sigma[:3])
     return remedy, (
-        Verdict(STAGE, "warning", f"{remedy.why}; {len(remedy.postures)} postures that would tell, in {FILE}: {sigma}"),
+        Verdict(
+            STAGE,
+            "warning",
+            f"{remedy.why}; {len(remedy.postures)} postures that would, in {FILE}: {sigma}",
+        ),
     )
 
 
@@ -150,14 +154,14 @@ def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> Exp
     whole = found.remedy(STAGE, "").sigma
     most = sorted((s for s in whole if s.after < _FALLS * s.before), key=lambda s: s.after / s.before)[:_NAMED]
     named = {s.name for s in most} | set(lost)
-    why = f"{known.untold} of {_directions(found)} combinations are told by the datasheet's tolerances alone"
+    why = f"{known.untold} of {_directions(found)} identifiable combinations are determined by the prior only"
     if short > 0:
-        why = f"{short} distinct postures are lacking; {why}"
+        why = f"{short} distinct postures are missing; {why}"
     never = [s.name for s in whole if s.name in lost and s.after > _NEVER * s.before]
     if set(lost) - set(never):
         why += f"; not identifiable: {', '.join(name for name in lost if name not in never)}"
     if never:
-        why += f"; no posture tells {', '.join(never)}"
+        why += f"; no posture identifies {', '.join(never)}"
     told = (Sigma("hand.position", "m", *hand), *(s for s in whole if s.name in named and s.name not in never))
     return replace(found.remedy(STAGE, why), sigma=told)
 
@@ -173,6 +177,8 @@ def believed_play(
     problem = hand_problem(hand, parameters, postures, NoiseModel(play, _LEAST * play, np.zeros(0)))
     at, f = problem.linearise(theta), problem.widths.prior
     noise, factors = problem.noise, np.geomspace(_LEAST, 1.0, _POINTS)
-    values = [evidence(at, noise, problem.prior, Widths(np.append(x * play, 1.0), f)).value for x in factors]
+    values = [
+        log_marginal(at, noise, problem.prior, Hyperparameters(np.append(x * play, 1.0), f)).value for x in factors
+    ]
     likely = np.exp(np.min(values) - np.array(values))
     return np.asarray(play * np.sqrt(likely @ factors**2 / likely.sum()))

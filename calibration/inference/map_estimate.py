@@ -5,9 +5,9 @@
     C_i = S_i + Jq_i diag(s^2) Jq_i' (+ position and rotation of the hand)
 
 S_i is the measured pose's covariance, s_j the random error of joint j's reading (play, friction: what no constant
-describes), carried to the hand by that posture's own lever arms. s and f maximise the evidence of the data linearised
-at theta, theta integrated out (`evidence`), on a spread subset where postures are many; Gauss-Newton steps on all of
-them in between.
+describes), carried to the hand by that posture's own lever arms. s and f maximise the marginal likelihood of the
+data linearised at theta, theta integrated out (`marginal_likelihood`), on a spread subset where postures are many;
+Gauss-Newton steps on all of them in between.
 References: MacKay, Neural Computation 1992; Hollerbach, Khalil, Gautier, Springer Handbook of Robotics, ch. 6.
 """
 
@@ -19,18 +19,18 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import lapack
 
-from calibration.inference.marginal_likelihood import Widths, inverse_and_log_det, moved_by, refined
-from calibration.inference.noise_selection import needed
+from calibration.inference.marginal_likelihood import Hyperparameters, inverse_and_log_det, maximised, moved_by
+from calibration.inference.noise_selection import selected
 from calibration.inference.parameters import ParameterSet, Prior
 from calibration.inference.residual import Linearised, Noise, Residual, stacked, stacked_noise
 
 _OUTER = 15
-_PROMISE = 1e-3  # the last Gauss-Newton step promises a smaller decrease of the cost [-], the one after it 1e-7
+_DECREASE = 1e-3  # the last Gauss-Newton step promises a smaller decrease of the cost [-], the one after it 1e-7
 _SAME = 1e-2  # outer iterations stop below this change of log s [-], a fraction of what 160 postures tell
-_HASTY, _HASTY_PROMISE = 0.1, 1.0
+_COARSE, _COARSE_DECREASE = 0.1, 1.0
 _MANY = 960  # components the evidence is asked with: standard deviations to 4 %
 _LEVERAGE = 20.0  # components per parameter above which a posture hardly moves its own prediction
-_ALIKE = 1e-5  # smallest over largest pivot of the normal equations [-]
+_MIN_PIVOT = 1e-5  # smallest over largest pivot of the normal equations [-]
 _log = logging.getLogger(__name__)
 
 
@@ -48,7 +48,7 @@ class Problem:
     residuals: tuple[Residual, ...]
     parameters: ParameterSet
     stated: bool = False
-    start: Widths | None = None
+    start: Hyperparameters | None = None
 
     @cached_property
     def prior(self) -> Prior:
@@ -63,9 +63,9 @@ class Problem:
         return stacked_noise([r.noise for r in self.residuals], self.linearise(self.prior.nominal).r.shape[1])
 
     @property
-    def widths(self) -> Widths:
+    def widths(self) -> Hyperparameters:
         """Hyperparameters to begin with."""
-        return self.start or Widths(self.noise.start, np.ones(self.prior.n_groups))
+        return self.start or Hyperparameters(self.noise.start, np.ones(self.prior.n_groups))
 
     def linearise(self, theta: np.ndarray) -> Linearised:
         """Residuals and derivatives at theta (p,)."""
@@ -95,7 +95,7 @@ class Fit:
 
     at: Linearised
     noise: Noise
-    widths: Widths
+    widths: Hyperparameters
     covariance: np.ndarray
     whitener: np.ndarray
     converged: bool
@@ -126,36 +126,36 @@ class Fit:
 
 @dataclass(frozen=True)
 class _Step:
-    """A Gauss-Newton step: change of theta (p,), promised decrease of the cost, covariance (p, p), the cost before."""
+    """A Gauss-Newton step: change of theta (p,), expected decrease of the cost, covariance (p, p), the cost before."""
 
     change: np.ndarray
-    promise: float
+    predicted_decrease: float
     covariance: np.ndarray
     cost: float
 
 
 def solve(
-    problem: Problem, at: Linearised, weigh: Callable[[np.ndarray], np.ndarray] | None = None, hasty: bool = False
+    problem: Problem, at: Linearised, weigh: Callable[[np.ndarray], np.ndarray] | None = None, coarse: bool = False
 ) -> Fit:
-    """Alternate evidence and Gauss-Newton until both stand still.
+    """Alternate marginal likelihood and Gauss-Newton until both converge.
 
     Args:
         problem: What is to be fitted.
         at: The problem where to start.
         weigh: Weights (n,) from squared distances (n,) as `distances` gives them; one where it is not given.
-        hasty: Be content with widths to a tenth and theta to a sigma, as a start for all postures.
+        coarse: Be content with widths to a tenth and theta to a sigma, as a start for all postures.
     """
-    same, promise = (_HASTY, _HASTY_PROMISE) if hasty else (_SAME, _PROMISE)
+    same, predicted_decrease = (_COARSE, _COARSE_DECREASE) if coarse else (_SAME, _DECREASE)
     widths, noise, at = problem.widths, problem.noise, replace(at, weight=np.ones(len(at.r)))
     some = spread(len(at.r), at.r.shape[1], _MANY)
     change, free = np.inf, None
     for _ in range(_OUTER):
         settled = change < same
         old = widths
-        if not settled and (hasty or problem.stated):
-            widths, _ = refined(at.rows(some), noise, problem.prior, widths, same)
+        if not settled and (coarse or problem.stated):
+            widths, _ = maximised(at.rows(some), noise, problem.prior, widths, same)
         elif not settled:
-            free, widths = needed(at.rows(some), noise, problem.prior, widths, free, same)
+            free, widths = selected(at.rows(some), noise, problem.prior, widths, free, same)
         W = noise.whitener(at, widths.noise)
         step = _step(problem.prior, at, W, widths)
         if not settled:
@@ -164,7 +164,7 @@ def solve(
             weight = weigh(distances(at.moved(step.change), noise, widths, step.covariance))
             change = max(change, float(np.abs(weight - at.weight).max()))
             at = replace(at, weight=weight)
-        still = step.promise < promise
+        still = step.predicted_decrease < predicted_decrease
         if still and change < same:
             return Fit(at.moved(step.change), noise, widths, step.covariance, W, True)
         lower = at if still else _descended(problem, at, W, widths, step)
@@ -179,7 +179,7 @@ def spread(n: int, d: int, components: int) -> np.ndarray:
     return np.unique(np.linspace(0, n - 1, components // d).astype(int))
 
 
-def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarray) -> np.ndarray:
+def distances(at: Linearised, noise: Noise, widths: Hyperparameters, covariance: np.ndarray) -> np.ndarray:
     """Squared Mahalanobis distance (n,) of each posture from what all others predict [-].
 
     r' (I - w M)^-1 (I - w M + M)^-1 r,     M = W J covariance J' W'
@@ -196,7 +196,7 @@ def distances(at: Linearised, noise: Noise, widths: Widths, covariance: np.ndarr
     return np.abs((r * inner).sum(axis=1))
 
 
-def _step(prior: Prior, at: Linearised, W: np.ndarray, widths: Widths) -> _Step:
+def _step(prior: Prior, at: Linearised, W: np.ndarray, widths: Hyperparameters) -> _Step:
     """From the normal equations; by orthogonal factors where data and priors differ too much for those."""
     scale, (n, d, p) = prior.scale, at.J.shape
     A, r = (W @ at.J).reshape(n * d, p), (W @ at.r[..., None]).ravel()
@@ -206,18 +206,20 @@ def _step(prior: Prior, at: Linearised, W: np.ndarray, widths: Widths) -> _Step:
     information = (A.T @ A) * scale * scale[:, None] + np.diag(root**2)
     factor, failed = lapack.dpotrf(information, lower=True)
     diagonal = np.diagonal(factor)
-    if failed or diagonal.min() < _ALIKE * diagonal.max():
+    if failed or diagonal.min() < _MIN_PIVOT * diagonal.max():
         stacked = np.vstack([A * scale, np.diag(root)])
         change = -np.linalg.lstsq(stacked, np.concatenate([r, off]), rcond=None)[0]
-        promise, covariance = float(((stacked @ change) ** 2).sum()), inverse_and_log_det(information)[0]
+        predicted_decrease, covariance = float(((stacked @ change) ** 2).sum()), inverse_and_log_det(information)[0]
     else:
         gradient = scale * (A.T @ r) + root * off
         change = -lapack.dpotrs(factor, gradient, lower=True)[0]
-        promise, covariance = float(-gradient @ change), inverse_and_log_det(information)[0]
-    return _Step(scale * change, promise, covariance * scale * scale[:, None], cost)
+        predicted_decrease, covariance = float(-gradient @ change), inverse_and_log_det(information)[0]
+    return _Step(scale * change, predicted_decrease, covariance * scale * scale[:, None], cost)
 
 
-def _descended(problem: Problem, at: Linearised, W: np.ndarray, widths: Widths, step: _Step) -> Linearised | None:
+def _descended(
+    problem: Problem, at: Linearised, W: np.ndarray, widths: Hyperparameters, step: _Step
+) -> Linearised | None:
     """The problem after a step, halved until the cost at fixed weights does not rise; None where it always does."""
     prior, precision = problem.prior, problem.prior.precision(widths.prior)
     for halved in range(12):

@@ -25,8 +25,8 @@ _NEGLIGIBLE = 10.0  # standard deviations below this many floors need not stand 
 
 
 @dataclass(frozen=True)
-class Widths:
-    """What the evidence decides.
+class Hyperparameters:
+    """Sizes of random errors and factors on priors.
 
     Attributes:
         noise: (g,) standard deviation of each group of noise sources.
@@ -38,8 +38,8 @@ class Widths:
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """The evidence at some widths: minus its logarithm, its derivatives by the variances, and what theta would be."""
+class LogMarginal:
+    """Minus the log marginal likelihood, its derivatives by the variances, and the theta it would give."""
 
     value: float
     slope: np.ndarray
@@ -53,7 +53,7 @@ def moved_by(old: np.ndarray, new: np.ndarray, least: np.ndarray | float) -> flo
     return float(np.abs(np.log(np.maximum(new, least) / np.maximum(old, least))).max(initial=0.0))
 
 
-def _scored(now: Evidence, floor: np.ndarray, free: np.ndarray, s: np.ndarray, damping: float) -> np.ndarray:
+def _scored(now: LogMarginal, floor: np.ndarray, free: np.ndarray, s: np.ndarray, damping: float) -> np.ndarray:
     """Standard deviations after one Fisher scoring step of the variances that are free and not held at their floor."""
     v, low = s**2, floor**2
     free = free & ~((v <= low * 1.0000001) & (now.slope > 0.0))
@@ -66,7 +66,7 @@ def _scored(now: Evidence, floor: np.ndarray, free: np.ndarray, s: np.ndarray, d
     return np.sqrt(np.clip(v + np.clip(step, -0.97 * v, 20.0 * v + 4.0 * low), low, np.maximum(_LARGEST**2, low)))
 
 
-def _prior_factors(prior: Prior, now: Evidence, f: np.ndarray) -> np.ndarray:
+def _prior_factors(prior: Prior, now: LogMarginal, f: np.ndarray) -> np.ndarray:
     """MacKay's fixed point for the factors on squared tolerances."""
     new = np.array(f)
     for h in range(len(f)):
@@ -104,33 +104,33 @@ def times_upper(A: np.ndarray, R: np.ndarray) -> np.ndarray:
     return blas.dtrmm(1.0, R, A.T, trans_a=1).T
 
 
-def refined(
-    at: Linearised, noise: Noise, prior: Prior, widths: Widths, same: float, free: np.ndarray | None = None
-) -> tuple[Widths, Evidence]:
-    """Widths of highest evidence for the linearised problem, to a change of their logarithms below `same`.
+def maximised(
+    at: Linearised, noise: Noise, prior: Prior, widths: Hyperparameters, same: float, free: np.ndarray | None = None
+) -> tuple[Hyperparameters, LogMarginal]:
+    """Hyperparameters of highest evidence for the linearised problem, to a change of their logarithms below `same`.
 
     Only the groups `free` (g,) of those that are, if given, are changed; the evidence, too, is to that accuracy.
     """
-    damping, now = _UNDAMPED, evidence(at, noise, prior, widths)
+    damping, now = _UNDAMPED, log_marginal(at, noise, prior, widths)
     free = noise.free if free is None else free
     for _ in range(_STEPS):
         f = _prior_factors(prior, now, widths.prior)
         v = _scored(now, noise.floor, free, widths.noise, damping)
         moved = max(moved_by(widths.noise, v, _NEGLIGIBLE * noise.floor), moved_by(widths.prior, f, 1e-12) / 2.0)
         if moved < same and damping <= _UNDAMPED:
-            return Widths(v, f), now
-        trial = evidence(at, noise, prior, Widths(v, f))
+            return Hyperparameters(v, f), now
+        trial = log_marginal(at, noise, prior, Hyperparameters(v, f))
         if trial.value > now.value + 1e-9 * abs(now.value) and damping < 1e6:
             damping = max(10.0 * damping, 1e-2)
             continue
         damping = 0.1 * damping
-        widths, now = Widths(v, f), trial
+        widths, now = Hyperparameters(v, f), trial
         if moved < same:
             break
     return widths, now
 
 
-def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evidence:
+def log_marginal(at: Linearised, noise: Noise, prior: Prior, widths: Hyperparameters) -> LogMarginal:
     """Evaluate; the slope is by variance, the information that of the postures taken one by one.
 
     Both are zero for groups that are not free.
@@ -153,6 +153,6 @@ def evidence(at: Linearised, noise: Noise, prior: Prior, widths: Widths) -> Evid
     groups = np.eye(len(noise.floor))[noise.group[free]]
     value = log_det - 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
     value += float((rest**2).sum() + (precision * off**2).sum()) + prior.held(widths.prior, _HELD)
-    return Evidence(
+    return LogMarginal(
         0.5 * value, groups.T @ slope, groups.T @ together @ groups, off * scale, (spread**2).sum(axis=1) * scale**2
     )

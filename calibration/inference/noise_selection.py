@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.inference.marginal_likelihood import Evidence, Widths, refined
+from calibration.inference.marginal_likelihood import Hyperparameters, LogMarginal, maximised
 from calibration.inference.parameters import Prior
 from calibration.inference.residual import Linearised, Noise
 
@@ -32,13 +32,13 @@ class _Set:
     """Groups that may differ from their floor, the widths of highest evidence, the cost, and the evidence there."""
 
     free: np.ndarray
-    widths: Widths
+    widths: Hyperparameters
     cost: float
-    now: Evidence
+    now: LogMarginal
 
 
 @dataclass(frozen=True)
-class _Question:
+class _Search:
     """The linearised problem, and the groups that may be asked: those `noise.free`."""
 
     at: Linearised
@@ -51,60 +51,60 @@ class _Question:
         """Of a group."""
         return float(0.5 * np.log(len(self.at.r)) + np.log(max(1, self.noise.free.sum())))
 
-    def answered(self, free: np.ndarray, widths: Widths) -> _Set:
+    def maximised_over(self, free: np.ndarray, widths: Hyperparameters) -> _Set:
         """A set with its best widths."""
         least = replace(widths, noise=np.where(self.noise.free & ~free, self.noise.floor, widths.noise))
-        best, now = refined(self.at, self.noise, self.prior, least, self.same, free)
+        best, now = maximised(self.at, self.noise, self.prior, least, self.same, free)
         return _Set(free, best, now.value + self.price * int(free.sum()), now)
 
 
-def needed(
-    at: Linearised, noise: Noise, prior: Prior, widths: Widths, free: np.ndarray | None, same: float
-) -> tuple[np.ndarray, Widths]:
+def selected(
+    at: Linearised, noise: Noise, prior: Prior, widths: Hyperparameters, free: np.ndarray | None, same: float
+) -> tuple[np.ndarray, Hyperparameters]:
     """Which groups (g,) the data need, and the widths then; searched from `free` where that is given.
 
     `noise.free` are the groups that may be asked, `same` is as `refined` takes it.
     """
-    question = _Question(at, noise, prior, same)
+    search = _Search(at, noise, prior, same)
     if free is not None:
-        start = question.answered(free, widths)
+        start = search.maximised_over(free, widths)
     else:
-        common, everything = (question.answered(some, widths) for some in (noise.free & noise.common, noise.free))
-        start = min(common, _thinned(question, everything), key=lambda found: found.cost)
-    best = _searched(question, start)
+        common, everything = (search.maximised_over(some, widths) for some in (noise.free & noise.common, noise.free))
+        start = min(common, _backward_eliminated(search, everything), key=lambda found: found.cost)
+    best = _searched(search, start)
     return best.free, best.widths
 
 
-def _searched(question: _Question, found: _Set) -> _Set:
+def _searched(search: _Search, found: _Set) -> _Set:
     """From a set to better neighbours until there is none."""
     while True:
-        trials = (question.answered(*neighbour) for neighbour in _neighbours(question, found))
+        trials = (search.maximised_over(*neighbour) for neighbour in _neighbours(search, found))
         better = next((trial for trial in trials if trial.cost < found.cost - _WORTH), None)
         if better is None:
             return found
         found = better
 
 
-def _neighbours(question: _Question, found: _Set) -> Iterator[tuple[np.ndarray, Widths]]:
+def _neighbours(search: _Search, found: _Set) -> Iterator[tuple[np.ndarray, Hyperparameters]]:
     """The sets most likely to be better, with widths to begin with."""
-    noise, now, price = question.noise, found.now, question.price
-    x, promised = found.widths.noise**2 - noise.floor**2, np.full(len(noise.free), np.inf)
+    noise, now, price = search.noise, found.now, search.price
+    x, expected = found.widths.noise**2 - noise.floor**2, np.full(len(noise.free), np.inf)
     inside, outside = np.flatnonzero(found.free), np.flatnonzero(noise.free & ~found.free & (now.slope < 0.0))
     if inside.size:
         curvature = 1.0 / np.diag(np.linalg.pinv(now.fisher[np.ix_(inside, inside)], hermitian=True))
-        promised[inside] = 0.5 * curvature * x[inside] ** 2 - price - _DOUBT
+        expected[inside] = 0.5 * curvature * x[inside] ** 2 - price - _DOUBT
     F = np.diag(now.fisher)
-    promised[outside] = -0.5 * now.slope[outside] ** 2 / F[outside] + price
-    for g in np.argsort(promised)[:_TRIALS]:
-        if promised[g] < 0.0:
+    expected[outside] = -0.5 * now.slope[outside] ** 2 / F[outside] + price
+    for g in np.argsort(expected)[:_TRIALS]:
+        if expected[g] < 0.0:
             start = found.widths.noise.copy()
             start[g] = np.sqrt(noise.floor[g] ** 2 + max(0.0, -now.slope[g] / F[g]))
             yield found.free ^ (np.arange(len(x)) == g), replace(found.widths, noise=start)
 
 
-def _thinned(question: _Question, found: _Set) -> _Set:
+def _backward_eliminated(search: _Search, found: _Set) -> _Set:
     """Groups dropped, cheapest first, the others taking over by the curvature, while one costs less than its price."""
-    x, free, price = found.widths.noise**2 - question.noise.floor**2, found.free.copy(), question.price
+    x, free, price = found.widths.noise**2 - search.noise.floor**2, found.free.copy(), search.price
     while free.any():
         left = np.flatnonzero(free)
         inverse = np.linalg.pinv(found.now.fisher[np.ix_(left, left)], hermitian=True)
@@ -116,5 +116,5 @@ def _thinned(question: _Question, found: _Set) -> _Set:
         free[left[k]] = False
     if np.array_equal(free, found.free):
         return found
-    sizes = np.sqrt(question.noise.floor**2 + np.maximum(x, 0.0))
-    return question.answered(free, replace(found.widths, noise=np.where(free, sizes, found.widths.noise)))
+    sizes = np.sqrt(search.noise.floor**2 + np.maximum(x, 0.0))
+    return search.maximised_over(free, replace(found.widths, noise=np.where(free, sizes, found.widths.noise)))

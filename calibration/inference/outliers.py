@@ -72,7 +72,7 @@ def _agreed(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.
     everything, some = problem(np.ones(n, dtype=bool)), spread(n, d, _FEW)
     mask = _mask(n, some)
     few = everything if mask.all() else problem(mask)
-    found = solve(few, few.linearise(theta), lambda distance: (_NU + d) / (_NU + distance), hasty=True)
+    found = solve(few, few.linearise(theta), lambda distance: (_NU + d) / (_NU + distance), coarse=True)
     weight = np.zeros(n)
     weight[some] = found.at.weight
     at, distance = _judged(everything, found, weight)

@@ -51,7 +51,7 @@ def test_one_marker_on_the_hand_is_a_place_and_no_pose(tmp_path):
     estimate = calibrate(dataset)
     said = " ".join(v.message for v in estimate.verdicts)
     assert estimate.calibrated and estimate.model("model_2").rank == 33
-    assert "which way the hand is turned is as drawn" in said and "no posture tells frame.tool.hand.rx" in said
+    assert "hand orientation is not observable" in said and "no posture identifies frame.tool.hand.rx" in said
     turn = {p.name: p for p in estimate.model("full").parameters}["frame.tool.hand.rx"]
     assert turn.status == "not_identifiable" and turn.sigma == pytest.approx(0.1)
     found = evaluate(estimate, dataset)

@@ -19,17 +19,17 @@ from calibration.robot.parameter_block import joint_lengths
 from calibration.stages.geometry.hand_residual import HAND_NAMES
 from calibration.stages.geometry.parameters import reading_names
 
-_SCALE = 1.2  # believable ratio of the robot's size to the measured one, or its inverse [-]
+_SCALE = 1.2  # plausible ratio of the robot's size to the measured one, or its inverse [-]
 APART = 0.05  # [rad, a tenth of it in m] postures closer than this in every joint are one
 _CONDITION_OF_COMPLIANCES = 1e6  # scaled [-]
-_FACTOR = 6.0  # largest believable ratio of a prior's width to what it began with [-]
-_READING = 0.03  # largest believable random error of a reading [rad, a tenth of it in m]
+_FACTOR = 6.0  # largest plausible ratio of a prior's width to what it began with [-]
+_READING = 0.03  # largest plausible random error of a reading [rad, a tenth of it in m]
 MANY_ODD = 0.25  # share of postures that may be wrong
-_HAND = (("position [m]", 1e-2), ("rotation [rad]", 5e-2))  # largest believable random errors of the hand
+_HAND = (("position [m]", 1e-2), ("rotation [rad]", 5e-2))  # largest plausible random errors of the hand
 CONDITION = {6: 2e4, 3: 1e6}  # scaled, of poses and of points; 200 to 900 for poses all over the workspace [-]
-_OFFSET = 0.5  # largest believable zero of a reading [rad, a tenth of it in m]
-_TOLERANCES = 10.0  # largest believable deviation from nominal, and play, in datasheet tolerances [-]
-_CHI2 = 3.0  # largest believable squared whitened residual per degree of freedom [-]
+_OFFSET = 0.5  # largest plausible zero of a reading [rad, a tenth of it in m]
+_TOLERANCES = 10.0  # largest plausible deviation from nominal, and play, in datasheet tolerances [-]
+_CHI2 = 3.0  # largest plausible squared whitened residual per degree of freedom [-]
 
 
 def distinct(q: np.ndarray, apart: np.ndarray, enough: int = sys.maxsize) -> int:
@@ -70,7 +70,7 @@ def unusable_fit(
     """Why the values cannot be true."""
     fit = found.fit
     if not fit.converged:
-        yield "the fit did not converge: model and data do not belong together"
+        yield "the fit did not converge; check joint order, units, tool frame"
     if not known.clear or known.condition > _CONDITION_OF_COMPLIANCES:
         yield (
             f"the postures do not excite the model (rank {known.rank}, gap {known.gap:.0f}, condition "
@@ -78,7 +78,8 @@ def unusable_fit(
         )
     yield from _implausible_values(hand, parameters, fit)
     if fit.widths.prior.max(initial=0.0) > _FACTOR**2:
-        yield f"the robot departs from its drawing {np.sqrt(fit.widths.prior.max()):.0f} times as far as robots do"
+        times = np.sqrt(fit.widths.prior.max())
+        yield f"placement errors are {times:.0f} times their prior standard deviation; units, joint order, tool frame?"
     wrong = n - int(found.kept.sum())
     if wrong > MANY_ODD * n:
         yield f"{wrong} of {n} postures contradict the others; more than mistakes of some rows"
@@ -90,7 +91,7 @@ def _implausible_values(hand: HandModel, parameters: ParameterSet, fit: Fit) -> 
     zeros = hand.block(EncoderZeros).names
     for name, offset, length in zip(zeros, fit.theta[parameters.indices(zeros)], lengths, strict=True):
         if abs(offset) > _OFFSET * length:
-            yield f"{name} = {offset:.3g} is beyond belief; readings of another joint?"
+            yield f"{name} = {offset:.3g} exceeds the plausible {_OFFSET * length:.2g}; readings of another joint?"
     for joint, s, length in zip(joints, fit.noise_sigma(reading_names(hand.nominal)), lengths, strict=True):
         if s > _READING * length:
             yield f"readings of {joint} scatter by {s:.2g}; units, order of the joints, tool frame?"
@@ -116,11 +117,12 @@ def too_little(known: Identifiability, limit: float) -> Iterator[str]:
 def implausible(parameters: ParameterSet, found: Fit, play: np.ndarray, hand: HandModel) -> Iterator[str]:
     """Why the values cannot be true."""
     if not found.converged:
-        yield "the fit did not converge: model and data do not belong together"
+        yield "the fit did not converge; check joint order, units, tool frame"
     off, limit = np.abs(found.theta - parameters.nominal), _TOLERANCES * parameters.tolerance
     limit[parameters.indices(hand.block(EncoderZeros).names)] = _OFFSET * joint_lengths(hand.nominal)
     for i in np.flatnonzero(off > limit):
-        yield f"{parameters.names[i]} = {found.theta[i]:.3g} {parameters.units[i]} is beyond belief ({limit[i]:.2g})"
+        name, unit = parameters.names[i], parameters.units[i]
+        yield f"{name} = {found.theta[i]:.3g} {unit} exceeds {limit[i]:.2g}, the plausible limit"
     reading = found.noise_sigma(reading_names(hand.nominal))
     for name, s, limit_s in zip(hand.nominal.joints, reading, _TOLERANCES * play, strict=True):
         if s > limit_s:

@@ -5,8 +5,8 @@
 The honest baseline: what is left after it is geometry, zeros, play and the base. Those errors are millimetres where the
 markers' noise is a tenth of one, so position and rotation weigh as the datasheet's tolerance of a marker body does, and
 postures passed through in swings count beside the static ones: a baseline must not hang on where the statics lie.
-A posture much farther from the others' fit than they are, `_STRAY` times their median squared distance, is left out and
-named: a robot's own errors are much alike over its workspace. The first guess minimises distances, not their squares.
+A posture much farther from the others' fit than they are, `_OUTLIER` times their median squared distance, is excluded
+and named: a robot's own errors are much alike over its workspace. The start minimises distances, not their squares.
 Samples of one swing hang together in time, by the robot's own errors foremost: the covariance is summed over blocks of
 several correlation times, each static posture being one (`block_covariance`). With the arm alone moving, all twelve
 are identifiable once it turns about two directions; where the base stands in the lab is not asked.
@@ -35,8 +35,8 @@ from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
 STAGE = "registration"
-_STRAY = 16.0  # squared distance over the median one [-]; 2 to 6 is the farthest of clean recordings
-_NEAR = 1e-2  # squared distance, in tolerances, that never strays [-]
+_OUTLIER = 16.0  # squared distance over the median one [-]; 2 to 6 is the farthest of clean recordings
+_NEAR = 1e-2  # squared distance, in tolerances, that is never an outlier [-]
 _ROUNDS = 6
 _STEPS = 20
 _STILL = 1e-10  # [m, rad]
@@ -49,27 +49,25 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
     drawn = np.where(np.arange(12) < told, parameters.tolerance, tol.body_rotation)
     parameters = replace(parameters, tolerance=drawn)
     W = np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)[: postures.components])
-    found, kept = _without_strays(nominal_hand(chain, parameters.nominal), parameters, postures, W)
+    found, kept = _without_outliers(nominal_hand(chain, parameters.nominal), parameters, postures, W)
     model = model_of(STAGE, chain, parameters, found)
     if not found.converged:
-        return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not come to rest"),)
+        return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not converge"),)
     if model.rank < told:
         message = (
             f"{told - model.rank} of {told} directions are not identified: the arm turned about one direction only, "
-            "so a turn of both frames about it cannot be told apart; move another joint"
+            "so a turn of both frames about it is not identifiable; move another joint"
         )
         return model, (Verdict(STAGE, "warning", message),)
     model = model_of(STAGE, chain, parameters, _in_time(found, parameters, postures.motion[kept]))
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
-    message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from its drawing"
+    message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from nominal"
     said = [Verdict(STAGE, "ok", message)]
     if not kept.all():
-        odd = np.flatnonzero(~kept)
-        names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
-        message = (
-            f"{len(odd)} of {len(kept)} postures lie far from where all others put the marker frames and were left "
-        )
-        said.append(Verdict(STAGE, "warning", message + f"out, counted from 0: {names}"))
+        outliers = np.flatnonzero(~kept)
+        names = ", ".join(postures.label[outliers] if len(postures.label) else outliers.astype(str))
+        message = f"{len(outliers)} of {len(kept)} postures are outliers and were excluded from the registration"
+        said.append(Verdict(STAGE, "warning", f"{message}, counted from 0: {names}"))
     return model, tuple(said)
 
 
@@ -86,7 +84,7 @@ def _in_time(found: Fit, parameters: ParameterSet, motion: np.ndarray) -> Fit:
     return replace(found, covariance=blocks.covariance + drawn @ drawn.T)
 
 
-def _without_strays(
+def _without_outliers(
     hand: HandModel, parameters: ParameterSet, postures: Postures, W: np.ndarray
 ) -> tuple[Fit, np.ndarray]:
     """The fit of the postures that agree, each residual times W (d, d), and which (n,) they are."""
@@ -95,7 +93,7 @@ def _without_strays(
         return np.asarray(((linearised(hand, theta, postures, parameters.names).r @ W) ** 2).sum(axis=1))
 
     def near(distance: np.ndarray) -> np.ndarray:
-        return distance <= max(_STRAY * float(np.median(distance)), _NEAR)
+        return distance <= max(_OUTLIER * float(np.median(distance)), _NEAR)
 
     start = registration_start(hand.chain.poses(postures.q), postures.T_base_hand, postures.components == 6).frames
     kept = near(min((distance(theta) for theta in (start, parameters.nominal)), key=np.median))

@@ -66,7 +66,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
         message = f"{known.rank} combinations of {len(parameters)} parameters from {used} postures"
         verdicts.append(Verdict(STAGE, "ok", f"{message}, condition {known.condition:.0f}"))
     if not oriented:
-        message = "a point of the hand was seen: its place is calibrated, which way the hand is turned is as drawn"
+        message = "a point of the hand was seen: hand orientation is not observable and fixed at nominal"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
     return model_of("model_2", chain, parameters, found), tuple(verdicts)
 

@@ -53,9 +53,9 @@ SPOILT = {
     "3 postures 12 times": (thrice, "3 distinct postures"),
     "broken orientations": (turned, "scatter|contradict|explain|belief"),
     "mirrored frame": (lambda m: replace(m, marker_position=m.marker_position * [1.0, -1.0, 1.0]), "mirror"),
-    "arm_2 and arm_3 exchanged": (lambda m: readings(m, [0, 1, 3, 2, 4, 5, 6, 7]), "limits|scatter|belief|order"),
-    "arm_6 and arm_7 exchanged": (lambda m: readings(m, [0, 1, 2, 3, 4, 5, 7, 6]), "limits|scatter|belief|order"),
-    "joints reversed": (lambda m: readings(m, [0, 7, 6, 5, 4, 3, 2, 1]), "limits|scatter|belief|order"),
+    "arm_2 and arm_3 exchanged": (lambda m: readings(m, [0, 1, 3, 2, 4, 5, 6, 7]), "limits|scatter|exceeds|order"),
+    "arm_6 and arm_7 exchanged": (lambda m: readings(m, [0, 1, 2, 3, 4, 5, 7, 6]), "limits|scatter|exceeds|order"),
+    "joints reversed": (lambda m: readings(m, [0, 7, 6, 5, 4, 3, 2, 1]), "limits|scatter|exceeds|order"),
 }
 
 

@@ -65,7 +65,7 @@ def test_five_postures_tell_what_joints_that_never_moved_left_open(suggested, st
     remedy, said = suggested
     assert still[1].rank < 36 and len(remedy.postures) == N == 5
     assert (
-        f"{36 - still[1].rank} of 36 combinations" in remedy.why
+        f"{36 - still[1].rank} of 36 identifiable combinations" in remedy.why
         and said[0].verdict == "warning"
         and "record_next.yaml" in said[0].message
     )

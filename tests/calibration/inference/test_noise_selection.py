@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from calibration.inference.marginal_likelihood import Widths, refined
-from calibration.inference.noise_selection import needed
+from calibration.inference.marginal_likelihood import Hyperparameters, maximised
+from calibration.inference.noise_selection import selected
 from calibration.inference.parameters import Prior
 from calibration.inference.residual import Linearised, Noise
 from calibration.stages.geometry.hand_residual import HAND_NAMES
@@ -27,17 +27,17 @@ def problem(seed, sizes, n=N, joints=0):
     names, start = ("a", "b", "c", "known"), np.full(4, 0.1)
     noise = Noise(names, np.array([0, 1, 2, 3, 3]), start, floor, free, np.arange(4) >= joints)
     prior = Prior(np.zeros(2), np.full(2, np.inf), np.full(2, -1))
-    return Linearised(np.zeros(2), r, J, everything), noise, prior, Widths(np.full(4, 0.1), np.zeros(0))
+    return Linearised(np.zeros(2), r, J, everything), noise, prior, Hyperparameters(np.full(4, 0.1), np.zeros(0))
 
 
 def test_errors_that_are_there_stay_and_others_go():
     kept, before = [], []
     for seed in range(40):
         at, noise, prior, start = problem(seed, np.array([0.3, 0.0, 0.15]), joints=2)
-        free, widths = needed(at, noise, prior, start, None, 1e-3)
+        free, widths = selected(at, noise, prior, start, None, 1e-3)
         kept.append(widths.noise[:3] > 1.01 * FLOOR)
         np.testing.assert_array_equal(free[:3] | ~kept[-1], True)
-        before.append(refined(at, noise, prior, start, 1e-3)[0].noise[1] > 1.01 * FLOOR)
+        before.append(maximised(at, noise, prior, start, 1e-3)[0].noise[1] > 1.01 * FLOOR)
     share = np.mean(kept, axis=0)
     assert share[0] == share[2] == 1.0
     assert share[1] < 0.1
@@ -46,16 +46,16 @@ def test_errors_that_are_there_stay_and_others_go():
 
 def test_nothing_changes_where_all_are_needed():
     at, noise, prior, start = problem(0, np.array([0.3, 0.2, 0.15]))
-    free, widths = needed(at, noise, prior, start, None, 1e-3)
+    free, widths = selected(at, noise, prior, start, None, 1e-3)
     np.testing.assert_array_equal(free, noise.free)
-    np.testing.assert_allclose(widths.noise, refined(at, noise, prior, start, 1e-3)[0].noise, rtol=1e-3)
+    np.testing.assert_allclose(widths.noise, maximised(at, noise, prior, start, 1e-3)[0].noise, rtol=1e-3)
 
 
 def test_a_search_goes_on_from_the_set_it_is_given():
     at, noise, prior, start = problem(1, np.array([0.3, 0.0, 0.15]))
-    fresh, best = needed(at, noise, prior, start, None, 1e-3)
+    fresh, best = selected(at, noise, prior, start, None, 1e-3)
     for mask in np.ndindex(2, 2, 2):
-        free, widths = needed(at, noise, prior, start, np.array([*mask, 0], dtype=bool), 1e-3)
+        free, widths = selected(at, noise, prior, start, np.array([*mask, 0], dtype=bool), 1e-3)
         np.testing.assert_array_equal(free, fresh)
         np.testing.assert_allclose(widths.noise, best.noise, rtol=0.05)
 
