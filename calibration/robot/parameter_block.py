@@ -132,7 +132,7 @@ class ReadingError(ParameterBlock):
     @property
     def units(self) -> tuple[str, ...]:
         """By whether a joint turns or slides."""
-        return tuple(self.unit[length != 1.0] for length in self.lengths)
+        return tuple(self.unit[int(length != 1.0)] for length in self.lengths)
 
     def shape(self, q: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """f (n, k)."""
