@@ -51,6 +51,7 @@ class Estimate:
         laboratory: What dataset.json declares, without its trials; None where the source does not say.
         remedies: What to record next, for what the data do not tell.
         regimes: Fit quality of the joint models on repetitions of their own motions.
+        registered: Whether it says where the marker bodies are; a URDF does not.
     """
 
     status: Literal["calibrated", "not_calibrated"]
@@ -67,6 +68,7 @@ class Estimate:
     laboratory: Description | None = None
     remedies: tuple[ExperimentPlan, ...] = ()
     regimes: "tuple[RegimeQuality, ...]" = ()
+    registered: bool = True
 
     def model(self, name: str) -> Model:
         """The model of that name.

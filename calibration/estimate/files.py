@@ -32,7 +32,7 @@ from pydantic import ValidationError
 from calibration.errors import InputError
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.json_schema import EstimateFile, to_estimate, to_file
-from calibration.estimate.tables import parameters_text, zeros_text
+from calibration.estimate.tables import parameters_text, read_zeros, zero_parameters, zeros_text
 from calibration.inference.parameters import Model
 from calibration.recording import netcdf
 from calibration.recording.experiment import plans_text, read_plans
@@ -67,10 +67,11 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
         _replace_text(folder / TABLE, parameters_text(estimate.models))
 
 
-def load_estimate(path: Path | str) -> Estimate:
+def load_estimate(path: Path | str, zeros: Path | str | None = None) -> Estimate:
     """Read an estimate: a folder written by `save_estimate`, an estimate.json, or a calibrated URDF.
 
-    Of a URDF the geometry is taken, zeros of readings are 0 and the marker bodies are where the datasheet has them.
+    Of a URDF the geometry is taken, its row is named after the file; zeros of readings are those of the file `zeros`,
+    else 0.
 
     Raises:
         InputError: There is nothing there that can be read.
@@ -79,7 +80,11 @@ def load_estimate(path: Path | str) -> Estimate:
     file = path / JSON if path.is_dir() else path
     text = _text(file)
     if file.suffix.lower() in (".urdf", ".xml"):
-        return Estimate("calibrated", (), (), (Model("model_2", ()),), "model_2", text)
+        parameters = () if zeros is None else zero_parameters(read_zeros(zeros))
+        model = Model(file.stem, parameters, covariance=np.zeros((len(parameters), len(parameters))))
+        return Estimate("calibrated", (), (), (model,), file.stem, text, registered=False)
+    if zeros is not None:
+        raise InputError(zeros, f"zeros go with a URDF; {file.name} has its own")
     try:
         found = EstimateFile.model_validate(json.loads(text))
     except json.JSONDecodeError as error:

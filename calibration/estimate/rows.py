@@ -8,7 +8,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-Base = Literal["fixed", "plate", "dynamics", "measured"]
+Base = Literal["fixed", "plate", "dynamics", "measured", "submitted"]
 Encoder = Literal["motor", "link"]
 SOURCES: tuple[Base, ...] = ("plate", "dynamics", "fixed")
 """Of the base's motion without a measured base, the best first."""

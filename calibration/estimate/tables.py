@@ -22,7 +22,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from calibration.errors import InputError
-from calibration.inference.parameters import Model
+from calibration.inference.parameters import Model, Parameter
 from calibration.robot.hand import HandModel
 
 COLUMNS = ("name", "value", "sigma", "unit", "status", "nominal", "model")
@@ -79,19 +79,44 @@ def zeros_text(hand: HandModel) -> str:
 
 
 def read_zeros(path: Path | str) -> tuple[Zero, ...]:
-    """Read master_calibration.yaml.
+    """Read master_calibration.yaml, a mapping of joints to offsets, or a CSV table with the columns joint, offset.
 
     Raises:
         InputError: It is not such a list.
     """
     try:
-        entries = YAML(typ="safe", pure=True).load(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
+        if Path(path).suffix.lower() == ".csv":
+            entries = [
+                {k: v for k, v in row.items() if v not in (None, "")} for row in csv.DictReader(io.StringIO(text))
+            ]
+        else:
+            entries = YAML(typ="safe", pure=True).load(text)
+        if isinstance(entries, dict):
+            entries = [{"joint": joint, "offset": offset} for joint, offset in entries.items()]
         return TypeAdapter(tuple[Zero, ...]).validate_python(entries)
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
         raise InputError(path, "; ".join(lines)) from error
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         raise InputError(path, f"not a list of joints and offsets ({error})") from error
+
+
+def zero_parameters(zeros: Sequence[Zero]) -> tuple[Parameter, ...]:
+    """The zeros as parameters of a model; whoever made them states no standard deviation."""
+    found = []
+    for z in zeros:
+        values = (
+            ("encoder", "motor.offset", z.offset),
+            ("gear", "compliance", z.compliance),
+            ("backlash", "gap", z.gap),
+        )
+        found += [
+            Parameter(f"{kind}.{z.joint}.{name}", "", 0.0, value, 0.0, "estimated")
+            for kind, name, value in values
+            if value or kind == "encoder"
+        ]
+    return tuple(found)
 
 
 def parameters_text(models: Sequence[Model]) -> str:

@@ -6,6 +6,7 @@ from calibration.evaluation.ladder import Row, TrialErrors, Trials, ladder, row_
 from calibration.evaluation.marker_errors import PointRow, point_rows
 from calibration.evaluation.pose_errors import pose_errors
 from calibration.evaluation.results import Evaluation
+from calibration.evaluation.submission import read_submission
 
 __all__ = [
     "Evaluation",
@@ -18,6 +19,7 @@ __all__ = [
     "ladder",
     "point_rows",
     "pose_errors",
+    "read_submission",
     "row_entry",
     "scored_errors",
 ]

@@ -9,7 +9,7 @@ not measure the base keep the place it had in the first second.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,9 +20,11 @@ from calibration.evaluation.ladder import TrialErrors, ladder, scored_errors
 from calibration.evaluation.marker_errors import point_rows
 from calibration.evaluation.pose_errors import PoseErrors, pose_errors
 from calibration.evaluation.results import STAGE, Evaluation
+from calibration.evaluation.submission import Submission
 from calibration.mocap.cluster_pose import point_of_means, poses_of, poses_of_means
 from calibration.mocap.labels import relabelled_trial
 from calibration.numerics.lie import inverse, mean, places, to_vector
+from calibration.prediction.foreign import check_names, registered
 from calibration.prediction.predicted_trial import PredictedTrial, Prediction
 from calibration.prediction.predictor import Predictor, predictor
 from calibration.prediction.second_session import registration_trials, reregistered
@@ -35,6 +37,8 @@ from calibration.stages.suspension.checks import moved_by
 from calibration.verdict import Verdict
 
 Progress = Callable[[str, float], None]
+NOTHING = Estimate("calibrated", (), (), (), "")
+"""An estimate without a model: the nominal robot is all there is."""
 
 
 @dataclass(frozen=True)
@@ -59,19 +63,33 @@ class _Scored:
 
 
 def evaluate(
-    estimate: Estimate, dataset: Dataset, progress: Progress | None = None, role: Role = "validation"
+    estimate: Estimate | Submission,
+    dataset: Dataset,
+    progress: Progress | None = None,
+    role: Role = "validation",
 ) -> Evaluation:
-    """Score an estimate on the trials of a role.
+    """Score an estimate, or submitted predictions, on the trials of a role.
+
+    Marker frames of an estimate that does not have them are fitted on the calibration trials.
 
     Raises:
+        InputError: Names, units, frames or clocks of another program are not the contract's.
         NotEnoughData: There is no trial of that role.
         NotCalibrated: The estimate must not be used.
     """
     entries = dataset.entries(role)
     if not entries:
         raise NotEnoughData(f"no {role} trial to score on")
+    submitted, estimate = (estimate, NOTHING) if isinstance(estimate, Submission) else (None, estimate)
+    remarks = check_names(estimate, dataset)
+    estimate = estimate if estimate.registered else registered(estimate, dataset)
     predict, report = predictor(estimate, dataset), progress or (lambda at, share: None)
-    scored = tuple(_each(predict, dataset, entries, report))
+    scored = tuple(_each(predict, dataset, entries, report, submitted))
+    if submitted is not None:
+        rows = [p for one in scored for p in one.predicted.rows if p.base == "submitted"]
+        remarks = tuple(submitted.remarks(dataset, role, rows))
+    if not estimate.robot:
+        remarks += estimate.verdicts
     registering = registration_trials(dataset) if role == "validation" else ()
     confirmed: list[TrialErrors] = []
     if registering:
@@ -86,21 +104,30 @@ def evaluate(
         traces=tuple(errors),
         regimes=(*estimate.regimes, *joints) if predict.joints is not None else (),
         confirmation=tuple(ladder(confirmed, "mocap")),
-        verdicts=tuple(moved_in_trials(scored)),
+        verdicts=(*remarks, *moved_in_trials(scored)),
         points=point_rows(estimate, dataset.description, means),
         predicted=tuple(one.predicted for one in scored),
     )
 
 
-def _each(predict: Predictor, dataset: Dataset, entries: tuple[TrialEntry, ...], report: Progress) -> Iterator[_Scored]:
+def _each(
+    predict: Predictor,
+    dataset: Dataset,
+    entries: tuple[TrialEntry, ...],
+    report: Progress,
+    submitted: Submission | None = None,
+) -> Iterator[_Scored]:
     for k, entry in enumerate(entries):
         report(f"evaluating {entry.id}", k / len(entries))
-        yield _of_means(predict, dataset, entry) if dataset.has_means(entry) else _of_trial(predict, dataset, entry)
+        one = _of_means if dataset.has_means(entry) else _of_trial
+        yield one(predict, dataset, entry, submitted)
 
 
-def _of_trial(predict: Predictor, dataset: Dataset, entry: TrialEntry) -> _Scored:
+def _of_trial(predict: Predictor, dataset: Dataset, entry: TrialEntry, submitted: Submission | None) -> _Scored:
     trial = relabelled_trial(dataset, entry)
     T_measured, predicted = poses_of(dataset.description.hand_body, trial).T, predict(entry, trial)
+    own = None if submitted is None else submitted.row(entry, trial.t_mocap, T_measured)
+    predicted = predicted if own is None else replace(predicted, rows=(*predicted.rows, own))
     errors = []
     for p in predicted.rows:
         e = pose_errors(p.T_lab_hand, T_measured)
@@ -113,9 +140,15 @@ def _of_trial(predict: Predictor, dataset: Dataset, entry: TrialEntry) -> _Score
     return _Scored(entry, predicted, tuple(errors), moved, left)
 
 
-def _of_means(predict: Predictor, dataset: Dataset, entry: TrialEntry) -> _Scored:
+def _of_means(predict: Predictor, dataset: Dataset, entry: TrialEntry, submitted: Submission | None) -> _Scored:
     means = dataset.read_means(entry)
     rows = tuple(predict.of_means(entry, means))
+    if submitted is not None:
+        hand = dataset.description.hand_body
+        unseen = np.full((len(means), 4, 4), np.nan)
+        T = unseen if hand.is_point else poses_of_means(hand, means).T
+        own = submitted.row(entry, np.arange(float(len(means))), T)
+        rows = rows if own is None else (*rows, own)
     errors = (_means_errors(p, dataset.description.hand_body, means) for p in rows)
     found = tuple(
         TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, e, e)

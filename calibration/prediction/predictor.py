@@ -28,6 +28,7 @@ from calibration.mocap.labels import relabelled_trial, relabelled_trials
 from calibration.mocap.postures import dwell_windows, readings_at
 from calibration.numerics.lie import from_vector, mean
 from calibration.prediction.base_pose import BaseInTrial
+from calibration.prediction.foreign import places_hand
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction
 from calibration.recording.clock import Clock
 from calibration.recording.dataset import Dataset
@@ -123,10 +124,11 @@ class Predictor:
                 yield Prediction(row.name, "measured", "motor", entry.id, entry.kind, np.arange(float(len(means))), T)
 
     def _rows(self) -> Iterator[tuple[LadderRow, HandModel, Encoder]]:
-        for row in LADDER:
-            if row.name in self.models:
-                for encoder in row.encoders:
-                    yield row, self.models[row.name], encoder
+        ours = [row for row in LADDER if row.name in self.models]
+        theirs = [row_of(name) for name in self.models if all(name != row.name for row in LADDER)]
+        for row in (*ours, *theirs):
+            for encoder in row.encoders:
+                yield row, self.models[row.name], encoder
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is asked with, at the motion capture's times."""
@@ -220,6 +222,8 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
         present = estimate.suspension is not None or not row.needs_suspension
         if hand is not None and present and (estimate.joint_models or not row.joints):
             models[row.name] = hand
+    own = (m for m in estimate.models if m.name not in models and (places_hand(m, drawn) or not estimate.registered))
+    models |= {model.name: estimated[model.name] for model in own}
     robot = estimate.clock("robot")
     trials = () if robot is not None else tuple(trial for _, trial in relabelled_trials(dataset, "calibration"))
     if trials:
@@ -228,7 +232,7 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
         )
     joints = None
     corrected = next((models[row.name] for row in LADDER if row.joints and row.name in models), None)
-    if corrected is not None:
+    if corrected is not None and estimate.joint_models:
         inputs = input_model(Laboratory(dataset.urdf, description), corrected)
         joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
     return Predictor(models, dataset.urdf, description, robot, estimate.clock("plate"), estimate.suspension, joints)

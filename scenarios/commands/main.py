@@ -161,13 +161,17 @@ def evaluate(
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder.")],
     out: Out,
     truth: Annotated[Path | None, typer.Option(metavar="TRUTH", help="A truth folder: adds score.json.")] = None,
+    zeros: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Encoder zeros of a URDF: YAML or CSV of joint, offset."),
+    ] = None,
 ) -> None:
-    """Write the error of an estimate on unseen trials."""
+    """Write the error of an estimate, a URDF or predicted poses on unseen trials."""
     from scenarios import steps
     from scenarios.commands import console
 
     with console.progress() as progress:
-        steps.evaluate(estimate, dataset, out, truth, progress)
+        steps.evaluate(estimate, dataset, out, truth, progress, zeros)
     console.show(console.ladder(out))
     console.show(console.points(out))
     for line in console.remarks(out):

@@ -13,6 +13,7 @@ import numpy as np
 
 from calibration import Estimate, Evaluation
 from calibration.evaluation import Row, TrialErrors, ladder, pose_errors, row_entry, scored_errors
+from calibration.inference import Model
 from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
@@ -51,13 +52,14 @@ class Score(ParameterScore):
         }
 
 
-def score(estimate: Estimate, evaluation: Evaluation, truth_folder: Path) -> Score:
-    """Judge an estimate and the predictions that were evaluated by the truth.
+def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path) -> Score:
+    """Judge an estimate, if there is one, and the predictions that were evaluated by the truth.
 
     Raises:
         ScenarioError: The truth is missing or of other trials.
         NotCalibrated: The estimate must not be used.
     """
+    estimate = estimate or Estimate("calibrated", (), (), (Model("", ()),), "")
     estimated = {p.name for model in estimate.models for p in model.parameters}
     parameters, models = judge_estimate(estimate, _read_parameters(truth_folder / "truth.json", estimated))
     pairs = [(p, _read_trial(truth_folder / "trials" / f"{p.trial_id}.nc")) for p in evaluation.predicted]

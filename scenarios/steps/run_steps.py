@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 Progress = Callable[[str, str, float], None]
 """Called with the step, what it is at, and the fraction of the step that is done [-]."""
 
+_POSES = (".csv", ".nc")  # predicted poses instead of an estimate
 PACKAGES = ("tiago-twin", "mujoco", "pin", "numpy", "scipy")
 
 
@@ -95,7 +96,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
         try:
             estimate = _calibrate(new / "dataset", new / "estimate", None, scenario.calibration, progress)
             evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
-            score = _score(new / "estimate", new / "dataset", new, new / "truth", evaluation, progress)
+            score = _score(new / "estimate", new, new / "truth", evaluation, progress)
             _report(new, progress)
         except (NotCalibrated, NotEnoughData) as error:
             refused = error
@@ -170,13 +171,17 @@ def evaluate(
     out: Path | str,
     truth: Path | str | None = None,
     progress: Progress = silent,
+    zeros: Path | str | None = None,
 ) -> tuple["Evaluation", "Score | None"]:
-    """Write evaluation.json into the folder `out`, and score.json where a truth is given; the rest of `out` stays."""
+    """Write evaluation.json into the folder `out`, and score.json where a truth is given; the rest of `out` stays.
+
+    `estimate` is an estimate folder, an estimate.json, a URDF with its `zeros`, or predicted poses (.csv, .nc).
+    """
     with folder.updating(out, folder.EVALUATION) as new, one_blas_thread():
-        evaluation = _evaluate(Path(estimate), Path(dataset), new, progress)
+        evaluation = _evaluate(Path(estimate), Path(dataset), new, progress, zeros)
         score = None
         if truth is not None:
-            score = _score(Path(estimate), Path(dataset), new, Path(truth), evaluation, progress)
+            score = _score(Path(estimate), new, Path(truth), evaluation, progress, zeros)
     return evaluation, score
 
 
@@ -233,12 +238,16 @@ def _calibrate(
     return estimate
 
 
-def _evaluate(estimate: Path, dataset: Path, out: Path, progress: Progress) -> "Evaluation":
+def _evaluate(
+    estimate: Path, dataset: Path, out: Path, progress: Progress, zeros: Path | str | None = None
+) -> "Evaluation":
     import calibration
+    from calibration.evaluation import read_submission
 
     progress("evaluate", "", 0.0)
+    poses = estimate.suffix.lower() in _POSES
     evaluation = calibration.evaluate(
-        calibration.load_estimate(estimate),
+        read_submission(estimate) if poses else calibration.load_estimate(estimate, zeros),
         calibration.load(dataset),
         lambda at, fraction: progress("evaluate", at, fraction),
     )
@@ -248,13 +257,19 @@ def _evaluate(estimate: Path, dataset: Path, out: Path, progress: Progress) -> "
 
 
 def _score(
-    estimate: Path, dataset: Path, out: Path, truth: Path, evaluation: "Evaluation", progress: Progress
+    estimate: Path,
+    out: Path,
+    truth: Path,
+    evaluation: "Evaluation",
+    progress: Progress,
+    zeros: Path | str | None = None,
 ) -> "Score":
     import calibration
     from scenarios.score.score import score
 
     progress("score", "", 0.0)
-    scored = score(calibration.load_estimate(estimate), evaluation, truth)
+    poses = estimate.suffix.lower() in _POSES
+    scored = score(None if poses else calibration.load_estimate(estimate, zeros), evaluation, truth)
     scored.save(out)
     return scored
 

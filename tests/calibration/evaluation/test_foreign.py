@@ -1,0 +1,186 @@
+"""Other people's calibrations: a URDF with zeros, a JSON of parameters, predicted poses."""
+
+import csv
+import json
+from dataclasses import replace
+
+import netCDF4
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from calibration import evaluate, load_estimate, save_estimate
+from calibration.errors import InputError
+from calibration.evaluation import read_submission
+from calibration.prediction import predict
+
+ROW = ("model_2", "measured", "motor")
+
+
+@pytest.fixture(scope="module")
+def saved(estimate, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("estimate")
+    save_estimate(estimate, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ours(estimate, dataset):
+    return evaluate(estimate, dataset)
+
+
+@pytest.fixture(scope="module")
+def poses(estimate, dataset):
+    """Trial, time and pose of one row of ours."""
+    return [
+        (trial.trial_id, trial.t, row.T_lab_hand)
+        for trial in predict(estimate, dataset)
+        for row in trial.rows
+        if (row.model, row.base, row.encoder) == ROW
+    ]
+
+
+def mm(evaluation, model, base, trials="dynamic"):
+    return evaluation.row(model, trials, base).metrics.position_rmse_component_mm
+
+
+def test_our_urdf_with_its_zeros_scores_as_the_estimate(saved, dataset, ours):
+    found = evaluate(load_estimate(saved / "calibrated.urdf", saved / "master_calibration.yaml"), dataset)
+    for trials in ("dynamic", "static"):
+        assert mm(found, "calibrated", "measured", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=0.02)
+    bare = evaluate(load_estimate(saved / "calibrated.urdf"), dataset)
+    assert mm(bare, "calibrated", "measured") > 1.5 * mm(found, "calibrated", "measured"), "zeros count"
+    assert any("marker frames registered on" in v.message for v in found.verdicts)
+
+
+@pytest.mark.parametrize(
+    "text", ["joint,offset\narm_1_joint,0.01\n", "- {joint: arm_1_joint, offset: 0.01}\n", "arm_1_joint: 0.01\n"]
+)
+def test_zeros_are_read_from_csv_list_and_mapping(saved, tmp_path, text):
+    path = tmp_path / ("zeros.csv" if text.startswith("joint") else "zeros.yaml")
+    path.write_text(text)
+    model = load_estimate(saved / "calibrated.urdf", path).models[0]
+    assert [(p.name, p.value) for p in model.parameters] == [("encoder.arm_1_joint.motor.offset", 0.01)]
+
+
+def test_a_urdf_of_another_robot_is_rejected_by_name(tmp_path, dataset):
+    (tmp_path / "other.urdf").write_text('<robot name="other"><link name="base_footprint"/></robot>')
+    with pytest.raises(InputError, match="not a URDF of this robot"):
+        evaluate(load_estimate(tmp_path / "other.urdf"), dataset)
+
+
+def written(folder, **models):
+    content = {"models": {name: {"parameters": parameters} for name, parameters in models.items()}}
+    (folder / "estimate.json").write_text(json.dumps(content))
+    return load_estimate(folder / "estimate.json")
+
+
+def test_another_program_s_models_become_rows_and_agree_with_ours(saved, dataset, ours, tmp_path):
+    parameters = json.loads((saved / "estimate.json").read_text())["models"]["model_2"]["parameters"]
+    parameters = [{"name": p["name"], "value": p["value"], "unit": p["unit"]} for p in parameters]
+    found = evaluate(replace(written(tmp_path, mine=parameters), clocks=load_estimate(saved).clocks), dataset)
+    assert {r.model for r in found.rows} == {"nominal", "mine"}
+    for trials in ("dynamic", "static"):
+        assert mm(found, "mine", "measured", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "message"),
+    [
+        ({"name": "geometry.arm_1_jont.x", "value": 0.0}, "no joint 'arm_1_jont'; the nearest known is 'arm_1_joint'"),
+        ({"name": "geometry.arm_1_joint.xx", "value": 0.0}, "nearest known is 'geometry.arm_1_joint.x'"),
+        ({"name": "geometry.arm_1_joint.x", "value": 0.1, "unit": "mm"}, "unit 'mm'; it must be 'm'"),
+    ],
+)
+def test_unknown_joints_names_and_units_are_rejected(dataset, tmp_path, parameter, message):
+    with pytest.raises(InputError, match=message):
+        evaluate(written(tmp_path, mine=[parameter]), dataset)
+
+
+def write_csv(path, poses, columns=("qw", "qx", "qy", "qz")):
+    with path.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["trial", "t", "x", "y", "z", *columns])
+        for trial, t, T in poses:
+            for time, pose in zip(t, T, strict=True):
+                known = np.isfinite(pose).all()
+                q = Rotation.from_matrix(pose[:3, :3]).as_quat(scalar_first=True) if known else np.full(4, np.nan)
+                table.writerow([trial, repr(float(time)), *(repr(float(x)) for x in (*pose[:3, 3], *q))])
+    return path
+
+
+def write_netcdf(path, poses):
+    with netCDF4.Dataset(path, "w") as file:
+        for trial, t, T in poses:
+            group = file.createGroup(trial)
+            group.createDimension("t", len(t))
+            group.createDimension("four", 4)
+            group.createVariable("t", "f8", ("t",))[:] = t
+            group.createVariable("T", "f8", ("t", "four", "four"))[:] = T
+    return path
+
+
+def test_predicted_poses_score_as_the_row_they_are_of(poses, dataset, ours, tmp_path):
+    for path in (write_csv(tmp_path / "mine.csv", poses), write_netcdf(tmp_path / "mine.nc", poses)):
+        found = evaluate(read_submission(path), dataset)
+        for trials in ("dynamic", "static"):
+            assert mm(found, "mine", "submitted", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=1e-9)
+
+
+def test_missing_trials_and_poses_are_warned_of(poses, dataset, tmp_path):
+    trial, t, T = poses[0]
+    holes = T.copy()
+    holes[100:200] = np.nan
+    found = evaluate(read_submission(write_netcdf(tmp_path / "mine.nc", [(trial, t, holes)])), dataset)
+    messages = " ".join(v.message for v in found.verdicts)
+    assert f"no prediction of trial {poses[1][0]}" in messages
+    assert "is without a prediction and not scored" in messages
+
+
+def test_times_between_the_camera_s_are_interpolated(poses, dataset, tmp_path):
+    shifted = [(trial, t + 0.004, T) for trial, t, T in poses]
+    found = evaluate(read_submission(write_netcdf(tmp_path / "mine.nc", shifted)), dataset)
+    assert mm(found, "mine", "submitted") > 0.0
+
+
+def changed(poses, change):
+    return [(trial, t, change(T)) for trial, t, T in poses]
+
+
+def in_mm(T):
+    T = T.copy()
+    T[:, :3, 3] *= 1e3
+    return T
+
+
+def in_another_frame(T):
+    away = np.eye(4)
+    away[:3, :3] = Rotation.from_rotvec([0.0, 0.0, 1.5]).as_matrix()
+    away[:3, 3] = [3.0, -1.0, 0.5]
+    return away @ T
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [(in_mm, "positions are in mm"), (in_another_frame, "another frame")],
+)
+def test_poses_in_other_units_or_frames_are_rejected_by_what_explains_them(poses, dataset, tmp_path, change, message):
+    path = write_netcdf(tmp_path / "mine.nc", changed(poses, change))
+    with pytest.raises(InputError, match=message):
+        evaluate(read_submission(path), dataset)
+
+
+def test_a_mixed_order_of_the_quaternion_another_clock_and_other_trials_are_rejected(poses, dataset, tmp_path):
+    path = write_csv(tmp_path / "mixed.csv", poses, ("qx", "qy", "qz", "qw"))
+    with pytest.raises(InputError, match="order of the quaternions"):
+        evaluate(read_submission(path), dataset)
+    path = write_netcdf(tmp_path / "late.nc", [(trial, t + 1e4, T) for trial, t, T in poses])
+    with pytest.raises(InputError, match="another clock"):
+        evaluate(read_submission(path), dataset)
+    path = write_netcdf(tmp_path / "other.nc", [("swing_9", t, T) for _, t, T in poses[:1]])
+    with pytest.raises(InputError, match="no validation trial named swing_9"):
+        evaluate(read_submission(path), dataset)
+    path = write_csv(tmp_path / "norm.csv", [(n, t[:2], np.array(2 * [np.eye(4)])) for n, t, _ in poses])
+    path.write_text(path.read_text().replace(",1.0,0.0,0.0,0.0", ",2.0,0.0,0.0,0.0"))
+    with pytest.raises(InputError, match="norm"):
+        read_submission(path)
