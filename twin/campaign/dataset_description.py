@@ -13,7 +13,13 @@ from twin.simulation.wrist_sensor import WRIST_SENSOR
 
 
 def describe_dataset(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Description:
-    """The description of a recorded campaign, of nominal values: those of one robot have another type."""
+    """The description of a recorded campaign.
+
+    Raises:
+        TypeError: The values are those of one robot.
+    """
+    if not isinstance(config, TwinConfig):
+        raise TypeError(f"a dataset is described by nominal values, TwinConfig, not by {type(config).__name__}")
     i, d = config.instruments, config.datasheet
     joints = [schema.Joint(name=TORSO, encoders=("motor",), rate=i.robot_rate)]
     joints += [schema.Joint(name=n, encoders=("motor", "link"), rate=i.robot_rate) for n in config.arm]
