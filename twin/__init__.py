@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from twin.base_tests import load_test
-    from twin.campaign.laboratory import Laboratory, laboratory
-    from twin.campaign.record import record
+    from twin.campaign.laboratory_model import Laboratory, laboratory
+    from twin.campaign.recording import record
     from twin.campaign.robot import Robot, sample
     from twin.config import TwinConfig
     from twin.motions import Motion

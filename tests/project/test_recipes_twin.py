@@ -15,7 +15,7 @@ from scenarios import load
 from scenarios.files.errors import ScenarioError
 from twin.errors import TwinError
 from twin.motions import JOINTS, RATE, schedule, trajectory
-from twin.motions.trajectory import InvalidTrajectory, read_trajectory
+from twin.motions.csv_trajectory import InvalidTrajectory, read_trajectory
 
 ROOT = Path(__file__).parents[2]
 POSE = [0.12, 1.5, 0.1, -1.55, 0.6, 0.1, 0.1, 0.1]

@@ -1,10 +1,10 @@
 """What a campaign commands: set-points of joints and base, and the order of the trials."""
 
+from twin.motions.csv_trajectory import trajectory
 from twin.motions.motion import RATE, BasePath, Motion, static_postures, swing
 from twin.motions.postures import sample_postures
-from twin.motions.schedule import schedule
 from twin.motions.swings import CALIBRATION_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
-from twin.motions.trajectory import trajectory
+from twin.motions.trial_schedule import schedule
 
 __all__ = [
     "CALIBRATION_SWINGS",

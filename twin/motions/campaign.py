@@ -29,7 +29,7 @@ class Trajectory:
     """A motion of one's own.
 
     Attributes:
-        file: CSV file, see `twin.motions.trajectory`; from the current folder.
+        file: CSV file, see `twin.motions.csv_trajectory`; from the current folder.
         role: calibration: the fit may use it; validation: it is predicted.
     """
 

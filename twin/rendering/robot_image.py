@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 import mjcf
-from twin.campaign.laboratory import Laboratory, laboratory
+from twin.campaign.laboratory_model import Laboratory, laboratory
 from twin.config.twin import TwinConfig
 from twin.motions.swings import JOINTS
 from twin.rendering.raycaster import View, render

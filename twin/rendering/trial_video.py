@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import RigidTransform
 
 import mjcf
-from twin.campaign.laboratory import Laboratory
+from twin.campaign.laboratory_model import Laboratory
 from twin.errors import TwinError
 from twin.rendering.raycaster import View
 from twin.rendering.renderer import Frames, Renderer

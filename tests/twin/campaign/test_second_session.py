@@ -87,7 +87,7 @@ def test_a_campaign_with_two_sessions_tells_their_truths_apart(config, tmp_path,
     def only_xyz(*given, schedule=schedule):
         return tuple(m for m in schedule(*given) if m.name == "xyz")
 
-    monkeypatch.setattr(import_module("twin.campaign.record"), "schedule", only_xyz)
+    monkeypatch.setattr(import_module("twin.campaign.recording"), "schedule", only_xyz)
     short = replace(config.campaign, validation_swing=3.0, confirmation=True)
     record(replace(config, campaign=short), 0, tmp_path)
     description = json.loads((tmp_path / "dataset/dataset.json").read_text())

@@ -6,7 +6,7 @@ import pytest
 
 from scenarios import load
 from twin.campaign import laboratory, sample
-from twin.campaign.record import _write_truth
+from twin.campaign.recording import _write_truth
 from twin.truth import read_parameters
 
 EVERYTHING = (

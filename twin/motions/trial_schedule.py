@@ -9,10 +9,10 @@ from calibration.recording import schema
 from twin.motions import driving
 from twin.motions import motion as motions
 from twin.motions.campaign import Campaign
+from twin.motions.csv_trajectory import read_trajectory
 from twin.motions.motion import Motion
 from twin.motions.postures import sample_postures
 from twin.motions.swings import CALIBRATION_SWINGS, FURTHER_SWINGS, JOINTS, VALIDATION_SWINGS, Swing
-from twin.motions.trajectory import read_trajectory
 from twin.random_streams import generator
 
 REGISTRATION = "registration"

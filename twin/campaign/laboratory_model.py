@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 import mjcf
+from twin.campaign.remounting import moved, remounted
 from twin.campaign.robot import Robot, links_seen, sample
-from twin.campaign.second_session import moved, remounted
 from twin.config.twin import SampledConfig, TwinConfig, sampled_config
 from twin.defects.defect import Defect
 from twin.fields.names import TORSO

@@ -3,7 +3,7 @@
 from functools import partial
 
 from calibration.recording import Trial
-from twin.campaign.laboratory import EPOCH, Laboratory
+from twin.campaign.laboratory_model import EPOCH, Laboratory
 from twin.fields.names import BASE
 from twin.instruments.instrument import Timing
 from twin.instruments.sampling import averaged, interpolate, interpolate_poses

@@ -20,14 +20,14 @@ from twin import truth
 from twin.base_tests.gravity_stiffness import gravity_stiffness
 from twin.base_tests.slip_load import slip_loads
 from twin.campaign.dataset_description import describe_dataset
-from twin.campaign.laboratory import EPOCH, Laboratory, laboratory, second_session
-from twin.campaign.measure import measure
-from twin.campaign.second_session import CONFIRMATION, session_parameters
+from twin.campaign.laboratory_model import EPOCH, Laboratory, laboratory, second_session
+from twin.campaign.measurement import measure
+from twin.campaign.remounting import CONFIRMATION, session_parameters
 from twin.config.twin import TwinConfig
 from twin.defects.wheels.rolling_wheel import rolling_parameters
 from twin.defects.wheels.stiffness import spatial_stiffness
 from twin.motions.motion import Motion
-from twin.motions.schedule import schedule
+from twin.motions.trial_schedule import schedule
 from twin.simulation.force_plates import plate_centre
 from twin.simulation.kinematic import arm_frame
 from twin.truth import Parameter
