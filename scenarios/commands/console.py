@@ -219,6 +219,6 @@ def _table(*columns: str) -> Table:
 
 
 def _rows(path: Path, key: str) -> list[dict[str, Any]]:
-    """Return the rows of dynamic and of static trials; what is of both together stands in the file."""
+    """Return the rows of dynamic and of static trials; those of both together are in the file only."""
     rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8")).get(key, [])
     return [row for row in rows if row["trials"] != "all"]

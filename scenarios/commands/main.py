@@ -206,7 +206,7 @@ check = app.command(epilog=_example("check runs/short --max model_2.mm=2.5"))(co
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command and exit with its code; what a user can mend or must know is told without a traceback."""
+    """Run the command and exit with its code; what a user can mend is one message without a traceback."""
     before = signal.signal(signal.SIGTERM, _terminate)
     try:
         app(args=arguments, prog_name="tiago-twin")

@@ -18,6 +18,6 @@ def look(
 
     for one in draw(dataset, out, trial or ()):
         typer.echo(f"{one.entry.id}: {one.entry.role}, {one.entry.kind}")
-        for line in one.said:
+        for line in one.findings:
             typer.echo(f"  {line}")
     typer.echo(f"Pictures: {out}")

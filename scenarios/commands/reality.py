@@ -74,7 +74,7 @@ def _show_swings(found: "Swings") -> None:
     ]
     console.show(console.records(rows))
     typer.echo(f"{found.n_inside} of {len(found.rows)} figures inside, {found.n} robots")
-    words = ("linear", found.linear), ("with play operators", found.hysteretic)
+    words = ("linear", found.linear), ("with backlash operators", found.hysteretic)
     typer.echo(
         "Yaw by Mz, R2 on the second half: " + ", ".join(f"{w} {m:.2f} ({a:.2f} to {b:.2f})" for w, (a, m, b) in words)
     )

@@ -83,7 +83,7 @@ def collect(
         write_whole(plan.folder / "collection.json", _description(plan))
         rows: list[Row] = []
         try:
-            for row in _told(compute(plan.orders(), workers, task), plan, workers, progress, announce):
+            for row in _reported(compute(plan.orders(), workers, task), plan, workers, progress, announce):
                 rows.append(row)
         finally:
             write_index(plan.folder / "index.csv", rows)
@@ -91,7 +91,7 @@ def collect(
     return tuple(sorted(rows, key=lambda row: row.id))
 
 
-def _told(
+def _reported(
     done: Iterator[Done], plan: Plan, workers: Workers, progress: Progress, announce: Callable[[str], None]
 ) -> Iterator[Row]:
     """Pass the rows on; say from the first one what the others will cost, then the rate and the time that is left."""

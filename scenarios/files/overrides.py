@@ -1,6 +1,6 @@
 """A value given beside a file, `path.to.field=value`: on the command line, or in a file that extends it.
 
-Where in a YAML file a value stands.
+The place of a value in a YAML file.
 """
 
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ class Override:
     Attributes:
         path: Field names, and positions in lists, joined by dots.
         value: What to put there.
-        file: Name of the file it stands in; empty: it is from the command line.
-        tree: The mapping of that file it stands in, `path` its key there, with the line and column of every value.
+        file: Name of its file; empty: it is from the command line.
+        tree: The mapping of that file that holds it, `path` its key there, with the line and column of every value.
     """
 
     path: str
@@ -54,7 +54,7 @@ class Override:
         return None
 
     def holds(self, path: tuple[str, ...]) -> bool:
-        """Whether what stands at `path` is this value or a part of it."""
+        """Whether the value at `path` is this one or a part of it."""
         return path[: len(self.keys)] == self.keys
 
     def where(self, path: Sequence[str], of_key: bool = True) -> tuple[int, int, str]:

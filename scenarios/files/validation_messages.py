@@ -61,7 +61,7 @@ class Source:
         return [text for *_, text in sorted(placed, key=lambda found: found[:3])]
 
     def _where(self, path: tuple[str, ...], holder: tuple[str, ...], of_key: bool) -> tuple[int, int, int, str]:
-        """Where `path` stands: 0 for this file or the number of an override from 1, line, column, and all in words.
+        """The place of `path`: 0 for this file or the number of an override from 1, line, column, and all in words.
 
         Args:
             path: What is wrong.
@@ -93,7 +93,7 @@ def _path(values: Any, location: Sequence[str | int], kind: str) -> tuple[str, .
 
 
 def _message(detail: Mapping[str, Any], path: Sequence[str], known: Sequence[str]) -> str:
-    """Say what is wrong and, for a wrong name, what is possible."""
+    """What is wrong and, for a wrong name, what is possible."""
     if detail["type"] in MISSING:
         return "missing"
     if detail["type"] == UNKNOWN_NAME:

@@ -1,7 +1,7 @@
 """Values of a typed model, to and from a YAML file a person writes.
 
 Every finding is one line, `file:line:column: path.to.field: message (got value)`, and all of them are
-told at once. YAML 1.2 (`1e-4` is a number, `on` is text), strict types, no duplicate keys.
+reported together. YAML 1.2 (`1e-4` is a number, `on` is text), strict types, no duplicate keys.
 An override is text, `path.to.field=value`, its value read as YAML.
 """
 

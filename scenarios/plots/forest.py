@@ -36,7 +36,7 @@ def intervals(found: Sequence[Interval], quantity: str, against_truth: bool, ax:
     Args:
         found: The estimates.
         quantity: What is along x, with its unit in brackets.
-        against_truth: Zero is the truth; intervals that miss it are told apart.
+        against_truth: Zero is the truth; intervals that miss it have another colour.
         ax: Where to draw.
     """
     ax.axvline(0.0, color=TRUTH if against_truth else NOMINAL, linestyle=(0, (4, 2)) if against_truth else "-", lw=1.0)

@@ -55,13 +55,13 @@ def look(dataset: Path, out: Path, trials: Sequence[str] = ()) -> tuple[Looked, 
 
 def page(dataset: Dataset, one: Looked) -> Figure:
     """The picture of one trial."""
-    drawn, trial, said = figure(_WIDTH, _HEIGHT), one.trial, _in_columns(one.said)
-    top = _BELOW_TITLE - _LINE * len(said)
+    drawn, trial, findings = figure(_WIDTH, _HEIGHT), one.trial, _in_columns(one.findings)
+    top = _BELOW_TITLE - _LINE * len(findings)
     parts = drawn.add_gridspec(2, 1, height_ratios=(1.85, 1.0), left=0.06, right=0.955, top=top, bottom=0.05)
     grid = parts[0].subgridspec(3, 2, width_ratios=(1.0, 1.35), hspace=0.5, wspace=0.2)
     title = f"{one.entry.id}: {one.entry.role}, {one.entry.kind}"
     drawn.text(0.06, 0.985, title, fontsize=11.0, fontweight="bold", va="top")
-    drawn.text(0.06, 0.963, "\n".join(said), fontsize=7.0, va="top", linespacing=1.35)
+    drawn.text(0.06, 0.963, "\n".join(findings), fontsize=7.0, va="top", linespacing=1.35)
     _from_above(dataset.description.plates, trial, drawn.add_subplot(grid[0, 0]))
     _motion(trial, drawn.add_subplot(grid[0, 1]))
     _sight(trial, drawn.add_subplot(grid[1, 1]))
@@ -79,9 +79,9 @@ def page(dataset: Dataset, one: Looked) -> Figure:
     return drawn
 
 
-def _in_columns(said: Sequence[str]) -> list[str]:
-    half = -(-len(said) // 2)
-    left, right = said[:half], [*said[half:], *[""] * (2 * half - len(said))]
+def _in_columns(findings: Sequence[str]) -> list[str]:
+    half = -(-len(findings) // 2)
+    left, right = findings[:half], [*findings[half:], *[""] * (2 * half - len(findings))]
     return [f"{a}    |    {b}" if b else a for a, b in zip(left, right, strict=True)]
 
 

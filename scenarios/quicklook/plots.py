@@ -1,4 +1,4 @@
-"""What instruments said in one trial: markers and their gaps, channels over time, centres of pressure."""
+"""Recordings of one trial: markers and their gaps, channels over time, centres of pressure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

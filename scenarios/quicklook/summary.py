@@ -16,17 +16,17 @@ _REST = 1.0  # [s] at both ends of a trial
 
 @dataclass(frozen=True)
 class Looked:
-    """One trial and what is to be said of it.
+    """One trial and what is worth reporting of it.
 
     Attributes:
         entry: As dataset.json has it.
         trial: What was recorded.
-        said: A line each.
+        findings: A line each.
     """
 
     entry: TrialEntry
     trial: Trial | PostureMeans
-    said: tuple[str, ...]
+    findings: tuple[str, ...]
 
 
 def looked_at(dataset: Dataset, entry: TrialEntry) -> Looked:

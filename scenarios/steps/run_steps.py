@@ -63,7 +63,7 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
     """
     from scenarios.files import registry
 
-    path = registry.find(name_or_path)  # an unknown name is told before the engines are imported
+    path = registry.find(name_or_path)  # an unknown name is refused before the engines are imported
 
     from scenarios.files import extends, yaml_file
     from scenarios.files.scenario import Scenario

@@ -94,7 +94,7 @@ def readable(steps: Sequence[Step]) -> tuple[Step, ...]:
 def predictive(steps: Iterable[Step], model: str) -> Step | None:
     """The row of a model that reads motor encoders and no measured base.
 
-    The base's motion from dynamics, which a robot knows wherever it stands; else from a plate, else none.
+    The base's motion from dynamics, which needs no instrument beside the robot; else from a plate, else none.
     """
     return _first(steps, model, _PREDICTIVE)
 

@@ -19,7 +19,7 @@ KINDS = {
     "frame": "marker frames",
     "geometry": "joint placements",
     "encoder": "encoder zeros",
-    "backlash": "play",
+    "backlash": "backlash",
     "gear": "gear compliance",
     "friction": "friction",
     "sigmoid": "sigmoid joint model",

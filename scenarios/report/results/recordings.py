@@ -48,7 +48,7 @@ def recorded(path: Path, entry: TrialEntry) -> Recorded:
 
 
 def instruments(description: Description, trials: Sequence[Recorded]) -> dict[str, str]:
-    """Each instrument and what it said, in words: rates of the first trial, declared noise."""
+    """Each instrument in words: rates of the first trial, declared noise."""
     rates = {name: f"{fixed(rate, 0)} Hz" for name, rate in trials[0].rates.items()} if trials else {}
     sigmas, n_link = description.sigmas, sum("link" in joint.encoders for joint in description.joints)
     bodies = ", ".join(f"{len(body.markers)} markers on {body.link}" for body in description.bodies)

@@ -84,7 +84,7 @@ class Sway:
 
     @property
     def shifted(self) -> np.ndarray:
-        """Where the base stands in the last second (6,) [mm, mrad]; it began at zero."""
+        """Displacement of the base in the last second (6,) [mm, mrad]; it began at zero."""
         return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - _REFERENCE], axis=0))
 
     @property
@@ -105,7 +105,7 @@ class AxisSway:
         axis: Its name.
         unit: Of what follows.
         spread: Peak to peak of what was measured.
-        shifted: Where it stands in the end, measured.
+        shifted: Measured displacement at the end.
         noise: Rms of the markers' noise.
         found: By source of the wrench: R2 and that of the middle half, None where the axis is left still, and the rms
             that is left.

@@ -162,7 +162,7 @@ def _loops(found: Sequence[JointSamples], corrected: Mapping[str, bool]) -> Iter
 
 
 def drawn(found: Sequence[Loop]) -> Figure | None:
-    """A panel for each joint; the legend stands where a panel is left over, or above."""
+    """A panel for each joint; the legend is where a panel is left over, or above."""
     if not found:
         return None
     rows = -(-(len(found) + 1) // _COLUMNS)

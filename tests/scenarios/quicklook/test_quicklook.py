@@ -76,7 +76,7 @@ def test_a_marker_that_moves_on_its_body_is_told(tmp_path):
     position[200:, trial.marker_body.index("base")] += [2e-3, 0.0, 0.0]
     trial = replace(trial, marker_position=position)
     dataset = load(rigid_robot.write(tmp_path / "dataset", [("sweep", "calibration", "sweep", trial)]))
-    (said,) = (line for line in looked_at(dataset, dataset.description.trials[0]).said if "each other" in line)
+    (said,) = (line for line in looked_at(dataset, dataset.description.trials[0]).findings if "each other" in line)
     moved = dict(part.split() for part in said.split(": ")[1].split(", "))
     assert float(moved["base"]) > 0.3 and float(moved["gripper"]) < 0.1
 
@@ -118,7 +118,7 @@ def test_force_is_drawn_about_its_mean_which_the_legend_tells(panels, one):
 def test_posture_means_have_a_picture_too(tmp_path):
     folder = means_dataset(tmp_path / "means", {"calibration": means(rigid_robot.defects(1), 12)})
     (found,) = look(folder, tmp_path / "out")
-    assert "12 static postures as means" in found.said[0] and len(list((tmp_path / "out").iterdir())) == 1
+    assert "12 static postures as means" in found.findings[0] and len(list((tmp_path / "out").iterdir())) == 1
 
 
 def test_an_unknown_trial_and_a_folder_that_is_none_are_told_and_nothing_is_written(folder, tmp_path, capsys):
@@ -154,7 +154,7 @@ def test_the_weight_at_both_ends_the_motors_and_the_wrist_are_told(tmp_path):
     wrench[late, :, 2] = -700.0 - 1.5 / wrench.shape[1]
     trial = replace(trial, plate_wrench=wrench, effort=effort, wrist_wrench=wrist)
     folder = rigid_robot.write(tmp_path / "dataset", [("sweep", "calibration", "sweep", trial)])
-    said = "\n".join(looked_at(load(folder), load(folder).description.trials[0]).said)
+    said = "\n".join(looked_at(load(folder), load(folder).description.trials[0]).findings)
     assert "in the last: -1.50 N" in said
     assert f"motor currents of 8 joints, {names[4]} the most, 2.25 A" in said
     assert "wrist: force 0.0-7.2 N" in said
