@@ -77,15 +77,16 @@ class TwinRun(TwinResult):
     estimate: Path
 
     def evaluate(self, estimate: Path | str) -> TwinResult:
-        """Evaluate another calibration of this robot, given as an estimate folder, its estimate.json, or a URDF."""
+        """Evaluate another calibration of this robot, given as an estimate folder or .json, a URDF, or poses."""
         path = Path(estimate).resolve()
         files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
         content = [self.folder.name, *(part for file in files for part in (file.name, _sha256(file)))]
         arguments = ("evaluate", str(path), str(self.dataset), "--truth", str(self.truth))
         folder = _cached("evaluation", content, arguments)
         rows, file = _rows(folder), path / "estimate.json" if path.is_dir() else path
-        name = _json(file).get("main") if file.suffix == ".json" else None
-        return TwinResult(folder, name or str(rows[-1]["model"]), rows, _json(folder / "score.json"))
+        names = {str(row["model"]) for row in rows}
+        name = _json(file).get("main") if file.suffix == ".json" else file.stem
+        return TwinResult(folder, name if name in names else str(rows[-1]["model"]), rows, _json(folder / "score.json"))
 
 
 @pytest.fixture(scope="session")
@@ -187,7 +188,7 @@ def assert_covers() -> Callable[..., None]:
     """
 
     def covers(result: TwinResult, at_least: float | None = None) -> None:
-        n, inside = int(result.score["n_judged"]), int(result.score["n_covered"])
+        n, inside = (int(result.score.get(key) or 0) for key in ("n_judged", "n_covered"))
         least = _quantile(n) if at_least is None else at_least * n
         if n == 0 or inside < least:
             entries = [*result.score["parameters"], *result.score["combinations"]]

@@ -75,7 +75,7 @@ class Engines:
         self.calls["blas"] = blas_threads()
         return self.load_estimate(dataset)
 
-    def load_estimate(self, path):
+    def load_estimate(self, path, dataset=None):
         verdict = SimpleNamespace(stage="clocks", verdict="ok", message="0.1 ms")
         return SimpleNamespace(calibrated=self.calibrated, verdicts=[verdict])
 
