@@ -14,8 +14,9 @@ import numpy as np
 
 from calibration.errors import InputError
 from calibration.formats.mapping.channels import Joints, Markers, Means, Plates, Reader, Recorded
-from calibration.formats.mapping.layouts import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels
+from calibration.formats.mapping.layouts import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels, PoseChannels
 from calibration.formats.mapping.plate_convention import checked_against_cop, to_action
+from calibration.formats.mapping.poses import AXES, marker_names, marker_sigma, rotations, shape_of, wrong_numbers
 from calibration.recording.schema import Plate, Setup
 
 _UNITS = ANGLES | LENGTHS
@@ -46,16 +47,14 @@ def _read(path: Path, table: CsvTable, setup: Setup) -> Recorded:
     text = read_text(path)
     if table.dwells is not None:
         return Recorded(str(path), dwells=_dwells(text, table.dwells), notes=_unused(text, table))
-    position = _positions(text, table) if table.markers else None
+    names, position = _seen(text, table)
     if table.time is None:
         q = np.stack([text.numbers([c.motor], _UNITS[c.unit])[:, 0] for c in table.joints.values()], axis=1)
-        means = Means(
-            tuple(table.joints), q, tuple(table.markers), np.asarray(position), float(table.marker_std or 0.0)
-        )
+        means = Means(tuple(table.joints), q, names, np.asarray(position), _std(table))
         return Recorded(str(path), means=means, notes=_unused(text, table))
     t = text.seconds(table.time.column, table.time.unit)
     _check_times(text, table.time.column, t)
-    markers = None if position is None else Markers(t, tuple(table.markers), position)
+    markers = None if position is None else Markers(t, names, position)
     plates, notes = _plates(text, table, setup, t)
     joints = _joints(text, table, t) if table.joints else None
     others = {"robot": joints, "plate": plates}
@@ -123,6 +122,34 @@ class CsvText:
     def error(self, row: int, column: str, message: str) -> InputError:
         """An error at a cell."""
         return InputError(f"{self.path}:{row + 2}:{self.index(column) + 1}", f"{column}: {message}")
+
+
+def _seen(text: CsvText, table: CsvTable) -> tuple[tuple[str, ...], np.ndarray | None]:
+    """Names and positions (n, m, 3) [m] of markers, and of those that stand for poses; None where there are none."""
+    if not (table.markers or table.poses):
+        return (), None
+    parts = [_positions(text, table)] if table.markers else []
+    parts += [_pose_markers(text, name, channels) for name, channels in table.poses.items()]
+    names = (*table.markers, *(m for name in table.poses for m in marker_names(name)))
+    return names, np.concatenate(parts, axis=1)
+
+
+def _std(table: CsvTable) -> np.ndarray:
+    """Standard deviation (m, 1) of each marker [m]."""
+    drawn = [float(table.marker_std or 0.0)] * len(table.markers)
+    posed = [marker_sigma(c) for c in table.poses.values() for _ in AXES]
+    return np.array(drawn + posed)[:, None]
+
+
+def _pose_markers(text: CsvText, name: str, channels: PoseChannels) -> np.ndarray:
+    """Positions (n, 6, 3) [m] of the markers that stand for a pose."""
+    p = text.numbers(channels.position, LENGTHS[channels.position_unit], gaps=True)
+    factor = 1.0 if channels.order.startswith("quat") else ANGLES[channels.angle_unit]
+    numbers = text.numbers(channels.rotation, factor, gaps=True)
+    wrong = list(wrong_numbers(p, numbers, channels))
+    if wrong:
+        raise InputError(text.path, "; ".join(f"pose of {name}: {message}" for message in wrong))
+    return np.einsum("nij,mj->nmi", rotations(numbers, channels.order), shape_of(channels)) + p[:, None]
 
 
 def _positions(text: CsvText, table: CsvTable) -> np.ndarray:
@@ -201,6 +228,7 @@ def _unused(text: CsvText, table: CsvTable) -> tuple[str, ...]:
     used |= {c for j in table.joints.values() for c in (j.motor, j.link, j.velocity, j.effort, j.command) if c}
     used |= {c for p in table.plates.values() for c in (*p.force, *p.moment, *(p.cop or ()))}
     used |= {*table.wrist.force, *table.wrist.moment} if table.wrist else set()
+    used |= {c for p in table.poses.values() for c in (*p.position, *p.rotation)}
     used |= {table.time.column} if table.time else set()
     used |= {*table.dwells} if table.dwells else set()
     left = [name for name in text.header if name not in used]

@@ -50,13 +50,16 @@ class Plates:
 
 @dataclass(frozen=True)
 class Means:
-    """Static postures: q (n, k) by `joints`, position (n, m, 3) by `markers`, standard deviation of the means [m]."""
+    """Static postures: q (n, k) by `joints`, position (n, m, 3) by `markers`, and their std [m].
+
+    `std` is one number, or (m, 1).
+    """
 
     joints: tuple[str, ...]
     q: np.ndarray
     markers: tuple[str, ...]
     position: np.ndarray
-    std: float
+    std: float | np.ndarray
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,38 @@ class WristChannels(Declaration):
     convention: Literal["action", "reaction"]
 
 
+Order = Literal["quat_xyzw", "quat_wxyz", "rotation_vector", "euler_xyz", "euler_zyx", "euler_XYZ", "euler_ZYX"]
+
+
+class PoseChannels(Declaration):
+    """Columns of the 6D pose of a rigid body.
+
+    Attributes:
+        position: x, y, z of its origin.
+        rotation: Four numbers of a quaternion, three of a rotation vector or of Euler angles.
+        order: Which; Euler axes of the lab in small letters, of the body in capitals, the first rotation first.
+        position_unit: m or mm.
+        angle_unit: rad or deg, of all but quaternions.
+        sigma_position: Standard deviation per axis [m].
+        sigma_rotation: Standard deviation per axis [rad].
+    """
+
+    position: Columns
+    rotation: tuple[str, ...]
+    order: Order
+    position_unit: Literal["m", "mm"] = "m"
+    angle_unit: Literal["rad", "deg"] = "rad"
+    sigma_position: Positive
+    sigma_rotation: Positive
+
+    @model_validator(mode="after")
+    def _has_as_many_columns(self) -> "PoseChannels":
+        wanted = 4 if self.order.startswith("quat") else 3
+        if len(self.rotation) != wanted:
+            raise ValueError(f"`rotation` names {len(self.rotation)} columns, {self.order} has {wanted}")
+        return self
+
+
 class CsvTime(Declaration):
     """The time column: seconds, or UTC stamps such as 2023-09-20_16:40:52.540797 (seconds since that midnight)."""
 
@@ -97,6 +129,7 @@ class CsvTable(Declaration):
         joints: Columns of each joint.
         plates: Columns of each plate.
         wrist: Columns of the wrist's force-torque sensor, in a table of joints.
+        poses: Columns of the pose of each rigid body, where the file has poses instead of markers.
         dwells: Columns of start and stop of each static posture [s, markers' clock], in a table of nothing else.
     """
 
@@ -109,6 +142,7 @@ class CsvTable(Declaration):
     joints: dict[str, JointChannels] = {}
     plates: dict[str, PlateChannels] = {}
     wrist: WristChannels | None = None
+    poses: dict[str, PoseChannels] = {}
     dwells: tuple[str, str] | None = None
 
     @model_validator(mode="after")
@@ -117,9 +151,10 @@ class CsvTable(Declaration):
             if self.time or self.marker_std or self.markers or self.joints or self.plates:
                 raise ValueError("a table of `dwells` has nothing else")
             return self
-        if (self.time is None) == (self.marker_std is None):
+        stated = self.marker_std is not None or (bool(self.poses) and not self.markers)
+        if self.marker_std is not None if self.time else not stated:
             raise ValueError("give `time` for samples, or `marker_std` for static postures")
-        if self.time is None and (self.plates or not self.joints or not self.markers):
+        if self.time is None and (self.plates or not self.joints or not (self.markers or self.poses)):
             raise ValueError("a table of static postures has markers and joints, and no plates")
         if self.wrist is not None and (self.time is None or not self.joints):
             raise ValueError("`wrist` is sampled with the joints; map it in their table")

@@ -11,7 +11,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from calibration.errors import InputError
-from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable
+from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable, PoseChannels
+from calibration.formats.mapping.poses import marker_names as pose_markers
+from calibration.formats.mapping.poses import shape_of
 from calibration.recording.schema import (
     BASE,
     HAND,
@@ -44,6 +46,7 @@ class MappedBody(Declaration):
         link: The link it is fixed on.
         markers: Drawn markers, with their coordinates in the link's frame [m].
         placement: Of drawn markers, where their coordinates are not in the link's frame; see `schema.Body`.
+        pose: Columns of its 6D pose, those of the table (`pose: true` in the file): six markers stand for it.
         undrawn: Names of markers whose coordinates nobody measured: their shape is the mean over calibration trials.
         standing: Places an undrawn body on the base by where the base stands at rest.
         fitted: Places an undrawn body, or the frame of the marker positions, by the nominal robot's fit to the
@@ -54,12 +57,15 @@ class MappedBody(Declaration):
     link: str
     markers: tuple[Marker, ...] = ()
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    pose: PoseChannels | None = None
     undrawn: tuple[str, ...] = ()
     standing: Standing | None = None
     fitted: bool = False
 
     @model_validator(mode="after")
     def _is_placed_once(self) -> "MappedBody":
+        if self.pose is not None and (self.markers or self.undrawn or self.standing):
+            raise ValueError(f"body {self.name}: its pose is recorded, so it has no markers; `fitted: true` places it")
         if self.markers and (self.undrawn or self.fitted or self.standing):
             raise ValueError(f"body {self.name}: markers are drawn, so it is neither undrawn, standing nor fitted")
         if (self.undrawn or self.fitted or self.standing) and self.fitted == (self.standing is not None):
@@ -71,11 +77,17 @@ class MappedBody(Declaration):
     @property
     def marker_names(self) -> tuple[str, ...]:
         """Of all its markers."""
+        if self.pose is not None:
+            return pose_markers(self.name)
         return self.undrawn or tuple(m.name for m in self.markers)
 
     def drawn(self) -> Body:
         """The body as it is drawn."""
-        return Body(name=self.name, link=self.link, markers=self.markers, placement=self.placement)
+        markers = self.markers
+        if self.pose is not None:
+            places = (tuple(map(float, x)) for x in shape_of(self.pose))
+            markers = tuple(Marker(name=n, xyz=x) for n, x in zip(self.marker_names, places, strict=True))  # type: ignore[arg-type]
+        return Body(name=self.name, link=self.link, markers=markers, placement=self.placement)
 
 
 class MappedTrial(Declaration):

@@ -22,6 +22,7 @@ from calibration.errors import InputError, NotEnoughData
 from calibration.formats.mapping.channels import Recorded
 from calibration.formats.mapping.dwell_means import posture_means
 from calibration.formats.mapping.mapping import MappedBody, MappingFile
+from calibration.formats.mapping.poses import other_convention
 from calibration.mocap.cluster_pose import body_poses
 from calibration.mocap.cluster_shape import cluster, misfit, of_one_shape
 from calibration.numerics.alignment import hand_eye, registration_start
@@ -105,6 +106,10 @@ def _posed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Placements (6,) of base and hand from nominal poses A (n, 4, 4) of hand's link in the base's."""
     B = np.concatenate([inverse(_poses(base, r)) @ _poses(hand, r) for r in postures])
+    posed = next((b.pose for b in mapping.content.bodies if b.name == hand.name), None)
+    if posed is not None and (other := other_convention(A, B, posed.order)) is not None:
+        what = f"as declared ({posed.order}) they contradict the joint readings, as {other} they do not"
+        raise InputError(postures[0].file, f"poses of {hand.name}: {what}; correct the mapping")
     try:
         X, Y = hand_eye(A, B)
     except NotEnoughData as error:

@@ -5,6 +5,7 @@
     trials: {static: [s], swing: [u, v]}, validation: [v], confirmation: []          a list of trials
     csv[].markers: "{marker}_{axis}"                                                 of every marker of the bodies
     csv[].joints: {motor: "{joint}_q", link: "{joint}_l", unit: [rad, m]}            of every joint; m of a slide
+    bodies[].pose: true                                                              columns of its pose
     c3d.markers: same, bag.joints: same                                              labels are the names
 
 What has another form is left as it is: the validation judges it.
@@ -44,7 +45,8 @@ def written_out(values: dict[str, Any]) -> dict[str, Any]:
         found["trials"] = _trials(found)
     for role in _ROLES:
         found.pop(role, None)
-    markers = _marker_names(found.get("bodies"))
+    found["bodies"] = _posed(found.get("bodies"), found.get("csv"))
+    markers = _marker_names(found["bodies"])
     if isinstance(found.get("csv"), list):
         linked = linked if isinstance(short, dict) else names
         found["csv"] = [_table(t, markers, names, slides, linked) if isinstance(t, dict) else t for t in found["csv"]]
@@ -80,6 +82,19 @@ def _trials(values: dict[str, Any]) -> list[dict[str, Any]]:
     trials = [{"id": n, "role": role_of.pop(n, "calibration"), "kind": kind} for kind, names in kinds for n in names]
     # a name under a role that no kind has: as a trial without kind, which the validation finds missing
     return trials + [{"id": name, "role": role} for name, role in role_of.items()]
+
+
+def _posed(bodies: Any, tables: Any) -> Any:
+    """Bodies with `pose: true` with the columns of their pose."""
+    if not isinstance(bodies, list) or not isinstance(tables, list):
+        return bodies
+    poses = {name: p for t in tables if isinstance(t, dict) for name, p in (t.get("poses") or {}).items()}
+    return [
+        b | {"pose": poses.get(b.get("name"), "named in no table's `poses`")}
+        if isinstance(b, dict) and b.get("pose") is True
+        else b
+        for b in bodies
+    ]
 
 
 def _marker_names(bodies: Any) -> list[str]:

@@ -121,7 +121,8 @@ def sigmas_of(session: Session) -> dict[str, float]:
         if r.markers is not None:
             found["marker"].append(_at_rest(r.markers.t, r.markers.position.reshape(len(r.markers.t), -1)))
         if r.joints is not None:
-            found["encoder"].append(float(np.max(noise_of(r.joints.q_motor))))
+            turning = [k for k, n in enumerate(r.joints.names) if n not in session.robot.prismatic(r.joints.names)]
+            found["encoder"].append(_of_encoders(r.joints.q_motor[:, turning]))
         if r.means is not None:
             found["marker"] += [max(sigma, _SIGMAS["marker"]) for sigma in _of_means(session, r.means)]
     for view in session.views:
@@ -130,9 +131,20 @@ def sigmas_of(session: Session) -> dict[str, float]:
             found["plate_force"].append(float(np.median(sigma[:3])))
             found["plate_moment"].append(float(np.median(sigma[3:])))
     return {
-        name: float(f"{max(float(np.median(x)), _LEAST[name]) if x else _SIGMAS[name]:.2g}")
+        name: float(f"{max(float(np.median(x)), _LEAST[name]) if x else _SIGMAS[name]:.3g}")
         for name, x in found.items()
     }
+
+
+def _of_encoders(q: np.ndarray) -> float:
+    """The coarsest resolution of readings q (n, k) [rad], each the smallest step between them; or their noise."""
+    if not q.shape[1]:
+        return _SIGMAS["encoder"]
+    steps = np.abs(np.diff(q, axis=0))
+    smallest = np.where(steps > _LEAST["encoder"], steps, np.inf).min(axis=0)
+    resolution = float(np.max(smallest[np.isfinite(smallest)], initial=0.0))
+    noise = float(np.max(noise_of(q)))
+    return resolution if resolution > 0.3 * noise else noise
 
 
 def _at_rest(t: np.ndarray, x: np.ndarray) -> float:
