@@ -49,7 +49,7 @@ class Estimate:
         link_zero: Motor minus link reading of each measured joint over the calibration postures [rad, m].
         options: What was chosen.
         laboratory: What dataset.json declares, without its trials; None where the source does not say.
-        remedies: What to record next, for what the data do not tell.
+        remedies: What to record next, for what the data do not identify.
         regimes: Fit quality of the joint models on repetitions of their own motions.
         registered: Whether it says where the marker bodies are; a URDF does not.
     """
@@ -80,6 +80,15 @@ class Estimate:
         if found is None:
             raise NoSuchElement("model", name, [m.name for m in self.models])
         return found
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every estimated parameter once: of the main model where it has it, else of the first model that does."""
+        models = sorted(self.models, key=lambda m: m.name != self.main)
+        found: dict[str, Parameter] = {}
+        for p in (p for model in models for p in model.parameters):
+            found.setdefault(p.name, p)
+        return tuple(found.values())
 
     def clock(self, instrument: str) -> Clock | None:
         """The clock of an instrument, None where it was not synchronised."""

@@ -2,13 +2,13 @@
 
     estimate.json            parameters, combinations, verdicts, clocks
     estimate.nc              covariances, one group a model
-    record_next.yaml         postures and motions for what the data do not tell, see `remedy`; if there is such
+    record_next.yaml         postures and motions for what the data do not identify; only if there are any
     nominal.urdf             what the placement twists are relative to
     calibrated.urdf          joint placements of the main model        } only if the result
     master_calibration.yaml  zeros of the readings of the main model   } may be used: see `estimate_tables`
     parameters.csv           every parameter of every model            }
 
-The same estimate gives the same bytes. `load_estimate` also reads somebody else's estimate.json, or a bare URDF.
+The same estimate gives the same bytes. `load_estimate` also reads another program's estimate.json or URDF.
 
 A calibrated URDF: the nominal text with the joint origins moved.
 

@@ -72,7 +72,7 @@ class SuspensionEntry(Part):
 
 
 def joint_entry(model: JointModel) -> JointEntry:
-    """A joint model as it stands in the file."""
+    """A joint model as it is in the file."""
     q = model.quality
     return JointEntry(
         joint=model.joint,
@@ -90,7 +90,7 @@ def joint_entry(model: JointModel) -> JointEntry:
 
 
 def joint_model(entry: JointEntry) -> JointModel:
-    """A joint model as it stood in the file."""
+    """A joint model as it was in the file."""
     return JointModel(
         entry.joint,
         entry.terms,
@@ -117,7 +117,7 @@ def regime_quality(entry: RegimeEntry) -> RegimeQuality:
 
 
 def suspension_entry(suspension: Suspension) -> SuspensionEntry:
-    """A suspension as it stands in the file."""
+    """A suspension as it is in the file."""
     return SuspensionEntry(
         form=suspension.form,
         K=_rows(suspension.K),
@@ -138,7 +138,7 @@ def suspension_entry(suspension: Suspension) -> SuspensionEntry:
 
 
 def suspension_of(entry: SuspensionEntry) -> Suspension:
-    """A suspension as it stood in the file, without the sigmas that its parameters have."""
+    """A suspension as it was in the file, without the sigmas that its parameters have."""
     unknown = np.full((6, 6), np.nan)
     return Suspension(
         entry.form,

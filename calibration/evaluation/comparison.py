@@ -2,7 +2,7 @@
 
     d = RMSE_b - RMSE_a [mm per component]      negative: b is better
 
-Errors of neighbouring samples are alike, so whole blocks of `_BLOCK` seconds are drawn, the same for both rows.
+Errors of neighbouring samples are alike, so whole blocks of `_BLOCK` seconds are resampled, the same for both rows.
 Reference: Kuensch, Annals of Statistics 1989 (block bootstrap).
 
 Why a model that only moves the base is better or worse than `nominal`, in one sentence of measured figures.
@@ -125,13 +125,13 @@ def base_reason(errors: Mapping[str, np.ndarray], finding: str) -> str:
     fixed, measured, predicted = (errors[name] for name in ("fixed", "measured", "predicted"))
     moved, missed = _rms(fixed - measured), _rms(predicted - measured)
     stays, left = _rms(fixed), _rms(measured)
-    told = f"the base moved the hand by {moved:.2f} mm rms per component"
+    moved_by = f"the base moved the hand by {moved:.2f} mm rms per component"
     even = f"the base measured would leave {left:.2f} mm of {stays:.2f}"
     if finding == "worse" and left >= stays:
-        return f"{told}, against the larger errors of the nominal hand itself: even {even}"
+        return f"{moved_by}, against the larger errors of the nominal hand itself: even {even}"
     if finding == "worse":
-        return f"{told}, its prediction misses that by {missed:.2f} mm; {even}"
-    return f"{told}, predicted to {missed:.2f} mm; {even}, the rest are the nominal hand's own errors"
+        return f"{moved_by}, its prediction misses that by {missed:.2f} mm; {even}"
+    return f"{moved_by}, predicted to {missed:.2f} mm; {even}, the rest are the nominal hand's own errors"
 
 
 def _rms(e: np.ndarray) -> float:

@@ -34,7 +34,7 @@ _UPRIGHT = 1e-9  # [m/s2] gravity's components in two frames 0 that are one dire
 
 @dataclass(frozen=True)
 class LoadedBase:
-    """A base on its suspension, standing somewhere.
+    """A base on its suspension at a known pose.
 
     Attributes:
         suspension: Of the base.
@@ -98,7 +98,7 @@ class LoadedBase:
 
 
 def loaded_base(suspension: Suspension, description: Description, T_lab_base: np.ndarray | None) -> LoadedBase:
-    """The base where it stands in the laboratory; where that is not given, the lab is the base frame."""
+    """The base at its pose in the laboratory; where that is not given, the lab is the base frame."""
     if T_lab_base is None:
         return LoadedBase(suspension, np.eye(4), np.eye(4), np.zeros(3))
     T_lab_0 = upright(T_lab_base, description)
@@ -108,10 +108,10 @@ def loaded_base(suspension: Suspension, description: Description, T_lab_base: np
 
 @dataclass(frozen=True)
 class BaseState:
-    """What the base is at after a sample.
+    """State of the base after a sample.
 
     Attributes:
-        start: When it was first asked [s].
+        start: Time of the first sample [s].
         t: The sample's time [s].
         rest: (6,) wrench at rest, the mean of the first second [N, N.m, frame 0].
         n: Samples in it.

@@ -179,7 +179,7 @@ class Compensator:
         return replace(_in_lab(in_base, base, state.moved, T_lab_base_start), base=state)
 
     def _base(self, T_lab_base: np.ndarray | None) -> LoadedBase | None:
-        """The base where it stands, None without a suspension or a laboratory."""
+        """The base at its pose, None without a suspension or a laboratory."""
         if self.suspension is None or self.laboratory is None:
             return None
         return loaded_base(self.suspension, self.laboratory, T_lab_base)

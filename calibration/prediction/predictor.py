@@ -6,7 +6,7 @@ T_lab_B, where the base's marker body is:      fixed      as in the first second
                                                plate      moved by the suspension under the plate's wrench
                                                dynamics   moved by the suspension under the nominal inverse dynamics
                                                measured   by its markers throughout
-q, what stands for the joints' positions:      motor      q_motor by the robot's clock; less the joint model in model_3
+q, readings the geometry is evaluated at:      motor      q_motor by the robot's clock; less the joint model in model_3
                                                link       link readings, their zero laid on the motor's
 
 Of a trial nothing else is read: encoders, plate, base markers of its first second (throughout where the base is
@@ -48,7 +48,7 @@ from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
 
 REFERENCE = 1.0  # [s] of rest at the start of every trial
-Side = Literal["motor", "corrected", "link"]  # readings the geometry is asked with
+Side = Literal["motor", "corrected", "link"]  # readings the geometry is evaluated at
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Predictor:
                 yield row, self.models[row.name], encoder
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
-        """Joint positions (n, n_joints) [rad, m] the geometry is asked with, at the motion capture's times."""
+        """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times."""
         side = self._side(row_of(name), encoder)
         return self._positions(side, trial, self._corrected(trial) if side == "corrected" else None)
 
@@ -212,17 +212,21 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     if not estimate.calibrated:
         raise NotCalibrated([v.message for v in estimate.verdicts if v.verdict == "refused"])
     description = dataset.description
-    drawn = chain_of(dataset.urdf, description)
-    frames = nominal_frames(drawn, description)
-    chain = drawn if estimate.urdf in (None, dataset.urdf) else chain_of(str(estimate.urdf), description)
+    nominal_chain = chain_of(dataset.urdf, description)
+    frames = nominal_frames(nominal_chain, description)
+    chain = nominal_chain if estimate.urdf in (None, dataset.urdf) else chain_of(str(estimate.urdf), description)
     estimated = {m.name: hand_of(m, chain, frames) for m in estimate.models}
-    nominal, models = nominal_hand(drawn, frames), {}
+    nominal, models = nominal_hand(nominal_chain, frames), {}
     for row in LADDER:
         hand = nominal if row.geometry is None else estimated.get(row.geometry)
         present = estimate.suspension is not None or not row.needs_suspension
         if hand is not None and present and (estimate.joint_models or not row.joints):
             models[row.name] = hand
-    own = (m for m in estimate.models if m.name not in models and (places_hand(m, drawn) or not estimate.registered))
+    own = (
+        m
+        for m in estimate.models
+        if m.name not in models and (places_hand(m, nominal_chain) or not estimate.registered)
+    )
     models |= {model.name: estimated[model.name] for model in own}
     robot = estimate.clock("robot")
     trials = () if robot is not None else tuple(trial for _, trial in relabelled_trials(dataset, "calibration"))

@@ -1,11 +1,11 @@
-"""Marker bodies registered anew in another session; geometry, zeros and joint models stay as they were calibrated.
+"""Marker bodies registered again in another session; geometry, zeros and joint models stay as they were calibrated.
 
     minimise over T_base_B, T_tool_H     sum_i |log6(T_measured_i^-1 T_B_H(q_i))|^2 / tolerance^2        12 parameters
 
 Asked of the dwells of the session's registration trials, which are not scored. Rows of the datasheet are not
-registered. Encoders that were homed anew are not asked for: their error is part of the prediction's.
+registered. Encoders that were homed again are not fitted: their error is part of the prediction's.
 
-A calibrated robot whose markers were put on anew: both frames fitted to a few postures, and what that is worth.
+A calibrated robot with remounted markers: both frames fitted to a few postures, and their covariance.
 
     frames = argmin sum_i |w log6(T_i^-1 T_B_H(q_i))|^2,    error of frames = -L w (J_g dg + e),    L = (w J_f)^+ w
 
@@ -56,7 +56,7 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
 
 
 def registration_postures(predict: Predictor, name: str, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Mean positions (n, n_joints) a row's geometry is asked with, and measured T_B_H (n, 4, 4), a dwell each."""
+    """Mean positions (n, n_joints) a row's geometry is evaluated at, and measured T_B_H (n, 4, 4), a dwell each."""
     return _postures(predict, name, [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)])
 
 
@@ -79,8 +79,10 @@ def _dwells(predict: Predictor, name: str, trial: Trial) -> tuple[np.ndarray, np
     return np.array([q[k].mean(axis=0) for k in seen]), np.array([mean(T[k]) for k in seen])
 
 
-def registered_anew(robot: Compensator, q: np.ndarray, T_measured: np.ndarray, description: Description) -> Compensator:
-    """The robot with its marker frames fitted to static postures, its geometry and zeros held.
+def reregistered_compensator(
+    robot: Compensator, q: np.ndarray, T_measured: np.ndarray, description: Description
+) -> Compensator:
+    """The robot with its marker frames fitted to static postures, its geometry and zeros fixed.
 
     Args:
         robot: As calibrated on another day.

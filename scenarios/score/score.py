@@ -43,10 +43,10 @@ class Score(ParameterScore):
     def content(self) -> dict[str, object]:
         """As in score.json."""
         rows = [row_entry(r) | {"skill": s} for r, s in zip(self.rows, self.skill, strict=True)]
-        n, held = (sum(getattr(score, name) for _, score in self.models) for name in ("n_judged", "n_covered"))
+        n, covered = (sum(getattr(score, name) for _, score in self.models) for name in ("n_judged", "n_covered"))
         return super().content() | {
             "models": {name: score.coverage() for name, score in self.models},
-            "every_model": {"coverage_95": held / n if n else None, "n_covered": held, "n_judged": n},
+            "every_model": {"coverage_95": covered / n if n else None, "n_covered": covered, "n_judged": n},
             "rows": rows,
             "base": [asdict(b) for b in self.base],
         }
@@ -60,7 +60,7 @@ def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path)
         NotCalibrated: The estimate must not be used.
     """
     estimate = estimate or Estimate("calibrated", (), (), (Model("", ()),), "")
-    estimated = {p.name for model in estimate.models for p in model.parameters}
+    estimated = {p.name for p in estimate.parameters}
     parameters, models = judge_estimate(estimate, _read_parameters(truth_folder / "truth.json", estimated))
     pairs = [(p, _read_trial(truth_folder / "trials" / f"{p.trial_id}.nc")) for p in evaluation.predicted]
     rows = tuple(ladder(list(_errors(pairs, _derived(truth_folder)["T_base_base"])), "truth"))

@@ -125,7 +125,7 @@ def _estimate(dataset: Dataset) -> Estimate:
     known = calibrate(dataset, ("registration",))
     postures = reduce(Postures.joined, (mean_postures(description, m) for _, m in dataset.means("calibration")))
     found = [stage(chain, description, postures) for stage in (calibrate_geometry, calibrate_gears)]
-    verdicts = (*known.verdicts, *(v for _, said in found for v in said))
+    verdicts = (*known.verdicts, *(v for _, findings in found for v in findings))
     if refused := [v.message for v in verdicts if v.verdict == "refused"]:
         raise NotCalibrated(refused)
     return replace(known, models=(*known.models, *(model for model, _ in found)), verdicts=verdicts)

@@ -1,6 +1,6 @@
 """A run of a matched study: a robot that is what the geometric model says it is, without physics, judged by its truth.
 
-Frames, joint placements and zeros are drawn from the datasheet's tolerances, readings err by its play, marker bodies'
+Frames, joint placements and zeros are sampled from the datasheet's tolerances, readings err by its play, marker bodies'
 means by the markers' noise; Pinocchio says where the hand is. What the fit promises must then hold: where it does not,
 the fit is wrong, and not the model.
 """

@@ -12,7 +12,7 @@ from calibration import Compensator, Dataset, calibrate
 from calibration import load as opened
 from calibration.mocap.postures import dwell_windows, mean_poses, readings_at
 from calibration.prediction.predictor import predictor
-from calibration.prediction.second_session import registered_anew, registration_postures
+from calibration.prediction.second_session import registration_postures, reregistered_compensator
 from calibration.robot.hand_uncertainty import Session
 from scenarios import load
 from twin.campaign import record
@@ -55,7 +55,7 @@ def shares(tmp_path_factory) -> np.ndarray:
         estimate = calibrate(dataset)
         predict, robot = predictor(estimate, dataset), Compensator.of(estimate)
         assert estimate.main == "full"
-        again = registered_anew(robot, *registration_postures(predict, "full", dataset), dataset.description)
+        again = reregistered_compensator(robot, *registration_postures(predict, "full", dataset), dataset.description)
         pairs = ((again, None), (again, Session()), (robot, Session()), (robot, REMOUNTED))
         found.append([inside(r, dataset, predict.robot, session) for r, session in pairs])
     print((100.0 * np.array(found)).round().astype(int))
@@ -63,7 +63,7 @@ def shares(tmp_path_factory) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_registered_anew_the_band_of_one_day_holds_on_another(shares):
+def test_reregistered_the_band_of_one_day_holds_on_another(shares):
     assert shares[:, 0].mean() >= 0.93 and shares[:, 0].min() >= 0.75
     assert shares[:, 1].min() >= 0.95
 

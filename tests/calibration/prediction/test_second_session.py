@@ -4,7 +4,7 @@ import pytest
 
 from calibration.errors import NotEnoughData
 from calibration.prediction.compensator import Compensator
-from calibration.prediction.second_session import registered_anew
+from calibration.prediction.second_session import reregistered_compensator
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
@@ -79,7 +79,7 @@ def test_frames_of_few_postures_are_as_uncertain_as_the_same_fit_repeated_shows(
     k, p = len(hand.offset), 12 + 7 * len(hand.offset)
     sigma = np.r_[np.full(12, 9.0), np.full(6 * k, 4e-4), np.full(k, 1e-3)]  # of the old frames: no matter
     robot = Compensator(hand, hand.names[:p], np.diag(sigma**2), np.full(k, 2e-3), np.array([2e-4, 1e-3]))
-    found = registered_anew(robot, q, hand.poses(q), description)
+    found = reregistered_compensator(robot, q, hand.poses(q), description)
     stated = found.points(MARKERS, other)
     errors = []
     for _ in range(300):
@@ -87,7 +87,7 @@ def test_frames_of_few_postures_are_as_uncertain_as_the_same_fit_repeated_shows(
             hand.theta[:p] + np.r_[np.zeros(12), sigma[12:] * rng.normal(size=p - 12)], hand.names[:p]
         )
         T = [moved_hand(true, x, robot, rng) for x in (q, other)]
-        again = registered_anew(robot, q, T[0], description)
+        again = reregistered_compensator(robot, q, T[0], description)
         seen = np.einsum("nij,mj->nmi", T[1][:, :3, :3], MARKERS) + T[1][:, None, :3, 3]
         errors.append(again.points(MARKERS, other).positions - seen)
     drawn = np.einsum("snmi,snmj->nmij", errors, errors) / len(errors)
