@@ -92,7 +92,7 @@ def prospect(
     model: HandModel,
     parameters: ParameterSet,
     description: Description,
-    play: np.ndarray,
+    reading_sigma: np.ndarray,
     q: np.ndarray,
     at: np.ndarray,
     known: np.ndarray | None = None,
@@ -103,14 +103,14 @@ def prospect(
         model: The robot as far as it is known.
         parameters: What is to be found, with tolerances.
         description: Markers and their noise.
-        play: (k,) random error of each joint's reading [rad, m].
+        reading_sigma: (k,) random error of each joint's reading [rad, m].
         q: Candidates.
         at: Where the hand is to be predicted.
         known: (p, p) covariance of the scaled parameters by what is recorded already; V is the identity then.
     """
     p = len(parameters)
     found = model.poses_and_derivatives(q, names=parameters.names)
-    W, J, J_joint = _whitened(found, description, play)
+    W, J, J_joint = _whitened(found, description, reading_sigma)
     A = (W @ J) * parameters.scale
     V = told_directions(A) if known is None else np.eye(p)
     P = model.poses_and_derivatives(at, names=parameters.names).J[:, :3] * parameters.scale @ V

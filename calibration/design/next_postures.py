@@ -61,7 +61,7 @@ class Known:
     Attributes:
         hand: The robot as far as it is known.
         parameters: To be found, with tolerances.
-        play: (k,) random error of each joint's reading [rad, m].
+        reading_sigma: (k,) random error of each joint's reading [rad, m].
         description: With the marker noise the recorded postures had.
         C: (p, p) covariance of the scaled parameters.
         untold: Number of directions that postures could tell and these did not.
@@ -69,7 +69,7 @@ class Known:
 
     hand: HandModel
     parameters: ParameterSet
-    play: np.ndarray
+    reading_sigma: np.ndarray
     description: Description
     C: np.ndarray
     untold: int
@@ -89,7 +89,7 @@ def record_next(
         return None, ()
     try:
         room = room_of(shapes_of(urdf, chain, description), known.description, rng)
-        task = Task(room, known.hand, known.parameters, known.play, known.C)
+        task = Task(room, known.hand, known.parameters, known.reading_sigma, known.C)
         found = plan(task, max(N, short), "D", rng)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "warning", f"no postures to suggest: {error}"),)
@@ -119,7 +119,7 @@ def _known(
         play = believed_play(hand, parameters, postures, theta, play)
     else:
         hand = hand_of(model, chain, frames)
-        play = model.play if len(model.play) else play
+        play = model.reading_sigma if len(model.reading_sigma) else play
     description = _as_measured(description, postures)
     low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits())
     anywhere = rng.uniform(low, high, size=(_PROBES, len(low)))

@@ -43,7 +43,7 @@ class Task:
         room: Where postures may be.
         model: The robot as far as it is known.
         parameters: To be found, with tolerances.
-        play: (k,) random error of each joint's reading [rad, m].
+        reading_sigma: (k,) random error of each joint's reading [rad, m].
         known: (p, p) covariance of the scaled parameters by what is recorded already; None: nothing is.
         departures: What the robot does and no parameter stands for; None: nothing.
         work: Draws postures like those the robot works in; None: anywhere in its room.
@@ -52,17 +52,17 @@ class Task:
     room: Room
     model: HandModel
     parameters: ParameterSet
-    play: np.ndarray
+    reading_sigma: np.ndarray
     known: np.ndarray | None = None
     departures: Departures | None = None
     work: Sample | None = None
 
     def prospect(self, q: np.ndarray, at: np.ndarray) -> Prospect:
         """What candidates q tell of the hand at other postures."""
-        told = prospect(self.model, self.parameters, self.room.description, self.play, q, at, self.known)
+        told = prospect(self.model, self.parameters, self.room.description, self.reading_sigma, q, at, self.known)
         if self.departures is None:
             return told
-        return departing(told, self.model, self.room.description, self.play, self.departures, at)
+        return departing(told, self.model, self.room.description, self.reading_sigma, self.departures, at)
 
     def sample(self, n: int, rng: np.random.Generator) -> np.ndarray:
         """Postures (n, n_measured) like those the robot works in."""
@@ -162,7 +162,9 @@ def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> 
         NotEnoughData: The robot has hardly any posture clear of itself and in sight.
     """
     found = search(task.room, task.prospect, n, criterion, rng, task.work)
-    return Plan(task, found, sides(found.prospect, found.chosen, task.play, rng), tour(found.q, task.room.shapes))
+    return Plan(
+        task, found, sides(found.prospect, found.chosen, task.reading_sigma, rng), tour(found.q, task.room.shapes)
+    )
 
 
 def compared(found: Plan, rng: np.random.Generator) -> Comparison:

@@ -192,7 +192,7 @@ def _model_entry(model: Model) -> ModelEntry:
             for c in model.combinations
         ),
         reading_error=tuple(
-            PlayEntry(joint=joint, sigma=float(s)) for joint, s in zip(model.joints, model.play, strict=True)
+            PlayEntry(joint=joint, sigma=float(s)) for joint, s in zip(model.joints, model.reading_sigma, strict=True)
         ),
         rank=model.rank,
         condition=model.condition,

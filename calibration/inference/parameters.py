@@ -57,7 +57,7 @@ class Model:
         combinations: Identifiable combinations of more than one parameter; coefficients in the parameters' order.
         covariance: (p, p).
         joints: Joints of the chain, base to tip.
-        play: (k,) random reading error of each joint, standard deviation [rad, m]; empty where not estimated.
+        reading_sigma: (k,) random reading error of each joint, standard deviation [rad, m]; empty where not estimated.
         rank: Number of identifiable combinations; 0 where not known.
         condition: Condition number of the scaled whitened Jacobian [-]; 0 where not known.
         hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
@@ -68,7 +68,7 @@ class Model:
     combinations: tuple[Combination, ...] = ()
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     joints: tuple[str, ...] = ()
-    play: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    reading_sigma: np.ndarray = field(default_factory=lambda: np.zeros(0))
     rank: int = 0
     condition: float = 0.0
     hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))

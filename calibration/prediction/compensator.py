@@ -58,7 +58,7 @@ class Compensator:
         hand: The calibrated robot.
         names: Parameters that are not certain, length p.
         covariance: (p, p) of them.
-        play: (k,) random reading error of each joint [rad, m].
+        reading_sigma: (k,) random reading error of each joint [rad, m].
         hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; (1,) of the position, (0,) none.
         joints: Joint models, None where the estimate has none.
         suspension: None where the estimate has none.
@@ -68,7 +68,7 @@ class Compensator:
     hand: HandModel
     names: tuple[str, ...]
     covariance: np.ndarray
-    play: np.ndarray
+    reading_sigma: np.ndarray
     hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
     joints: JointModels | None = None
     suspension: Suspension | None = None
@@ -77,7 +77,7 @@ class Compensator:
     @property
     def spread(self) -> Spread:
         """What it is not sure of."""
-        return Spread(self.names, self.covariance, self.play, self.hand_error)
+        return Spread(self.names, self.covariance, self.reading_sigma, self.hand_error)
 
     @classmethod
     def load(cls, folder: Path | str, payload: float | None = None) -> "Compensator":
@@ -105,7 +105,7 @@ class Compensator:
         chain = chain_of_frames(estimate.urdf, robot.joints, *frames, *described).carrying(payload)
         model = estimate.model(estimate.main)
         hand = hand_of(model, chain, np.zeros(12))
-        play = model.play if len(model.play) else np.zeros(len(chain.joints))
+        play = model.reading_sigma if len(model.reading_sigma) else np.zeros(len(chain.joints))
         joints = None
         if estimate.joint_models and laboratory is not None:
             inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
@@ -186,7 +186,7 @@ class Compensator:
 
     def _hand(self, t: np.ndarray, q: np.ndarray, velocity: np.ndarray | None) -> HandPose:
         """In the base frame."""
-        variance = np.broadcast_to(self.play**2, (len(q), len(self.play)))
+        variance = np.broadcast_to(self.reading_sigma**2, (len(q), len(self.reading_sigma)))
         if velocity is not None and self.joints is not None:
             corrected = correct(self.joints, t, q, velocity)
             q, columns = corrected.q, self.hand.chain.columns

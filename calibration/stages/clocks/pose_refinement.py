@@ -56,14 +56,14 @@ class Provisional:
         hand: Calibrated on the static postures.
         names: Of the parameters it was calibrated in, length p.
         root: (p, p) Cholesky factor of their covariance.
-        play: (k,) random reading error of each joint [rad, m].
+        reading_sigma: (k,) random reading error of each joint [rad, m].
         largest: (k,) largest gravity torque of each joint in the campaign [N.m, N].
     """
 
     hand: HandModel
     names: tuple[str, ...]
     root: np.ndarray
-    play: np.ndarray
+    reading_sigma: np.ndarray
     largest: np.ndarray
 
 
@@ -117,7 +117,7 @@ def link_angles(robot: Provisional, description: Description, trial: Trial, cloc
     Joints that are not on the way to the hand keep their readings.
     """
     x = read_samples(MeasuredTrial.of(description, trial), clock, calm=False)
-    J, D = robot.hand.joint_jacobians(x.q), robot.play**2
+    J, D = robot.hand.joint_jacobians(x.q), robot.reading_sigma**2
     r = _residuals(x.T, robot.hand.poses(x.q))
     C = x.covariance + (J * D) @ np.swapaxes(J, 1, 2)
     q = robot.hand.angles(x.q)
@@ -134,7 +134,7 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     if not speaks.any():
         raise NotEnoughData("no joint moves that gravity holds on one flank")
     at = hand.poses_and_derivatives(x.q, tau, robot.names)
-    moved = at.J_joint * np.where(held, robot.play, np.maximum(robot.play, _FREE))[:, None]
+    moved = at.J_joint * np.where(held, robot.reading_sigma, np.maximum(robot.reading_sigma, _FREE))[:, None]
     W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
     J = W @ at.J_joint
     shapes = (tau > 0.0, tau < 0.0, q - q.mean(axis=0), tau)

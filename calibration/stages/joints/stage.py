@@ -181,7 +181,7 @@ def joints_model(geometry: Model, models: tuple[JointModel, ...]) -> Model:
         (*geometry.parameters, *added),
         covariance=block_diag(*blocks),
         joints=geometry.joints,
-        play=geometry.play,
+        reading_sigma=geometry.reading_sigma,
     )
 
 

@@ -98,6 +98,6 @@ def test_frames_of_few_postures_are_as_uncertain_as_the_same_fit_repeated_shows(
 
 def moved_hand(true, q, robot, rng):
     """Poses (n, 4, 4) of the hand, readings and hand off by their random errors."""
-    T = true.poses(q + robot.play * rng.normal(size=q.shape))
+    T = true.poses(q + robot.reading_sigma * rng.normal(size=q.shape))
     sigma = np.sqrt(robot.spread.hand_variances)
     return np.array([M @ pin.exp6(sigma * rng.normal(size=6)).homogeneous for M in T])

@@ -41,7 +41,7 @@ def pool(task):
 @pytest.fixture(scope="module")
 def few(task, pool):
     """A small prospect: 60 candidates, the hand at 30 other postures."""
-    return prospect(task.model, task.parameters, DESCRIBED, task.play, pool[:60], pool[60:])
+    return prospect(task.model, task.parameters, DESCRIBED, task.reading_sigma, pool[:60], pool[60:])
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,7 @@ def test_predicted_sigmas_are_those_of_the_information_inverted_whole(task, few)
     """All parameters at once, gauge included, by the normal equations with the tolerances as priors."""
     chosen = np.arange(25)
     found = task.model.poses_and_derivatives(few.q[chosen], names=task.parameters.names)
-    again = prospect(task.model, task.parameters, DESCRIBED, task.play, few.q[chosen], few.q[:1])
+    again = prospect(task.model, task.parameters, DESCRIBED, task.reading_sigma, few.q[chosen], few.q[:1])
     W = again.J_joint @ np.linalg.pinv(found.J_joint)
     np.testing.assert_allclose(W @ found.J_joint, again.J_joint, atol=1e-6)
     J = (few.B[chosen] @ few.V.T / few.scale).reshape(-1, len(task.parameters))
@@ -189,7 +189,7 @@ def test_a_robot_without_wheels_or_shapes_is_designed_for_too():
     described = rigid_robot.described()
     bare = nominal_task(pin_text_without_shapes(), described, np.random.default_rng(0))
     rigid = geometry_parameters(bare.model.chain, described)
-    at = partial(prospect, bare.model, rigid, described, bare.play)
+    at = partial(prospect, bare.model, rigid, described, bare.reading_sigma)
     q = bare.room.pool(80, np.random.default_rng(0))
     assert at(q[:60], q[60:]).B.shape[2] == 36
 
