@@ -102,7 +102,7 @@ def test_a_refused_fit_ends_with_postures_too(chain, n, widest):
     model, said = calibrate_geometry(chain, DESCRIBED, postures)
     assert any(v.verdict == "refused" for v in said)
     remedy, told = record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, True)
-    assert f"{13 - n} distinct postures are lacking" in told[0].message
+    assert f"{13 - n} distinct postures are missing" in told[0].message
     assert len(remedy.postures) == max(N, 13 - n) and remedy.sigma[0].after < 0.6 * remedy.sigma[0].before
     more = recorded(np.array([p.q for p in remedy.postures]) - TRUTH.offset, 2)
     after, said = calibrate_geometry(chain, DESCRIBED, postures.joined(more))
