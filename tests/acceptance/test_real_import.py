@@ -48,7 +48,7 @@ def test_one_marker_on_the_hand_is_a_place_and_no_pose(tmp_path):
     files = [written(tmp_path / f"day{k + 1}.csv", head, rows[part]) for k, part in enumerate((order[:30], order[30:]))]
     import_export.import_files("csv", files, one_marker(tmp_path), tmp_path / "dataset")
     dataset = load(tmp_path / "dataset")
-    estimate = calibrate(dataset)
+    estimate = calibrate(dataset, plan_next=True)
     said = " ".join(v.message for v in estimate.verdicts)
     assert estimate.calibrated and estimate.model("model_2").rank == 33
     assert "hand orientation is not observable" in said and "no posture identifies frame.tool.hand.rx" in said
