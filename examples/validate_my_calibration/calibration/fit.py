@@ -31,7 +31,7 @@ def calibrate(dataset: Path, out: Path) -> Path:
     parameters = [{"name": name, "value": float(value)} for name, value in zip(names, theta, strict=True)]
     out.mkdir(parents=True, exist_ok=True)
     path = out / "estimate.json"
-    estimate = {"schema": 1, "main": "model_2", "models": {"model_2": {"parameters": parameters}}}
+    estimate = {"schema": 1, "main": "mine", "models": {"mine": {"parameters": parameters}}}
     path.write_text(json.dumps(estimate), encoding="utf-8")
     return path
 
