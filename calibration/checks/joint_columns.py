@@ -1,22 +1,15 @@
-"""Columns of joints that are swapped or reversed, told by the hand's markers before anything is written.
+"""Columns of joints that are swapped or reversed, found by the hand's markers before anything is written.
 
     e_h = mean_i min(|d_i|, 0.5 m),   d_i = (p, L w) of (X A_i(h) Y)^-1 B_i        L = 0.2 m
 
 A_i(h) is the nominal robot's T_base_hand at the readings under hypothesis h (as declared; one joint reversed; two
 joints swapped), B_i the measured one; X and Y are two constant frames fitted to all of them (hand-eye), so that no
 drawing is needed. A robot is a centimetre or two off its nominal model, a column that is another's by the motion
-itself: where one hypothesis explains the hand better than the declaration by a factor, it is named.
-A joint that does not move, or two that turn about one line, cannot be told apart so; then nothing is said.
-A single wrong file among right ones is held against the frames that the others give.
+itself: where one hypothesis explains the hand better than the declaration by a factor, it is reported.
+Joints that do not move, or turn about one line, are not distinguishable so and are not reported. A single wrong file
+among right ones is compared with the frames fitted to the others.
 
 Clocks are not known yet: the robot's is brought to the markers' by the hand's speed of rotation, for each hypothesis.
-
-Link readings that cannot be those of their joint, told by name before a joint model is fitted to them.
-
-    y = q_motor - q_link - zero         rms y > 0.1 rad over calibration trials: ten times the play of a worn gear
-    q_link ~ a q_motor + b              a = -1 sign, a = 180 / pi degrees, a = 0 stands still; by least squares
-
-A polynomial of the angle explains such a discrepancy perfectly, so its R2 says nothing.
 """
 
 import logging
@@ -36,7 +29,6 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
-from calibration.verdict import Verdict
 
 _POSES, _FEWEST, _ENOUGH = 60, 6, 10  # compared, of all trials; of each at least; to judge by
 _OFF, _ANOTHER = 0.012, 0.06  # [m] no suspicion; another robot than the nominal one
@@ -45,10 +37,6 @@ _ODD = 3.0  # times the other files' distance: a file unlike them
 _HALF = 0.5  # of that file's distance is left by an explanation, at most
 _STRANGE = 0.15  # [m] a file for which there is none; postures far from the others' are 60 mm off on a loose robot
 _log = logging.getLogger(__name__)
-_BEYOND = 0.1  # rms [rad, m]
-_NEAR = 0.1  # of the slope [-]
-_FOLLOWS = 0.99  # correlation with another joint's motor side [-]
-_SLOPES = ((-1.0, "its sign is turned"), (180.0 / np.pi, "it is in degrees"), (0.0, "it stands still"))
 
 
 def check_columns(description: Description, chain: Chain, trials: Sequence[tuple[str, Trial | PostureMeans]]) -> None:
@@ -169,29 +157,3 @@ def _distances(chain: Chain, shown: Sequence[Shown], reading: Reading) -> np.nda
     except NotEnoughData as error:
         _log.info("joints not compared with the hand: %s", error)
         return None
-
-
-def wrong_links(measured: Sequence[str], trials: Sequence[Trial], zero: np.ndarray) -> Iterator[Verdict]:
-    """A refusal for each joint whose link readings, its zero (n_measured,) removed, are not those of its motor side."""
-    motor, link = (np.concatenate([getattr(t, side) for t in trials]) for side in ("q_motor", "q_link"))
-    for j, joint in enumerate(measured):
-        known = np.isfinite(link[:, j]) & np.isfinite(motor).all(axis=1)
-        if not known.any():
-            continue
-        rms = float(np.sqrt((((motor - link)[known, j] - zero[j]) ** 2).mean()))
-        if rms > _BEYOND:
-            why = _reason(measured, j, motor[known], link[known, j])
-            message = f"link encoder of {joint} is off its motor side by {rms:.2g} rad rms{why}; correct the recording"
-            yield Verdict("joints", "refused", message)
-
-
-def _reason(measured: Sequence[str], j: int, motor: np.ndarray, link: np.ndarray) -> str:
-    """What explains the readings `link` (n,), or nothing; motor (n, n_measured)."""
-    spread, across = motor.std(axis=0), link.std()
-    covariance = ((motor - motor.mean(axis=0)) * (link - link.mean())[:, None]).mean(axis=0)
-    follows = np.abs(covariance) > _FOLLOWS * np.maximum(spread * across, np.finfo(float).tiny)
-    if follows.any() and not follows[j]:
-        return f": it follows {measured[int(np.argmax(follows))]}"
-    slope = covariance[j] / max(float(spread[j]) ** 2, np.finfo(float).tiny)
-    said = [text for value, text in _SLOPES if abs(slope - value) < _NEAR * max(abs(value), 1.0)]
-    return f": {said[0]}" if said else " (sign, unit, whole turns, order of the joints?)"

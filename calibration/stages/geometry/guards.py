@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from calibration.checks.recordings import implausible_readings
+from calibration.checks.joint_readings import implausible_readings
 from calibration.inference.identifiability import Identifiability
 from calibration.inference.map_estimate import Fit
 from calibration.inference.outliers import RobustFit

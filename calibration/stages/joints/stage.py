@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
-from calibration.checks.joint_columns import wrong_links
+from calibration.checks.joint_readings import wrong_links
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model, Parameter, Status
 from calibration.numerics.robust_covariance import ENOUGH

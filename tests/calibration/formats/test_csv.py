@@ -170,7 +170,7 @@ def series_cases():
         "time goes back": (changed(good, t=back), {}, ["log.csv:52:1: t: time 0.2 does not increase; remove"]),
         "time twice": (changed(good, t=twice), {}, ["log.csv:52:1: t: time 0.49 is the same as in the row before"]),
         "millimetres": ({k: 1e3 * v if "base" in k else v for k, v in good.items()}, {}, ["marker_unit"]),
-        "one marker's columns": (changed(good, base1_x=good["base2_x"]), {}, ["drawn 300 mm", "swapped"]),
+        "one marker's columns": (changed(good, base1_x=good["base2_x"]), {}, ["nominal 300 mm", "swapped"]),
         "no column": ({k: v for k, v in good.items() if k != "My"}, {}, ["log.csv:1:1: My: no such column"]),
         "zero gap": (good | zero, {}, ["log.csv:52:5: base1_x: the marker is at exactly (0, 0, 0)", "gaps: zero"]),
         "upside down": (good | up, {}, ["log.csv: Fx, Fy, Fz", "pull it up with 730 N", "convention: reaction"]),
