@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from calibration.evaluation.results import Evaluation
     from calibration.pipeline import calibrate
     from calibration.prediction.compensator import Compensator
-    from calibration.prediction.predictor import predictions
+    from calibration.prediction.predict import predictions
     from calibration.recording.dataset import Dataset, load
     from calibration.stages.geometry.from_arrays import fit_geometry
 
@@ -41,7 +41,7 @@ _MODULES = {
     "evaluation.results": ("Evaluation",),
     "pipeline": ("calibrate",),
     "prediction.compensator": ("Compensator",),
-    "prediction.predictor": ("predictions",),
+    "prediction.predict": ("predictions",),
     "recording.dataset": ("Dataset", "load"),
     "stages.geometry.from_arrays": ("fit_geometry",),
 }

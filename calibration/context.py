@@ -11,6 +11,7 @@ from calibration.recording.experiment import ExperimentPlan
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import TrialEntry
 from calibration.recording.trial import Trial
+from calibration.stages.bundle.stage import Bundle
 from calibration.stages.joints.correction import JointModels
 from calibration.stages.joints.repetitions import on_repetitions
 from calibration.stages.stage import StageInput, StageResult
@@ -35,7 +36,9 @@ class Context:
 
     def with_result(self, result: StageResult) -> "Context":
         """With the models, quantities and findings of a stage."""
-        models = (*self.estimate.models, *(self._clocked(m) for m in result.models))
+        names = [model.name for model in result.models]
+        kept = (m for m in self.estimate.models if m.name not in names)
+        models = (*kept, *(self._clocked(m) for m in result.models))
         estimate = replace(self.estimate, models=models)
         if isinstance(result.quantity, Suspension):
             estimate = replace(estimate, suspension=result.quantity)
@@ -43,7 +46,10 @@ class Context:
             found, zero = result.quantity, tuple(map(float, result.quantity.zero))
             regimes = on_repetitions(found, self.data.trials, self.data.options.terms)
             estimate = replace(estimate, joint_models=found.models, link_zero=zero, regimes=regimes)
-        return Context(replace(self.data, models=models), estimate).with_findings(*result.findings)
+        elif isinstance(result.quantity, Bundle):
+            estimate = replace(estimate, bundle=result.quantity.parts)
+        data = replace(self.data, models=models, quantities=(*self.data.quantities, result.quantity))
+        return Context(data, estimate).with_findings(*result.findings)
 
     def with_plan(self, plan: ExperimentPlan | None, findings: Sequence[Verdict]) -> "Context":
         """With an experiment to record next, if there is one."""

@@ -20,6 +20,7 @@ from calibration.mocap.labels import relabelled_trials
 from calibration.options import Options
 from calibration.recording.dataset import Dataset
 from calibration.robot.laboratory import Laboratory
+from calibration.stages.bundle.stage import BUNDLE
 from calibration.stages.clocks.stage import synchronise
 from calibration.stages.frames.arm_tool_stage import ARM_TOOL
 from calibration.stages.frames.base_rests import MOVES, read_stations
@@ -36,7 +37,7 @@ from calibration.stages.wrist_load import WRIST_LOAD
 from calibration.verdict import Verdict
 
 Progress = Callable[[str, float], None]
-_STAGES: tuple[Stage, ...] = (REGISTRATION, BASE_FRAME, ARM_TOOL, SUSPENSION, GEOMETRY, WRIST_LOAD, JOINTS)
+_STAGES: tuple[Stage, ...] = (REGISTRATION, BASE_FRAME, ARM_TOOL, SUSPENSION, GEOMETRY, WRIST_LOAD, JOINTS, BUNDLE)
 STAGES = ("clocks", *(stage.name for stage in _STAGES))
 _FRAMES = (BASE_FRAME.name, ARM_TOOL.name)  # run where there is a spin; alone where the arm only ever posed
 _NO_CLOCKS = (Verdict("clocks", "missing", "posture means only: there is no time, and no clock to estimate"),)

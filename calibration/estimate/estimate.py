@@ -15,6 +15,7 @@ from calibration.recording.schema import Description
 from calibration.verdict import Verdict
 
 if TYPE_CHECKING:
+    from calibration.stages.bundle.robot import BundleParts
     from calibration.stages.joints.model import JointModel
     from calibration.stages.joints.repetitions import RegimeQuality
     from calibration.stages.suspension.model import Suspension
@@ -50,6 +51,7 @@ class Estimate:
         options: What was chosen.
         laboratory: What dataset.json declares, without its trials; None where the source does not say.
         remedies: What to record next, for what the data do not identify.
+        bundle: Drive trains, bending and base of row `full`; None where they were not identified.
         regimes: Fit quality of the joint models on repetitions of their own motions.
         registered: Whether it says where the marker bodies are; a URDF does not.
     """
@@ -69,6 +71,7 @@ class Estimate:
     remedies: tuple[ExperimentPlan, ...] = ()
     regimes: "tuple[RegimeQuality, ...]" = ()
     registered: bool = True
+    bundle: "BundleParts | None" = None
 
     def model(self, name: str) -> Model:
         """The model of that name.

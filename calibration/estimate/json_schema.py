@@ -1,7 +1,7 @@
 """estimate.json: its fields, and the way between it and an `Estimate`."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -18,10 +18,12 @@ from calibration.estimate.json_stage_models import (
     suspension_entry,
     suspension_of,
 )
+from calibration.estimate.plain_values import plain, restored
 from calibration.inference.parameters import Combination, Model, Parameter, Status
 from calibration.options import Options
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
+from calibration.stages.bundle.robot import BundleParts
 from calibration.verdict import Verdict
 
 
@@ -112,6 +114,7 @@ class EstimateFile(Entry):
     regimes: tuple[RegimeEntry, ...] = ()
     options: Options = Field(default_factory=Options)
     laboratory: Description | None = None
+    bundle: dict[str, Any] | None = None
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore", validate_by_name=True)
 
@@ -145,6 +148,7 @@ def to_file(estimate: Estimate) -> EstimateFile:
         regimes=tuple(regime_entry(x) for x in estimate.regimes),
         options=estimate.options,
         laboratory=estimate.laboratory,
+        bundle=plain(estimate.bundle),
     )
 
 
@@ -165,6 +169,7 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
         file.options,
         file.laboratory,
         regimes=tuple(regime_quality(x) for x in file.regimes),
+        bundle=None if file.bundle is None else restored(BundleParts, file.bundle, "estimate.json: bundle"),
     )
 
 

@@ -40,6 +40,7 @@ class LadderRow:
         meaning: In a few words.
         geometry: Model of the estimate that places the hand; None: the datasheet.
         joints: Whether the joint models correct the motor readings.
+        bundle: Whether drive trains correct them, the column bends and the base slips, where those were identified.
         bases: Where the base's motion may come from.
         encoders: Which sides of the gear are read.
         builds_on: Row it is compared with; None: not compared.
@@ -52,6 +53,7 @@ class LadderRow:
     meaning: str
     geometry: str | None
     joints: bool = False
+    bundle: bool = False
     bases: tuple[Base, ...] = _EVERY
     encoders: tuple[Encoder, ...] = _MOTOR
     builds_on: str | None = None
@@ -116,10 +118,20 @@ LADDER = (
         builds_on="model_2",
         published=Published("measured", "link", constants_removed=True),
     ),
-    LadderRow("full", "geometry with joint compliance and backlash preload, from static postures", "full", means=True),
+    LadderRow(
+        "full",
+        "geometry, physical drive trains and stick-slip base; of posture means geometry with compliance and backlash",
+        "full",
+        bundle=True,
+        means=True,
+    ),
 )
 MAIN = tuple(row.name for row in reversed(LADDER) if row.geometry == row.name)
 """Rows an estimate can be used by, the best first: those with a geometry of their own."""
+
+
+PARTS = ("base_frame", "drive_trains", "stick_slip")
+"""Models of an estimate that are no row: parameters beside a geometry."""
 
 
 def row_of(name: str) -> LadderRow:

@@ -2,7 +2,7 @@
 
 from calibration.evaluation.comparison import compare
 from calibration.evaluation.evaluate import evaluate
-from calibration.evaluation.ladder import Row, TrialErrors, Trials, ladder, row_entry, scored_errors
+from calibration.evaluation.ladder import Row, TrialErrors, ladder, row_entry, scored_errors
 from calibration.evaluation.marker_errors import PointRow, point_rows
 from calibration.evaluation.pose_errors import pose_errors
 from calibration.evaluation.results import Evaluation
@@ -13,7 +13,6 @@ __all__ = [
     "PointRow",
     "Row",
     "TrialErrors",
-    "Trials",
     "compare",
     "evaluate",
     "ladder",

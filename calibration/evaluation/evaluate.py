@@ -25,8 +25,9 @@ from calibration.mocap.cluster_pose import point_of_means, poses_of, poses_of_me
 from calibration.mocap.labels import relabelled_trial
 from calibration.numerics.lie import inverse, mean, places, to_vector
 from calibration.prediction.foreign import check_names, registered
+from calibration.prediction.predict import predictor
 from calibration.prediction.predicted_trial import PredictedTrial, Prediction
-from calibration.prediction.predictor import Predictor, predictor
+from calibration.prediction.predictor import Predictor
 from calibration.prediction.second_session import registration_trials, reregistered
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans

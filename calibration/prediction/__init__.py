@@ -2,8 +2,8 @@
 
 from calibration.estimate.rows import BASELINE, LADDER, NOMINAL, LadderRow
 from calibration.prediction.compensator import Compensator
+from calibration.prediction.predict import predict
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction, read_predicted
-from calibration.prediction.predictor import predict
 from calibration.robot.hand_uncertainty import Session
 
 __all__ = [

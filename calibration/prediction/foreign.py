@@ -38,7 +38,7 @@ from calibration.verdict import Verdict
 
 _AXIS = "(x|y|z|rx|ry|rz)"
 _FREE = re.compile(  # of the contract, without effect on the hand's place
-    rf"(friction\.\w+\.(coulomb|viscous)|sigmoid\.\w+\.\w+|suspension\.\w+\.\w+|slip\.\w+\.\w+\.[kdc]|contact\.\w+\.\w+"
+    rf"(friction\.\w+\.(coulomb|viscous)|sigmoid\.\w+\.\w+|suspension\.\w+\.\w+|slip\.\w+(\.\w+\.[kdc])?|flexibility\.\w+\.kr?[xyz]|contact\.\w+\.\w+"
     rf"|link\.\w+\.(mass|cx|cy|cz)|payload\.(mass|cx|cy|cz)|marker\.\w+\.[xyz]|plate\.\w+\.\w+"
     rf"|clock\.\w+\.(offset|drift)|frame\.\w+\.\w+\.{_AXIS}|encoder\.\w+\.(motor|link)\.(offset|cos1|sin1|cos2|sin2)"
     rf"|gear\.\w+\.\w+|backlash\.\w+\.gap|drive\.\w+\.\w+)"

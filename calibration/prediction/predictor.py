@@ -8,47 +8,41 @@ T_lab_B, where the base's marker body is:      fixed      as in the first second
                                                measured   by its markers throughout
 q, readings the geometry is evaluated at:      motor      q_motor by the robot's clock; less the joint model in model_3
                                                link       link readings, their zero laid on the motor's
+Row `full` has link angles behind its drive trains, the column bent, and the base that sticks and slips in place of the
+suspension, where those were identified.
 
 Of a trial nothing else is read: encoders, plate, base markers of its first second (throughout where the base is
 `measured`), never hand or shoulder.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from functools import cache
-from typing import Literal
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from calibration.errors import NotCalibrated, NotEnoughData
-from calibration.estimate.estimate import Estimate
+from calibration.errors import NotEnoughData
 from calibration.estimate.rows import LADDER, NOMINAL, Base, Encoder, LadderRow, row_of
 from calibration.mocap.cluster_pose import poses_of, poses_of_means
-from calibration.mocap.labels import relabelled_trial, relabelled_trials
 from calibration.mocap.postures import dwell_windows, readings_at
 from calibration.numerics.lie import from_vector, mean
 from calibration.prediction.base_pose import BaseInTrial
-from calibration.prediction.foreign import places_hand
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction
 from calibration.recording.clock import Clock
-from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Description, Role, TrialEntry
+from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial
-from calibration.robot.chain import chain_of
-from calibration.robot.hand import HandModel, nominal_hand
-from calibration.robot.laboratory import Laboratory
-from calibration.robot.nominal_frames import nominal_frames
-from calibration.stages.clocks.stage import synchronise
-from calibration.stages.geometry.model_of_fit import hand_of
-from calibration.stages.joints.correction import Corrected, JointModels, correct, input_model
+from calibration.robot.hand import HandModel
+from calibration.stages.bundle.robot import BundledRobot
+from calibration.stages.joints.correction import Corrected, JointModels, correct
 from calibration.stages.joints.samples import aligned_link_readings, samples_of
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
 
 REFERENCE = 1.0  # [s] of rest at the start of every trial
-Side = Literal["motor", "corrected", "link"]  # readings the geometry is evaluated at
+T = TypeVar("T")
+Side = Literal["motor", "corrected", "bundled", "link"]  # readings the geometry is evaluated at
 
 
 @dataclass(frozen=True)
@@ -63,6 +57,7 @@ class Predictor:
         plate: Clock of the plate, None where there is none.
         suspension: None where there is none.
         joints: None where there is none.
+        bundled: Robot of the row with drive trains and a stick-slip base; None where there is none.
     """
 
     models: dict[str, HandModel]
@@ -72,40 +67,22 @@ class Predictor:
     plate: Clock | None = None
     suspension: Suspension | None = None
     joints: JointModels | None = None
+    bundled: BundledRobot | None = None
 
     def __call__(self, entry: TrialEntry, trial: Trial) -> PredictedTrial:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
         T_lab_B, corrected = self._measured_base(entry, trial), self._corrected(trial)
         still = np.broadcast_to(mean(_start(T_lab_B, trial)), T_lab_B.shape)
-        base, hands = self._base(entry, trial, still[0]), {id(hand): hand for hand in self.models.values()}
-
-        @cache
-        def in_base(hand: int, side: Side) -> np.ndarray:
-            return _known_poses(hands[hand].carrying(entry.payload), self._positions(side, trial, corrected))
-
-        @cache
-        def displaced(source: Source, hand: int) -> tuple[Rest, np.ndarray] | None:
-            if base is None or (source == "plate" and (self.plate is None or len(trial.t_plate) == 0)):
-                return None
-            rest = base.rest(from_vector(hands[hand].base))
-            return rest, base.displacement(source, rest)
-
-        def moved(source: Base, hand: int) -> np.ndarray | None:
-            if source == "measured" or source == "fixed":
-                return T_lab_B if source == "measured" else still
-            found = displaced(source, hand)
-            return None if found is None else found[0].poses(found[1])
-
+        poses = TrialPoses(self, entry, trial, T_lab_B, still, self._base(entry, trial, still[0]), corrected)
         rows = tuple(
-            Prediction(row.name, source, encoder, entry.id, entry.kind, trial.t_mocap, T @ in_base(id(hand), side))
-            for row, hand, encoder in self._rows()
-            for side in (self._side(row, encoder),)
+            Prediction(row.name, source, encoder, entry.id, entry.kind, trial.t_mocap, T @ poses.in_base(row, encoder))
+            for row, _, encoder in self._rows()
             for source in row.bases
-            if (T := moved(source, id(hand))) is not None
+            if (T := poses.base(row, source)) is not None
         )
         motion = None
-        if base is not None and NOMINAL in self.models:
-            found = [(source, displaced(source, id(self.models[NOMINAL]))) for source, _ in base.suspension.held_out]
+        if poses.loaded is not None and NOMINAL in self.models:
+            found = [(source, poses.displaced(source, NOMINAL)) for source, _ in poses.loaded.suspension.held_out]
             motion = _motion(T_lab_B, found)
         samples = tuple(self._samples(trial)) if entry.kind != "static" else ()
         return PredictedTrial(
@@ -132,20 +109,26 @@ class Predictor:
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times."""
-        side = self._side(row_of(name), encoder)
-        return self._positions(side, trial, self._corrected(trial) if side == "corrected" else None)
+        side = self.side(row_of(name), encoder)
+        return self.readings(side, trial, self._corrected(trial) if side == "corrected" else None)
 
-    def _side(self, row: LadderRow, encoder: Encoder) -> Side:
+    def side(self, row: LadderRow, encoder: Encoder) -> Side:
+        """Which readings the geometry of a row is evaluated at."""
+        if row.bundle and self.bundled is not None and self.bundled.trains.trains:
+            return "bundled"
         if self.joints is None or (encoder == "motor" and not row.joints):
             return "motor"
         return "link" if encoder == "link" else "corrected"
 
-    def _positions(self, side: Side, trial: Trial, corrected: Corrected | None) -> np.ndarray:
+    def readings(self, side: Side, trial: Trial, corrected: Corrected | None) -> np.ndarray:
+        """Readings (n, n_joints) [rad, m] of a side of the gears at the motion capture's times."""
         if self.robot is None or not len(trial.t_robot):
             raise NotEnoughData(f"{trial.id}: no joint readings on a known clock, so no hand pose can be predicted")
         readings = trial.q_motor
         if side == "link" and self.joints is not None:
             readings = aligned_link_readings(trial, self.joints.zero)
+        elif side == "bundled" and self.bundled is not None:
+            readings = self.bundled.link_readings(trial)
         elif side == "corrected" and corrected is not None:
             readings = corrected.q
         return readings_at(trial, self.robot, trial.t_mocap, readings)
@@ -183,11 +166,80 @@ class Predictor:
         return BaseInTrial(self.suspension, lab, trial, T_lab_B)
 
 
-def _known_poses(hand: HandModel, q: np.ndarray) -> np.ndarray:
-    """T_B_H (n, 4, 4) at q (n, n_joints), NaN where a reading is missing."""
-    T, known = np.full((len(q), 4, 4), np.nan), np.isfinite(q).all(axis=1)
-    T[known] = hand.poses(q[known])
-    return T
+@dataclass(frozen=True, eq=False)
+class TrialPoses:
+    """Poses in one trial, each computed once.
+
+    Attributes:
+        predictor: All that predicting takes.
+        entry: The trial's declaration.
+        trial: Its recording.
+        T_lab_B: (n, 4, 4) the base's marker body as measured.
+        still: (n, 4, 4) as in the first second.
+        loaded: The base on its suspension; None without one.
+        corrected: Readings corrected by the joint models; None without.
+    """
+
+    predictor: Predictor
+    entry: TrialEntry
+    trial: Trial
+    T_lab_B: np.ndarray
+    still: np.ndarray
+    loaded: BaseInTrial | None
+    corrected: Corrected | None
+    _known: dict[tuple[object, ...], Any] = field(default_factory=dict)
+
+    def in_base(self, row: LadderRow, encoder: Encoder) -> np.ndarray:
+        """T_B_H (n, 4, 4) of a row, NaN where a reading is missing."""
+        p, side = self.predictor, self.predictor.side(row, encoder)
+        hand = p.models[row.name]
+        return self._once(("in base", id(hand), side), lambda: self._in_base(hand, side))
+
+    def base(self, row: LadderRow, source: Base) -> np.ndarray | None:
+        """T_lab_B (n, 4, 4) of a row by a source of the base's motion; None where that was not recorded."""
+        if source == "measured" or source == "fixed":
+            return self.T_lab_B if source == "measured" else self.still
+        if source == "submitted":  # poses of another program, not predicted here
+            return None
+        if row.bundle and (T := self._once(("slipped", source), lambda: self._slipped(source))) is not None:
+            return T
+        found = self.displaced(source, row.name)
+        return None if found is None else found[0].poses(found[1])
+
+    def displaced(self, source: Source, model: str) -> tuple[Rest, np.ndarray] | None:
+        """Rest and displacement (n, 6) of the base by its suspension; None where the source was not recorded."""
+        hand = self.predictor.models[model]
+        return self._once(("displaced", source, id(hand)), lambda: self._displaced(source, hand))
+
+    def _in_base(self, hand: HandModel, side: Side) -> np.ndarray:
+        p = self.predictor
+        if side == "bundled" and p.bundled is not None and p.robot is not None:
+            return p.bundled.hand_in_base(self.trial, p.robot)
+        q = p.readings(side, self.trial, self.corrected)
+        T, known = np.full((len(q), 4, 4), np.nan), np.isfinite(q).all(axis=1)
+        T[known] = hand.carrying(self.entry.payload).poses(q[known])
+        return T
+
+    def _displaced(self, source: Source, hand: HandModel) -> tuple[Rest, np.ndarray] | None:
+        if self.loaded is None or not self._recorded(source):
+            return None
+        rest = self.loaded.rest(from_vector(hand.base))
+        return rest, self.loaded.displacement(source, rest)
+
+    def _slipped(self, source: Source) -> np.ndarray | None:
+        bundled = self.predictor.bundled
+        if self.loaded is None or bundled is None or not bundled.knows(source) or not self._recorded(source):
+            return None
+        sources = replace(self.loaded.wrenches, T_base_B=from_vector(bundled.hand.base))
+        return bundled.base_poses(sources, self.trial, source)
+
+    def _recorded(self, source: Source) -> bool:
+        return source != "plate" or (self.predictor.plate is not None and len(self.trial.t_plate) > 0)
+
+    def _once(self, key: tuple[object, ...], compute: Callable[[], T]) -> T:
+        if key not in self._known:
+            self._known[key] = compute()
+        return self._known[key]
 
 
 def _motion(T_lab_B: np.ndarray, found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]]) -> BaseMotion | None:
@@ -201,61 +253,3 @@ def _motion(T_lab_B: np.ndarray, found: Iterable[tuple[Source, tuple[Rest, np.nd
 
 def _start(T_lab_B: np.ndarray, trial: Trial) -> np.ndarray:
     return T_lab_B[trial.t_mocap <= trial.t_mocap[0] + REFERENCE]
-
-
-def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
-    """Prepare the prediction of a dataset's trials; the clock from its calibration trials if the estimate has none.
-
-    Raises:
-        NotCalibrated: The estimate must not be used.
-    """
-    if not estimate.calibrated:
-        raise NotCalibrated([v.message for v in estimate.verdicts if v.verdict == "refused"])
-    description = dataset.description
-    nominal_chain = chain_of(dataset.urdf, description)
-    frames = nominal_frames(nominal_chain, description)
-    chain = nominal_chain if estimate.urdf in (None, dataset.urdf) else chain_of(str(estimate.urdf), description)
-    estimated = {m.name: hand_of(m, chain, frames) for m in estimate.models}
-    nominal, models = nominal_hand(nominal_chain, frames), {}
-    for row in LADDER:
-        hand = nominal if row.geometry is None else estimated.get(row.geometry)
-        present = estimate.suspension is not None or not row.needs_suspension
-        if hand is not None and present and (estimate.joint_models or not row.joints):
-            models[row.name] = hand
-    own = (
-        m
-        for m in estimate.models
-        if m.name not in models and (places_hand(m, nominal_chain) or not estimate.registered)
-    )
-    models |= {model.name: estimated[model.name] for model in own}
-    robot = estimate.clock("robot")
-    trials = () if robot is not None else tuple(trial for _, trial in relabelled_trials(dataset, "calibration"))
-    if trials:
-        robot = next(
-            (c for c in synchronise(Laboratory(dataset.urdf, description), trials)[0] if c.instrument == "robot"), None
-        )
-    joints = None
-    corrected = next((models[row.name] for row in LADDER if row.joints and row.name in models), None)
-    if corrected is not None and estimate.joint_models:
-        inputs = input_model(Laboratory(dataset.urdf, description), corrected)
-        joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
-    return Predictor(models, dataset.urdf, description, robot, estimate.clock("plate"), estimate.suspension, joints)
-
-
-def predict(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[PredictedTrial]:
-    """Every trial of a role, read once and predicted by every row."""
-    prepared = predictor(estimate, dataset)
-    for entry in dataset.entries(role):
-        if dataset.has_means(entry):
-            means = dataset.read_means(entry)
-            yield PredictedTrial(
-                entry.id, entry.kind, np.arange(float(len(means))), tuple(prepared.of_means(entry, means))
-            )
-        else:
-            yield prepared(entry, relabelled_trial(dataset, entry))
-
-
-def predictions(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[Prediction]:
-    """Predicted hand poses of all trials of a role, trial by trial, row by row."""
-    for trial in predict(estimate, dataset, role):
-        yield from trial.rows

@@ -5,6 +5,7 @@ result = stage.run(data)            data is a value: a stage changes nothing tha
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model
@@ -15,6 +16,8 @@ from calibration.recording.schema import Kind
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.verdict import Verdict
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,7 @@ class StageInput:
         options: What was chosen.
         models: Estimated so far.
         rejected: Whether an earlier stage rejected its result.
+        quantities: What earlier stages estimated beside parameters of models.
     """
 
     lab: Laboratory
@@ -42,6 +46,11 @@ class StageInput:
     options: Options = field(default_factory=Options)
     models: tuple[Model, ...] = ()
     rejected: bool = False
+    quantities: tuple[object, ...] = ()
+
+    def quantity(self, kind: type[T]) -> T | None:
+        """What an earlier stage estimated, by its type; None where none did."""
+        return next((q for q in self.quantities if isinstance(q, kind)), None)
 
     def clock(self, instrument: str) -> Clock | None:
         """The clock of an instrument; None where it was not recorded or could not be estimated."""
@@ -76,7 +85,7 @@ class StageResult:
     Attributes:
         models: Rows of the estimate.
         findings: What is to be reported.
-        quantity: What the stage estimates beside parameters of models: a `Suspension`, `JointModels`.
+        quantity: What the stage estimates beside parameters of models: a `Suspension`, `JointModels`, `Bundle`.
     """
 
     models: tuple[Model, ...] = ()

@@ -14,7 +14,7 @@ from calibration.errors import NotEnoughData, ShapeError
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.postures import readings_at
 from calibration.numerics.lie import from_vector, inverse, mean, to_vector
-from calibration.prediction.predictor import predictor
+from calibration.prediction.predict import predictor
 from calibration.recording.clock import Clock
 from calibration.stages.joints.correction import velocities
 from scenarios import load, run, steps

@@ -11,7 +11,7 @@ import pytest
 from calibration import Compensator, Dataset, calibrate
 from calibration import load as opened
 from calibration.mocap.postures import dwell_windows, mean_poses, readings_at
-from calibration.prediction.predictor import predictor
+from calibration.prediction.predict import predictor
 from calibration.prediction.second_session import registration_postures, reregistered_compensator
 from calibration.robot.hand_uncertainty import Session
 from scenarios import load

@@ -127,7 +127,7 @@ def watch(event, arguments):
     if event == "open" and isinstance(arguments[0], str):
         name = arguments[0]
         if name.startswith({str(ROOT) + "/"!r}) and "/.venv/" not in name and not name.endswith((".py", ".pyc")):
-            if ".pyc." not in name:
+            if ".pyc." not in name and "__pycache__" not in name:  # numba looks for compiled kernels
                 print("opened", name)
 sys.addaudithook(watch)
 for name in {sorted(modules)!r}:

@@ -1,0 +1,68 @@
+"""Frozen dataclasses of numbers and arrays as plain JSON values, and back by their type hints.
+
+Arrays are nested lists, NaN is null. A class needs no code of its own to stand in estimate.json.
+"""
+
+from dataclasses import fields, is_dataclass
+from types import UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from calibration.errors import InputError
+
+T = TypeVar("T")
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON holds it.
+
+    Raises:
+        TypeError: It is of a kind that has no plain form.
+    """
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (tuple, list)):
+        return [plain(x) for x in value]
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    raise TypeError(f"{type(value).__name__} has no plain form")
+
+
+def restored(kind: type[T], value: Any, at: str = "") -> T:
+    """A value of a kind from its plain form.
+
+    Raises:
+        InputError: A field is missing or of another kind; `at` is where.
+    """
+    try:
+        return _restored(kind, value)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(at, f"is no {getattr(kind, '__name__', kind)}: {error!r}") from error
+
+
+def _restored(kind: Any, value: Any) -> Any:
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind is np.ndarray:
+        return np.array(_with_nan(value), dtype=float)
+    if kind is float:
+        return float("nan") if value is None else float(value)
+    if origin in (Union, UnionType):
+        return None if value is None else _restored(next(a for a in arguments if a is not type(None)), value)
+    if origin is tuple:
+        kinds = [arguments[0]] * len(value) if arguments[-1:] == (Ellipsis,) else arguments
+        return tuple(_restored(k, x) for k, x in zip(kinds, value, strict=True))
+    if is_dataclass(kind):
+        hints = get_type_hints(kind)
+        return kind(**{f.name: _restored(hints[f.name], value[f.name]) for f in fields(kind) if f.init})  # type: ignore[operator]
+    if origin is Literal and value not in arguments:
+        raise ValueError(f"{value!r} is none of {arguments}")
+    return value
+
+
+def _with_nan(value: Any) -> Any:
+    return [_with_nan(x) for x in value] if isinstance(value, list) else np.nan if value is None else value

@@ -1,0 +1,92 @@
+"""The robot of row `full` in use.
+
+T_lab_H(t) = T_lab_B(t)  T_B_H(q_link(t), M(t))        q_link  readings behind the drive trains
+M       moment that bends the column
+T_lab_B(t)  marker body of the base that sticks and slips, from its first second and a wrench
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+from calibration.robot.hand import HandModel
+from calibration.stages.drive_trains.column_bending import ColumnBending
+from calibration.stages.drive_trains.drive_train import DriveTrain
+from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.geometry_refit import corrected_trial, hand_poses
+from calibration.stages.drive_trains.torques import dynamics
+from calibration.stages.stick_slip.model import StickSlip
+from calibration.stages.stick_slip.poses import slipping_base_poses
+from calibration.stages.suspension.base_response import WrenchSources
+from calibration.stages.suspension.model import Source
+
+
+@dataclass(frozen=True)
+class BundleParts:
+    """What row `full` has beside the parameters of its geometry, as estimate.json holds it.
+
+    Attributes:
+        trains: Drive trains of the joints that have one.
+        offset: (k,) zeros of the motor readings [rad, m].
+        bending: Of the column.
+        stick_slip: The base; None where it was not identified.
+    """
+
+    trains: tuple[DriveTrain, ...]
+    offset: np.ndarray
+    bending: ColumnBending
+    stick_slip: StickSlip | None
+
+
+@dataclass(frozen=True)
+class BundledRobot:
+    """The robot with its drive trains, in a laboratory.
+
+    Attributes:
+        hand: Its geometry.
+        trains: Its drive trains with the dynamics that load them; none where none was identified.
+        bending: Of the column.
+        stick_slip: Its base; None where it was not identified.
+    """
+
+    hand: HandModel
+    trains: DriveTrains
+    bending: ColumnBending
+    stick_slip: StickSlip | None
+
+    @classmethod
+    def of(cls, hand: HandModel, parts: BundleParts, urdf: str, description: Description) -> "BundledRobot":
+        """The robot from what was saved of it."""
+        zero = np.zeros(len(parts.offset))
+        loads = dynamics(urdf, description, parts.offset)
+        trains = DriveTrains(loads, parts.trains, zero, urdf, description)
+        return cls(hand, trains, parts.bending, parts.stick_slip)
+
+    def hand_in_base(self, trial: Trial, robot: Clock) -> np.ndarray:
+        """T_B_H (n, 4, 4) at a trial's mocap times by its motor readings, NaN where one is missing.
+
+        The base is taken to be level and at rest: none of its markers is read.
+        """
+        return hand_poses(self.hand, self.bending, corrected_trial(self.trains, trial, None, self.hand), robot)
+
+    def link_readings(self, trial: Trial) -> np.ndarray:
+        """(n, k) link angles in place of a trial's motor readings, NaN where one is missing [rad, m]."""
+        return corrected_trial(self.trains, trial, None, self.hand).trial.q_motor
+
+    def knows(self, source: Source) -> bool:
+        """Whether the base's motion was identified from that source."""
+        return self.stick_slip is not None and source in [d.source for d in self.stick_slip.directions]
+
+    def base_poses(self, sources: WrenchSources, trial: Trial, source: Source) -> np.ndarray:
+        """T_lab_B (n, 4, 4) from the first second of a trial and a wrench.
+
+        Raises:
+            NotEnoughData: The wrench was not recorded, or the base was not identified.
+        """
+        if self.stick_slip is None:
+            raise NotEnoughData(f"{trial.id}: no base that slips was identified")
+        return slipping_base_poses(self.stick_slip, sources, trial, source).T_lab_B

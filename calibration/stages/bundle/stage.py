@@ -1,0 +1,133 @@
+"""Stage `bundle`: row `full` of the ladder.
+
+1  drive trains from motor and link readings of the calibration trials, beside the geometry found so far
+2  geometry again on link angles, static postures and moving trials together, bending of the column taken off
+3  the base that sticks and slips, its markers placed by that geometry
+
+Each part is estimated with the others at their estimates.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.inference.parameters import Model, Parameter
+from calibration.numerics.lie import from_vector
+from calibration.recording.clock import Clock
+from calibration.recording.trial import Trial
+from calibration.robot.hand import HandModel
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.bundle.robot import BundleParts
+from calibration.stages.drive_trains.column_bending import rigid
+from calibration.stages.drive_trains.drive_train import Quantity
+from calibration.stages.drive_trains.geometry_refit import refit_geometry
+from calibration.stages.drive_trains.stage import fit_drive_trains
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
+from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
+from calibration.stages.stick_slip.stage import fit_stick_slip
+from calibration.stages.suspension.base_response import WrenchSources
+from calibration.stages.suspension.model import Suspension
+from calibration.verdict import Verdict
+
+STAGE = "bundle"
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Row `full`.
+
+    Attributes:
+        geometry: Fitted to link angles; the geometry found before where there are no drive trains.
+        quantities: Of the drive trains and the column.
+        parts: What predictions take beside the geometry.
+    """
+
+    geometry: Model
+    quantities: tuple[Quantity, ...]
+    parts: BundleParts
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """Parameters of all parts: `drive_trains`, `stick_slip`, and last the geometry, `full`."""
+        return (*self._parts(), self.geometry)
+
+    def _parts(self) -> Iterator[Model]:
+        if self.quantities:
+            known = [q for q in self.quantities if np.isfinite(q.value) and np.isfinite(q.sigma)]
+            own = tuple(Parameter(q.name, q.unit, 0.0, q.value, q.sigma, q.status) for q in known)
+            yield Model("drive_trains", own, covariance=np.diag([p.sigma**2 for p in own]))
+        if self.parts.stick_slip is not None:
+            wheels, first = self.parts.stick_slip.wheels, self.parts.stick_slip.directions[0]
+            yield Model("stick_slip", wheel_parameters(wheels, first), covariance=covariance_of(wheels, first))
+
+
+def fit_bundle(
+    lab: Laboratory,
+    trials: Sequence[Trial],
+    clocks: tuple[Clock, Clock | None],
+    geometry: Model,
+    suspension: Suspension | None,
+) -> tuple[Bundle, tuple[Verdict, ...]]:
+    """Row `full` from moving and static trials.
+
+    Args:
+        lab: The nominal robot and its setup.
+        trials: Calibration trials in which the base is not driven.
+        clocks: Of robot and plate, None where there is no plate.
+        geometry: The geometry found so far.
+        suspension: For heave and tilt; without one the base is not identified.
+    """
+    (robot, plate), chain, description = clocks, lab.chain, lab.description
+    hand = hand_of(geometry, chain, lab.nominal_frames)
+    trains, findings = fit_drive_trains(lab.urdf, description, trials, robot, hand)
+    bending, quantities, found = rigid(chain.joints[0]), trains.parameters, list(findings)
+    geometry = replace(geometry, name="full")
+    if trains.trains:
+        refitted = refit_geometry(chain, description, trials, robot, hand, trains)
+        geometry, bending, trains = refitted.model, refitted.bending, refitted.trains
+        hand = refitted.hand(chain)
+        link = next(body.link for body in description.bodies if body.name == description.base_body.name)
+        quantities = (*quantities, *bending.parameters(_carried_link(lab, link)))
+    base = None
+    if suspension is not None:
+        sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
+        base, more = fit_stick_slip(sources, trials, suspension)
+        found += more
+    parts = BundleParts(trains.trains, _offsets(hand), bending, base)
+    return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
+
+
+def _offsets(hand: HandModel) -> np.ndarray:
+    """(k,) zeros of the measured joints [rad, m]."""
+    offset = np.zeros(len(hand.chain.measured))
+    offset[hand.chain.columns] = hand.offset
+    return offset
+
+
+def _carried_link(lab: Laboratory, base_link: str) -> str:
+    """Link of the marker body that the column carries; the base's where there is none."""
+    known = (lab.description.base_body.name, lab.description.hand_body.name)
+    return next((body.link for body in lab.description.bodies if body.name not in known), base_link)
+
+
+def _run(data: StageInput) -> StageResult:
+    geometry, robot = data.model("full") or data.model("model_2"), data.clock("robot")
+    if data.rejected or geometry is None:
+        return StageResult()
+    if robot is None:
+        raise NotEnoughData("no robot clock")
+    suspension = data.quantity(Suspension)
+    found, findings = fit_bundle(data.lab, data.trials, (robot, data.clock("plate")), geometry, suspension)
+    return StageResult(found.models, findings, found)
+
+
+def _lacks(data: StageInput) -> str:
+    if data.clock("robot") is None:
+        return "posture means show no motion; record motor and link readings continuously"
+    return has_postures(data)
+
+
+BUNDLE = Stage(STAGE, _run, _lacks, needs="geometry")

@@ -1,0 +1,32 @@
+"""Drive trains of the joints: backlash, compliance, friction and encoder errors, identified and used.
+
+fit_drive_trains      motor minus link readings of the calibration trials -> DriveTrains
+with_hand_markers     joints without a link encoder, from the hand's markers
+DriveTrains           motor readings -> link angles with intervals
+refit_geometry        the geometry on link angles, with the bending of the arm's column
+hand_poses            a trial's corrected readings -> poses of the hand
+stream_of             the same sample by sample
+"""
+
+from calibration.stages.drive_trains.column_bending import ColumnBending, bent
+from calibration.stages.drive_trains.drive_train import DriveTrain, Quantity
+from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
+from calibration.stages.drive_trains.from_markers import with_hand_markers
+from calibration.stages.drive_trains.geometry_refit import corrected_trial, hand_poses, refit_geometry
+from calibration.stages.drive_trains.stage import fit_drive_trains
+from calibration.stages.drive_trains.streaming import stream_of
+
+__all__ = [
+    "ColumnBending",
+    "DriveTrain",
+    "DriveTrains",
+    "LinkAngles",
+    "Quantity",
+    "bent",
+    "corrected_trial",
+    "fit_drive_trains",
+    "hand_poses",
+    "refit_geometry",
+    "stream_of",
+    "with_hand_markers",
+]

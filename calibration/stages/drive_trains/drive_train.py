@@ -1,0 +1,205 @@
+"""Drive train of one joint: motor reading in, link angle and its interval out.
+
+    q_link = q_motor - offset - e_m(theta) - delta            e(theta) = cos1 cos + sin1 sin + cos2 cos 2 + sin2 sin 2
+    link reading = q_link + offset_l + e_l(theta)             phases in the joint's angle theta
+
+delta is the state of the dead zone (`link_motion`). Where the motion before the first reading is unknown, delta is
+anywhere in what friction holds at rest, [D(tau - f_c), D(tau + f_c)]: both ends are carried along, and what is between
+them is the interval of the link's angle. They meet once the drive has been moved through its gap or its load has
+decided the side. A torque that is wrong by two standard deviations either way widens the interval where it would change
+the side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from calibration.stages.drive_trains.link_motion import (
+    COMPLIANCE,
+    COULOMB,
+    HALF_GAP,
+    Drive,
+    deflection,
+    played,
+    simulated,
+)
+from calibration.stages.drive_trains.torques import LinkLoads
+
+Form = Literal["dead_zone", "friction_held"]
+Status = Literal["estimated", "not_identifiable"]
+VALUES = ("half_gap", "compliance", "coulomb", "viscous", "relaxation", "spring", "slip")
+HARMONICS = ("cos1", "sin1", "cos2", "sin2")
+LONGEST = 3.4e-3  # [s] step of the link's motion
+_RIGID = 1e-7  # [rad/(N.m)] least compliance that is simulated
+LIGHT = 1e-5  # [kg.m2] least inertia
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter of a drive train.
+
+    Attributes:
+        name: As in the contract.
+        unit: SI.
+        value: Estimate.
+        sigma: Standard deviation, priors included.
+        status: Whether the data fix it.
+        remedy: The motion that would, where they do not.
+    """
+
+    name: str
+    unit: str
+    value: float
+    sigma: float
+    status: Status
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class DriveTrain:
+    """Drive train of one joint.
+
+    Attributes:
+        joint: Name.
+        form: `dead_zone`: the load decides the side; `friction_held`: motion does, and the mesh slips.
+        values: (7,) half gap [rad], compliance [rad/(N.m)], Coulomb [N.m] and viscous [N.m.s/rad] friction, relaxation
+            time of the contact [s], spring [N.m/rad] and slip [N.m] of the mesh's friction.
+        link_inertia: Of the output gear, beside the nominal links' [kg.m2].
+        dynamic: Whether the link's inertia counts; else delta follows the torque at once.
+        motor: (4,) eccentricity of the motor encoder at the joint, cos1, sin1, cos2, sin2 [rad].
+        link: (5,) offset of the link encoder from the motor's, and its eccentricity [rad]; NaN without one.
+        start: Share of [D(tau - f_c), D(tau + f_c)] at which trials start, mean and standard deviation [-].
+        torque_sigma: Standard deviation of the torque at which the side changes [N.m].
+        residual: Rms that trials left out kept of what the model explains [rad].
+        inertials: (p,) masses and first moments, less the nominal ones, that this joint's load speaks for, in the order
+            of `torques.inertials` [kg, kg.m]; empty: nominal.
+        parameters: What is reported, with standard deviations.
+    """
+
+    joint: str
+    form: Form
+    values: np.ndarray
+    link_inertia: float = 0.0
+    dynamic: bool = True
+    motor: np.ndarray = field(default_factory=lambda: np.zeros(4))
+    link: np.ndarray = field(default_factory=lambda: np.full(5, np.nan))
+    start: tuple[float, float] = (0.5, 0.3)
+    torque_sigma: float = 0.05
+    residual: float = 0.0
+    inertials: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    parameters: tuple[Quantity, ...] = ()
+
+    @property
+    def gap(self) -> float:
+        """Total backlash [rad]."""
+        return 2.0 * float(self.values[HALF_GAP])
+
+    def backlash(self, drive: "DriveMotion", starts: np.ndarray | None = None) -> "Deflection":
+        """delta in trials; `starts` (m,) are delta at their first samples [rad], where they are known."""
+        torque = drive.torque + self.link_inertia * drive.a
+        if starts is not None:
+            found = self.deltas(drive, torque, starts)
+            return Deflection(found, found, found)
+        low, high = self.ends(torque[drive.begins[:-1]])
+        likely = self.deltas(drive, torque, low + self.start[0] * (high - low))
+        others = [likely]
+        for off in (-2.0 * self.torque_sigma, 2.0 * self.torque_sigma):
+            shift = self.values[COMPLIANCE] * off  # of a mesh in contact, and no doubt about its side
+            for start in self.ends(torque[drive.begins[:-1]] + off):
+                others.append(self.deltas(drive, torque + off, start) - shift)
+        return Deflection(likely, np.min(others, axis=0), np.max(others, axis=0))
+
+    def at_rest(self, torque: float) -> tuple[float, float]:
+        """Least and largest delta [rad] at which friction holds the link under a torque [N.m]."""
+        g, c, f = self.values[HALF_GAP], self.values[COMPLIANCE], self.values[COULOMB]
+        return deflection(torque - f, g, c), deflection(torque + f, g, c)
+
+    def ends(self, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`at_rest` at torques (m,) [N.m], (m,) each."""
+        low, high = np.array([self.at_rest(float(x)) for x in torque]).reshape(-1, 2).T
+        return low, high
+
+    def harmonics(self, angle: np.ndarray) -> np.ndarray:
+        """Eccentricity e_m (n,) [rad] of the motor encoder at joint angles (n,) [rad]."""
+        return harmonic_terms(angle) @ self.motor
+
+    def deltas(
+        self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
+    ) -> np.ndarray:
+        """delta (n,) [rad] under torques (n,) [N.m], from `starts` (m,) where trials begin; steps of `longest` [s]."""
+        if not self.dynamic and self.form == "dead_zone":
+            own = Drive(drive.t, drive.q, drive.v, torque, drive.inertia)
+            return np.asarray(played(own, drive.begins, starts, self.values))
+        inertia = self.moved_inertia(drive.inertia)
+        own = Drive(drive.t, drive.q, drive.v, torque, inertia)
+        return np.asarray(simulated(own, drive.begins, starts, longest, self.simulated_values))
+
+    def moved_inertia(self, nominal: np.ndarray) -> np.ndarray:
+        """What the mesh moves (n,) [kg.m2], as the simulation has it, where it nominally moves (n,)."""
+        inertia = np.maximum(nominal + self.link_inertia, LIGHT)
+        return inertia if self.dynamic else np.full(len(nominal), LIGHT)
+
+    @property
+    def simulated_values(self) -> np.ndarray:
+        """`values` with a compliance that can be simulated."""
+        values = self.values.copy()
+        values[COMPLIANCE] = max(values[COMPLIANCE], _RIGID)
+        return values
+
+
+@dataclass(frozen=True)
+class DriveMotion:
+    """What one motor did in m trials of n samples in all, in a row, and what loads it; all (n,) unless said otherwise.
+
+    Attributes:
+        t: [s].
+        q: Motor readings [rad].
+        v: [rad/s].
+        a: [rad/s2].
+        torque: Of the link's motion if it followed the motor [N.m].
+        inertia: The mesh moves [kg.m2].
+        begins: (m + 1,) first sample of each trial, and n.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    torque: np.ndarray
+    inertia: np.ndarray
+    begins: np.ndarray
+
+
+def drive_motion(loads: Sequence[LinkLoads], column: int, inertials: np.ndarray | None = None) -> DriveMotion:
+    """Motion of a joint in trials, with other masses and first moments (p,) where they are given."""
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(of_trial, name)[:, column] for of_trial in loads])
+
+    t, torque = np.concatenate([of_trial.t for of_trial in loads]), joined("torque")
+    if inertials is not None:
+        torque = torque + joined("regressor") @ inertials
+    begins = np.cumsum([0, *(len(of_trial.t) for of_trial in loads)])
+    return DriveMotion(t, joined("q"), joined("v"), joined("a"), torque, joined("inertia"), begins)
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """delta of a joint.
+
+    Attributes:
+        value: (n,) most likely [rad].
+        low: (n,) least.
+        high: (n,) largest.
+    """
+
+    value: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def harmonic_terms(angle: np.ndarray) -> np.ndarray:
+    """cos, sin, cos 2, sin 2 (n, 4) of angles (n,) [rad]."""
+    return np.stack([np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)], axis=1)

@@ -1,0 +1,125 @@
+"""Drive train of a joint without a link encoder, from the hand's markers through the chain.
+
+    r(t) = log6( (Q^-1 T_measured)^-1 T_B_H(q) ) = J_j delta_j(t) + geometry, noise         q of other joints corrected
+    y_j = (J_j' W J_j)^-1 J_j' W r        W^-1  covariance of the two marker bodies' poses
+
+y_j takes the place of motor minus link reading: the same fit, windows weighted by what the markers say of this joint
+there. The zero and the eccentricity that it finds are the motor encoder's beside the geometry.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.mocap.cluster_pose import poses_of
+from calibration.numerics.lie import adjoint, inverse, log6
+from calibration.recording.clock import Clock
+from calibration.recording.trial import Trial
+from calibration.robot.hand import HandModel
+from calibration.stages.drive_trains.drive_train import DriveTrain
+from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.identification import identify, load_modes
+from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
+from calibration.stages.drive_trains.stage import DEFLECTION, loads_of_trial
+from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances
+
+_FLOOR = 1e-4  # [rad] a joint's angle is known to through the chain, however long its levers
+
+
+@dataclass(frozen=True)
+class SeenJoint:
+    """What the markers say of a joint in a trial, all (n,) at the readings' times.
+
+    Attributes:
+        y: Motor reading less the joint's angle [rad], NaN where the hand is not seen.
+        variance: Of it, one sample [rad2].
+    """
+
+    y: np.ndarray
+    variance: np.ndarray
+
+
+def with_hand_markers(
+    trains: DriveTrains, trials: Sequence[Trial], robot: Clock, hand: HandModel, joints: Sequence[str] | None = None
+) -> DriveTrains:
+    """The drive trains with those of further joints (of all revolute ones that have none), by the hand's markers."""
+    have = [train.joint for train in trains.trains]
+    others = [j for j in hand.chain.joints if not hand.chain.is_prismatic(j) and j not in have]
+    found = trains
+    for joint in others if joints is None else joints:
+        train = identified_by_markers(found, joint, trials, robot, hand)
+        kept = [t for t in found.trains if t.joint != joint]
+        order = sorted([*kept, train], key=lambda t: trains.joints.index(t.joint))
+        found = replace(found, trains=tuple(order))
+    return found
+
+
+def identified_by_markers(
+    trains: DriveTrains, joint: str, trials: Sequence[Trial], robot: Clock, hand: HandModel
+) -> DriveTrain:
+    """The drive train of one joint; the other joints are corrected by those there are.
+
+    Raises:
+        NotEnoughData: No trial shows the hand.
+    """
+    bare = replace(trains, trains=tuple(t for t in trains.trains if t.joint != joint))
+    j = trains.joints.index(joint)
+    loads, seen = [], []
+    for trial in trials:
+        load = loads_of_trial(bare, trial, robot, hand)
+        try:
+            seen.append(seen_joint(bare, load, trial, robot, hand, joint))
+        except NotEnoughData:
+            continue
+        loads.append(load)
+    if not loads:
+        raise NotEnoughData(f"no calibration trial shows base and hand: {joint} has neither link encoder nor markers")
+    tolerances = trains.description.tolerances
+    C = inertial_tolerances(trains.dynamics, tolerances.link_mass, tolerances.link_com)
+    modes = load_modes(loads, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
+    data, coarse = (_data(loads, seen, j, modes, window) for window in (WINDOW, COARSE))
+    found = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))
+    names = [q for q in found.parameters if ".link." not in q.name]
+    return replace(found, link=np.full(5, np.nan), parameters=tuple(names))
+
+
+def seen_joint(
+    trains: DriveTrains, loads: LinkLoads, trial: Trial, robot: Clock, hand: HandModel, joint: str
+) -> SeenJoint:
+    """Motor reading less joint angle of a joint as the hand's markers show it, other joints as `trains` has them."""
+    bodies = trains.description.base_body, trains.description.hand_body
+    base, other = (poses_of(body, trial) for body in bodies)
+    T = inverse(base.T) @ other.T
+    Ad = adjoint(inverse(T))
+    C = (other.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)) * trains.description.sigmas.marker**2
+    have = np.isin(trains.joints, [train.joint for train in trains.trains])
+    q = trains.of_loads(loads).q + np.where(have, trains.zero, 0.0)  # as the geometry on bare readings has them
+    at = np.stack([np.interp(robot.from_mocap(trial.t_mocap), loads.t, column) for column in q.T], axis=1)
+    known = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2))
+    if known.sum() < 2:
+        raise NotEnoughData(f"{trial.id}: the hand is not seen")
+    y, variance = np.full(len(T), np.nan), np.full(len(T), np.nan)
+    r = log6(inverse(T[known]) @ hand.poses(at[known]))
+    J = hand.joint_jacobians(at[known])[:, :, hand.chain.joints.index(joint)]
+    WJ = np.linalg.solve(C[known], J[..., None])[..., 0]
+    information = (J * WJ).sum(axis=1)
+    y[known], variance[known] = (WJ * r).sum(axis=1) / information, 1.0 / information
+    t = robot.to_mocap(loads.t)
+    near = np.clip(np.searchsorted(trial.t_mocap, t), 0, len(t) - 1)
+    rows = np.flatnonzero(known)
+    found = np.interp(t, trial.t_mocap[rows], y[rows])
+    hidden = ~known[np.minimum(near, len(known) - 1)] | (t < trial.t_mocap[0]) | (t > trial.t_mocap[-1])
+    return SeenJoint(np.where(hidden, np.nan, found), np.interp(t, trial.t_mocap[rows], variance[rows]))
+
+
+def _data(
+    loads: Sequence[LinkLoads], seen: Sequence[SeenJoint], column: int, modes: np.ndarray, window: float
+) -> JointData:
+    k = loads[0].q.shape[1]
+    differences = [np.tile(s.y[:, None], (1, k)) for s in seen]
+    data = joint_data(loads, differences, column, modes, window)
+    count = np.diff(np.append(data.first, len(data.motion.t)))
+    variance = data.means(np.concatenate([s.variance for s in seen])) / count + _FLOOR**2
+    return replace(data, weight=np.median(variance) / variance)

@@ -1,0 +1,157 @@
+"""The geometry fitted to link angles: readings corrected by the drive trains, the column's bending taken off.
+
+    r = log6( (Q(n)^-1 T_measured)^-1 T_B_H(q_link, theta) )            Q  motion of what the column carries
+
+Static postures of all calibration trials, and some a second of those in which the arm moves, in one problem of the
+existing solver: base and hand frames, placements and zeros; joints' own random errors, as the evidence has them. Where
+the side of a mesh is not known, its interval widens the posture's covariance along that joint.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.inference.parameters import Model
+from calibration.mocap.postures import Postures, dwell_windows, passing_postures, readings_at, static_postures
+from calibration.numerics.lie import inverse
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+from calibration.robot.chain import Chain
+from calibration.robot.hand import HandModel
+from calibration.robot.nominal_frames import nominal_frames
+from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
+from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
+from calibration.stages.drive_trains.stage import loads_of_trial
+from calibration.stages.drive_trains.torques import LinkLoads
+from calibration.stages.geometry.hand_residual import NoiseModel
+from calibration.stages.geometry.model_of_fit import hand_of, model_of
+from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
+from calibration.stages.geometry.stage import fit_robustly
+
+_SPACING = 0.5  # [s] between postures of a motion
+_READING = 0.05  # of the datasheet's backlash: random error of a corrected reading to begin with
+_HAND = np.array([2e-4, 4e-4])  # random errors of the hand's position [m] and rotation [rad] to begin with
+_MOVES = 0.05  # [rad, m] of any joint: a trial in which the arm moves
+
+
+@dataclass(frozen=True)
+class CorrectedTrial:
+    """A trial with its readings corrected.
+
+    Attributes:
+        trial: The recording; `q_motor` are link angles, NaN where a reading was.
+        loads: That corrected them.
+        angles: The link angles with their intervals, at the loads' times.
+    """
+
+    trial: Trial
+    loads: LinkLoads
+    angles: LinkAngles
+
+
+@dataclass(frozen=True)
+class RefittedGeometry:
+    """The geometry of row `full`, the column that bends, and the drive trains with the zeros that go with them.
+
+    Attributes:
+        model: Parameters of the geometry.
+        bending: Of the column.
+        trains: The drive trains; `dynamics.offset` are the new zeros.
+    """
+
+    model: Model
+    bending: ColumnBending
+    trains: DriveTrains
+
+    def hand(self, chain: Chain) -> HandModel:
+        """The robot with this geometry."""
+        return hand_of(self.model, chain, nominal_frames(chain, self.trains.description))
+
+
+def refit_geometry(
+    chain: Chain, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, trains: DriveTrains
+) -> RefittedGeometry:
+    """The geometry on link angles of the calibration trials; `hand` is the one the drive trains were fitted with."""
+    corrected = [corrected_trial(trains, trial, robot, hand) for trial in trials]
+    bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
+    parts = list(_postures(description, corrected, robot, hand, bending))
+    postures = parts[0]
+    for part in parts[1:]:
+        postures = postures.joined(part)
+    parameters = geometry_parameters(chain, description)
+    play, floor = _READING * reading_sigma(chain, description), reading_floor(chain, description)
+    errors = NoiseModel(np.maximum(play, floor), floor, _HAND[: postures.components // 3])
+    found = fit_robustly(hand_model(chain, nominal_frames(chain, description)), parameters, postures, errors)
+    model = model_of("full", chain, parameters, found.fit)
+    fitted = hand_of(model, chain, nominal_frames(chain, description))
+    offset = np.array(trains.dynamics.offset)
+    offset[chain.columns] = fitted.offset
+    return RefittedGeometry(model, bending, trains.with_offset(offset))
+
+
+def corrected_trial(trains: DriveTrains, trial: Trial, robot: Clock | None, hand: HandModel) -> CorrectedTrial:
+    """A trial with link angles in place of its motor readings; without the clock no base marker is read."""
+    loads = loads_of_trial(trains, trial, robot, hand)
+    angles = trains.of_loads(loads)
+    q = np.full(trial.q_motor.shape, np.nan)
+    q[np.isfinite(trial.q_motor).all(axis=1)] = angles.q
+    return CorrectedTrial(replace(trial, q_motor=q), loads, angles)
+
+
+def hand_poses(hand: HandModel, bending: ColumnBending, corrected: CorrectedTrial, robot: Clock) -> np.ndarray:
+    """T_B_H (n, 4, 4) at the trial's mocap times, NaN where it has no readings."""
+    trial = corrected.trial
+    q = readings_at(trial, robot, trial.t_mocap, trial.q_motor)
+    moment = _at(corrected, robot, trial.t_mocap)
+    known = np.isfinite(q).all(axis=1)
+    T = np.full((len(q), 4, 4), np.nan)
+    T[known] = bent(hand, bending, q[known], moment[known])
+    return T
+
+
+def _at(corrected: CorrectedTrial, robot: Clock, t: np.ndarray) -> np.ndarray:
+    """Moments (n, 2) of the column at mocap times (n,)."""
+    s = robot.from_mocap(t)
+    return np.stack([np.interp(s, corrected.loads.t, m) for m in corrected.loads.moment.T], axis=1)
+
+
+def _postures(
+    description: Description, corrected: Sequence[CorrectedTrial], robot: Clock, hand: HandModel, bending: ColumnBending
+) -> Iterator[Postures]:
+    """Static postures, then those passed."""
+    for one in corrected:
+        if len(one.trial.dwell_start):
+            yield from _widened(one, static_postures(description, [one.trial], robot), robot, hand, bending, True)
+        elif np.ptp(one.loads.q, axis=0).max() > _MOVES:
+            yield from _widened(
+                one, passing_postures(description, [one.trial], robot, _SPACING), robot, hand, bending, False
+            )
+
+
+def _widened(
+    one: CorrectedTrial, postures: Postures, robot: Clock, hand: HandModel, bending: ColumnBending, static: bool
+) -> Iterator[Postures]:
+    """Postures with bending taken off and covariances widened along joints whose side is not known."""
+    t = _times(one, postures, static)
+    s = robot.from_mocap(t)
+    k = np.clip(np.searchsorted(one.loads.t, s), 0, len(one.loads.t) - 1)
+    variance = (one.angles.high - one.angles.low)[k] ** 2 / 12.0
+    Q = moved(hand, bending, postures.q, _at(one, robot, t))
+    J = hand.joint_jacobians(postures.q)
+    along = J * variance[:, None, hand.chain.columns]
+    wide = along @ np.swapaxes(J, 1, 2)
+    n = postures.components
+    yield replace(
+        postures, T_base_hand=inverse(Q) @ postures.T_base_hand, covariance=postures.covariance + wide[:, :n, :n]
+    )
+
+
+def _times(one: CorrectedTrial, postures: Postures, static: bool) -> np.ndarray:
+    """Mocap times (n,) of postures, by their labels."""
+    if static:
+        middle = dwell_windows(one.trial).mean(axis=1)
+        return np.array([middle[int(str(name).rsplit(" ", 1)[1])] for name in postures.label])
+    after = [float(str(name).rsplit(" at ", 1)[1].split(" ")[0]) for name in postures.label]
+    return one.trial.t_mocap[0] + np.array(after)

@@ -1,0 +1,174 @@
+"""From one joint's trials to its drive train: modes of its load, form, parameters, and how sure its side is.
+
+The torque of a joint is known as well as masses and centres of mass are; its largest modes over the trials' samples,
+R S = U D V' with S S' the covariance of the inertial parameters, are estimated with the drive train. What no mode holds
+- coupled links, friction that is not quite Coulomb's - leaves the load unknown to a share of the friction, or to some
+hundredths of a newton metre: as `torque_sigma` it decides where the side of a mesh is called known.
+
+The form that holds is the one that predicts trials left out best:
+
+    score = 1 / c sum_t n_t log s_t        s_t  size of what a fit without trial t leaves of trial t
+
+A fit without a trial is one Gauss-Newton step from the fit of all. c windows hang together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.stages.drive_trains.drive_train import DriveTrain
+from calibration.stages.drive_trains.joint_data import JointData
+from calibration.stages.drive_trains.link_motion import COULOMB
+from calibration.stages.drive_trains.quantities import reported, uncertainty
+from calibration.stages.drive_trains.torques import LinkLoads
+from calibration.stages.drive_trains.train_fit import (
+    FLOORS,
+    GAMMA_INFORMATION,
+    Problem,
+    TrainFit,
+    derivatives,
+    fit_train,
+    prior_of,
+    sizes,
+    weights,
+)
+
+_MOST, _LEAST = 4, 0.02  # modes, and the least torque [N.m rms] one is worth
+_THINNED = 10  # samples between those the modes are of
+_FRICTION, _TORQUE = 0.15, 0.045  # share of the friction, and [N.m], to which a load is not known
+_SPREAD = 0.15  # least standard deviation of where trials start [-]
+_GAPS = (0.0, 0.2, 0.35, 0.45)  # of the discrepancy's spread
+_SOFTNESS = (0.15, 0.5)  # of the prior
+_FRICTIONS = (0.15, 0.5)  # [N.m]
+_VISCOUS = 0.05  # [N.m.s/rad]
+_ROUGH, _FINE = FLOORS[:2], FLOORS[2:]
+_TRIED = 3
+_SLIPS = (0.1, 0.4, 2.0)  # [N.m]
+_HINT = 2.0  # cost that friction in the mesh must save at a glance
+_BETTER = 10.0  # score by which a richer form must win
+_DAMPED = 0.02  # share of the information that damps a step without a trial
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fit and how it predicts.
+
+    Attributes:
+        fit: Of all trials.
+        score: Of trials left out; less is better.
+        left_out: Rms of what is left of trials left out [rad].
+    """
+
+    fit: TrainFit
+    score: float
+    left_out: float
+
+
+def load_modes(loads: Sequence[LinkLoads], column: int, root: np.ndarray) -> np.ndarray:
+    """Directions (p, z) of the inertial parameters that move a joint's torque most; root (p, p) of their covariance."""
+    R = np.concatenate([of_trial.regressor[::_THINNED, column] for of_trial in loads]) @ root
+    _, size, V = np.linalg.svd(R, full_matrices=False)
+    z = min(_MOST, int((size / np.sqrt(len(R)) > _LEAST).sum()))
+    return np.asarray(root @ V[:z].T)
+
+
+def identify(
+    joint: str,
+    data: JointData,
+    coarse: JointData,
+    modes: np.ndarray,
+    backlash: float,
+    deflection: float,
+    motor_offset: float,
+) -> DriveTrain:
+    """The drive train of a joint; `modes` (p, z) as in its data, priors as `prior_of`, `coarse` as `best_train`."""
+    prior = prior_of(data, "dead_zone", backlash, deflection)
+    chosen = best_train(Problem(joint, data, prior), coarse, backlash, deflection)
+    fit = chosen.fit
+    train = replace(
+        fit.problem.train(fit.theta),
+        link=np.append(motor_offset - fit.gamma[0], -fit.gamma[1:]),
+        start=_start(fit),
+        residual=chosen.left_out,
+        inertials=modes @ fit.problem.modes(fit.theta),
+        torque_sigma=torque_sigma(float(fit.problem.train(fit.theta).values[COULOMB])),
+    )
+    return reported(train, fit, uncertainty(fit), motor_offset)
+
+
+def torque_sigma(coulomb: float) -> float:
+    """Standard deviation [N.m] of the torque at which a link with this friction [N.m] changes its side."""
+    return max(_FRICTION * coulomb, min(_TORQUE, 2.0 * _FRICTION * coulomb))
+
+
+def _start(fit: TrainFit) -> tuple[float, float]:
+    """Share of the gap at which trials start, mean and standard deviation."""
+    data, train = fit.problem.data, fit.problem.train(fit.theta)
+    torque = data.loaded(fit.problem.modes(fit.theta)).torque[data.motion.begins[:-1]]
+    low, high = train.ends(torque)
+    wide = high - low > train.values[0]
+    share = (data.started(fit.gamma) - low)[wide] / (high - low)[wide]
+    share = np.clip(share[np.isfinite(share)], 0.0, 1.0)
+    if len(share) < 2:
+        return 0.5, 0.3
+    return float(share.mean()), max(_SPREAD, float(share.std()))
+
+
+def best_train(problem: Problem, coarse: JointData, backlash: float, deflection: float) -> Candidate:
+    """The form that holds; priors as `prior_of`. The search begins with the joint's data in `coarse` windows."""
+    still, moving = (replace(problem, form="dead_zone", dynamic=dynamic) for dynamic in (False, True))
+    first = replace(moving, data=coarse)
+    roughly = [fit_train(first, theta, _ROUGH[:1], hasty=True) for theta in _starts(first)]
+    best = fit_train(first, min(roughly, key=lambda fit: fit.cost).theta, _ROUGH)
+    found = [judged(fit_train(problem, best.theta, _FINE)) for problem in (moving, still)]
+    plain = found[1] if found[1].score < found[0].score - _BETTER else found[0]
+    prior = prior_of(problem.data, "friction_held", backlash, deflection)
+    richer = Problem(problem.joint, problem.data, prior, "friction_held", True)
+    starts = [fit_train(richer, theta, ()) for theta in _with_friction(plain.fit.theta)]
+    likely = min(starts, key=lambda fit: fit.cost)
+    if likely.cost > fit_train(plain.fit.problem, plain.fit.theta, ()).cost - _HINT:
+        return plain
+    rough = fit_train(replace(richer, data=coarse), likely.theta, _ROUGH[1:])
+    held = judged(fit_train(richer, rough.theta, _FINE))
+    return held if held.score < plain.score - _BETTER else plain
+
+
+def judged(fit: TrainFit) -> Candidate:
+    """How a fit predicts trials left out."""
+    problem, data = fit.problem, fit.problem.data
+    A, r, n = derivatives(replace(problem, dynamic=False), fit.theta, fit.gamma), fit.residuals, len(fit.theta)
+    w = weights(problem, r, fit.scales) / problem.correlated
+    prior = problem.prior
+    H = (A.T * w) @ A + np.diag(np.append(prior.width**-2.0, GAMMA_INFORMATION))
+    known, left = np.where(np.isfinite(r), r, 0.0), np.full(len(r), np.nan)
+    for i in range(len(data.trial_ids)):
+        rows = np.flatnonzero((data.trial == i) & np.isfinite(r))
+        B = A[rows].T * w[rows]
+        step = -np.linalg.solve(H - B @ A[rows] + _DAMPED * np.diag(np.diag(H)), B @ known[rows])
+        theta, gamma = np.maximum(fit.theta + step[:n], prior.least), fit.gamma + step[n:]
+        again = data.y - problem.deltas(theta, gamma) - data.terms @ gamma
+        left[rows] = again[rows]
+    size = sizes(problem, left, FLOORS[-1])
+    count = np.bincount(data.trial[np.isfinite(data.y)], minlength=len(size))
+    score = float((count * np.log(size)).sum()) / problem.correlated
+    return Candidate(fit, score, float(np.sqrt(np.nanmean(left**2))))
+
+
+def _starts(problem: Problem) -> list[np.ndarray]:
+    """Some theta of a grid, the best for each size of gap."""
+    spread = float(np.diff(np.nanquantile(problem.data.y, [0.01, 0.99]))[0])
+    soft, z = problem.prior.width[1], np.zeros(problem.data.modes.shape[1])
+    found = []
+    for a in _GAPS:
+        grid = [
+            np.concatenate([[a * spread, b * 2.0 * soft, f, _VISCOUS, 0.0], z]) for b in _SOFTNESS for f in _FRICTIONS
+        ]
+        found.append(min((fit_train(problem, theta, ()) for theta in grid), key=lambda fit: fit.cost))
+    return [fit.theta for fit in sorted(found, key=lambda fit: fit.cost)[:_TRIED]]
+
+
+def _with_friction(theta: np.ndarray) -> list[np.ndarray]:
+    """Starts with friction in the mesh and more of it at the link, from theta without."""
+    stiff = 1.0 / max(theta[1], 1e-5)
+    return [np.concatenate([theta[:2], [theta[2] + t], theta[3:5], [stiff, t], theta[5:]]) for t in _SLIPS]

@@ -1,0 +1,101 @@
+"""What one joint did in the calibration trials: motor minus link reading to explain, in windows of a tenth of a second.
+
+    y = q_motor - q_link = zero + e(theta) + delta + noise          e = e_m - e_l, once and twice per turn
+
+Encoders differ by their zero and by both eccentricities together: the difference of two readings shows the sum.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from calibration.stages.drive_trains.drive_train import LONGEST, DriveMotion, DriveTrain, drive_motion, harmonic_terms
+from calibration.stages.drive_trains.torques import LinkLoads
+
+WINDOW, COARSE = 0.1, 0.5  # [s]
+_START = 0.3  # [s] of a trial's rest that show where delta starts
+
+
+@dataclass(frozen=True)
+class JointData:
+    """One joint in m trials, k windows in all.
+
+    Attributes:
+        trial_ids: The trials, length m.
+        motion: Of motor and load, nominal torques.
+        modes: (n, z) torque by unit modes of the inertial parameters [N.m].
+        first: (k,) first sample of each window.
+        trial: (k,) which trial a window is of.
+        y: (k,) motor minus link reading, mean over the window [rad], NaN where there is none.
+        terms: (k, 5) 1, cos, sin, cos 2, sin 2 of the joint's angle.
+        weight: (k,) of each window, 1 where all are alike.
+        window: Its length [s].
+    """
+
+    trial_ids: tuple[str, ...]
+    motion: DriveMotion
+    modes: np.ndarray
+    first: np.ndarray
+    trial: np.ndarray
+    y: np.ndarray
+    terms: np.ndarray
+    weight: np.ndarray
+    window: float = WINDOW
+
+    def means(self, x: np.ndarray) -> np.ndarray:
+        """Means (k, ...) over the windows of x (n, ...)."""
+        count = np.diff(np.append(self.first, len(x)))
+        return np.asarray(np.add.reduceat(x, self.first, axis=0) / count.reshape(-1, *[1] * (x.ndim - 1)))
+
+    def loaded(self, z: np.ndarray) -> DriveMotion:
+        """The motion with torque modes z (z,)."""
+        return replace(self.motion, torque=self.motion.torque + self.modes @ z)
+
+    def delta(self, of: DriveTrain, z: np.ndarray, zero: np.ndarray, off: float = 0.0) -> np.ndarray:
+        """Window means (k,) of delta [rad], started where y less `terms @ zero` shows it, with torque modes z.
+
+        A torque that is `off` [N.m] everywhere shows in the side of the mesh and not in how far it is wound up.
+        """
+        torque = self.motion.torque + self.modes @ z + of.link_inertia * self.motion.a + off
+        low, high = of.ends(torque[self.motion.begins[:-1]])
+        starts = np.clip(np.where(np.isfinite(seen := self.started(zero)), seen, 0.5 * (low + high)), low, high)
+        longest = LONGEST if self.window == WINDOW else 1.5 * LONGEST
+        return self.means(of.deltas(self.motion, torque, starts, longest)) - of.values[1] * off
+
+    def started(self, zero: np.ndarray) -> np.ndarray:
+        """delta (m,) where each trial starts, as y less `terms @ zero` shows it; NaN where it does not."""
+        rest = self.y - self.terms @ zero
+        begins = np.searchsorted(self.trial, np.arange(len(self.trial_ids)))
+        return np.array([rest[b : b + max(1, round(_START / self.window))].mean() for b in begins])
+
+    def without(self, trial: int) -> "JointData":
+        """The data with the readings of one trial left out."""
+        return replace(self, y=np.where(self.trial == trial, np.nan, self.y))
+
+
+def joint_data(
+    loads: Sequence[LinkLoads],
+    differences: Sequence[np.ndarray],
+    column: int,
+    modes: np.ndarray,
+    window: float = WINDOW,
+) -> JointData:
+    """A joint's trials; differences (n, k) of each trial are motor minus link readings, `modes` (p, z) of dphi."""
+    motion = drive_motion(loads, column)
+    first, trial = [], []
+    for i, (start, stop) in enumerate(pairwise(motion.begins)):
+        t = motion.t[start:stop]
+        edges = np.unique(np.searchsorted(t, np.arange(t[0], t[-1] - 0.5 * window, window)))
+        first.append(start + edges)
+        trial.append(np.full(len(edges), i))
+    n = sum(map(len, first))
+    bare = JointData(
+        tuple(of_trial.trial_id for of_trial in loads), motion,
+        np.concatenate([of_trial.regressor[:, column] for of_trial in loads]) @ modes,
+        np.concatenate(first), np.concatenate(trial), np.zeros(0), np.zeros((0, 5)), np.ones(n), window,
+    )  # fmt: skip
+    angle = bare.means(np.concatenate([of_trial.angle[:, column] for of_trial in loads]))
+    terms = np.column_stack([np.ones(len(angle)), harmonic_terms(angle)])
+    return replace(bare, y=bare.means(np.concatenate(differences)[:, column]), terms=terms)

@@ -1,0 +1,149 @@
+"""Stage `drive_trains`: the drive train of every joint that has a link encoder, from the calibration trials.
+
+Data: motor minus link reading of all calibration trials. Inputs: motor encoders, the base's markers, the geometry's
+zeros, the nominal robot with each trial's payload. Choices are made by trials left out.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from calibration.checks.joint_readings import wrong_links
+from calibration.errors import NotEnoughData
+from calibration.mocap.postures import dwell_windows
+from calibration.numerics.lie import from_vector
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+from calibration.robot.hand import HandModel
+from calibration.stages.drive_trains.drive_train import DriveTrain
+from calibration.stages.drive_trains.drive_trains import DriveTrains, zeros_of
+from calibration.stages.drive_trains.identification import identify, load_modes
+from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, joint_data
+from calibration.stages.drive_trains.torques import (
+    Dynamics,
+    LinkLoads,
+    base_acceleration,
+    dynamics,
+    inertial_tolerances,
+)
+from calibration.stages.joints.samples import link_zeros
+from calibration.verdict import Verdict
+
+STAGE = "drive_trains"
+DEFLECTION = 1e-2  # [rad] of a drive at its largest torque, prior
+_SHORTEST = 1.5  # [s] of a trial
+
+
+def fit_drive_trains(
+    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel
+) -> tuple[DriveTrains, tuple[Verdict, ...]]:
+    """The drive trains, and what is to be said of them; of joints without link encoders, none.
+
+    Args:
+        urdf: Nominal robot.
+        description: Of the dataset.
+        trials: Calibration trials.
+        robot: The robot's clock.
+        hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
+    """
+    bare = DriveTrains(
+        _dynamics(urdf, description, hand), (), np.zeros(len(hand.chain.measured)), urdf, description
+    )  # fmt: skip
+    try:
+        zero = link_zeros(trials, robot)
+    except NotEnoughData as error:
+        return bare, (Verdict(STAGE, "missing", str(error)),)
+    refused = tuple(wrong_links(bare.joints, trials, zero))
+    if refused:
+        return bare, tuple(Verdict(STAGE, v.verdict, v.message) for v in refused)
+    used = [trial for trial in trials if _long(trial)]
+    loads = [loads_of_trial(bare, trial, robot, hand) for trial in used]
+    differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
+    trains = tuple(_identified(bare, loads, differences, hand))
+    found = DriveTrains(bare.dynamics, trains, bare.zero, urdf, description)
+    deltas = [row for trial, load in zip(used, loads, strict=True) for row in _dwell_deltas(found, trial, robot, load)]
+    found = DriveTrains(bare.dynamics, trains, zeros_of(found, deltas), urdf, description)
+    return found, tuple(_verdicts(found, hand))
+
+
+def loads_of_trial(
+    trains: DriveTrains, trial: Trial, robot: Clock | None, hand: HandModel, regressors: bool = True
+) -> LinkLoads:
+    """Loads in a trial with its payload, its base as its markers show it where they do."""
+    rows = _complete(trial)
+    base = None
+    if robot is not None:
+        model = trains.dynamics.model
+        frame = model.frames[model.getFrameId(hand.chain.base_frame)]
+        T_root_B = frame.placement.homogeneous @ from_vector(hand.base)
+        base = base_acceleration(trains.description, trial, robot, T_root_B)
+    here = trains.of_trial(trial.id).dynamics
+    return here.loads(
+        trial.id, trial.t_robot[rows], trial.q_motor[rows], None if base is None else base[rows], regressors
+    )
+
+
+def _dynamics(urdf: str, description: Description, hand: HandModel) -> Dynamics:
+    offset = np.zeros(len(hand.chain.measured))
+    offset[hand.chain.columns] = hand.offset
+    return dynamics(urdf, description, offset)
+
+
+def _complete(trial: Trial) -> np.ndarray:
+    return np.flatnonzero(np.isfinite(trial.q_motor).all(axis=1))
+
+
+def _long(trial: Trial) -> bool:
+    rows = _complete(trial)
+    return len(rows) > 3 and bool(trial.t_robot[rows[-1]] - trial.t_robot[rows[0]] > _SHORTEST)
+
+
+def _identified(
+    bare: DriveTrains, loads: Sequence[LinkLoads], differences: Sequence[np.ndarray], hand: HandModel
+) -> Iterator[DriveTrain]:
+    tolerances = bare.description.tolerances
+    C = inertial_tolerances(bare.dynamics, tolerances.link_mass, tolerances.link_com)
+    root = np.linalg.cholesky(C + 1e-12 * np.eye(len(C)))
+    for joint in hand.chain.joints:
+        j = bare.joints.index(joint)
+        has = [k for k, y in enumerate(differences) if np.isfinite(y[:, j]).any()]
+        if not has or hand.chain.is_prismatic(joint):
+            continue
+        own, seen = [loads[k] for k in has], [differences[k] for k in has]
+        modes = load_modes(own, j, root)
+        data, coarse = (joint_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
+        yield identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(bare.dynamics.offset[j]))
+
+
+def _dwell_deltas(trains: DriveTrains, trial: Trial, robot: Clock, loads: LinkLoads) -> Iterator[np.ndarray]:
+    """Mean delta (k,) of each dwell of a trial."""
+    windows = dwell_windows(trial)
+    if not len(windows):
+        return
+    t, delta = robot.to_mocap(loads.t), loads.q - trains.of_loads(loads).q
+    for start, stop in windows:
+        rows = (t >= start) & (t <= stop)
+        if rows.any():
+            yield delta[rows].mean(axis=0)
+
+
+def _verdicts(found: DriveTrains, hand: HandModel) -> Iterator[Verdict]:
+    if found.trains:
+        summary = "; ".join(
+            f"{t.joint} {t.form.replace('_', ' ')}, backlash {1e3 * t.gap:.2f} mrad, left out {1e3 * t.residual:.2f}"
+            for t in found.trains
+        )
+        yield Verdict(STAGE, "ok", f"{summary} mrad rms")
+    without = [
+        j for j in hand.chain.joints if j not in [t.joint for t in found.trains] and not hand.chain.is_prismatic(j)
+    ]
+    if without:
+        yield Verdict(STAGE, "missing", f"no drive train without a link encoder: {', '.join(without)}")
+    for train in found.trains:
+        open_ = [q for q in train.parameters if q.status != "estimated" and ".motor." not in q.name]
+        if open_:
+            names = ", ".join(q.name for q in open_)
+            yield Verdict(
+                STAGE, "warning", f"not identifiable: {names}; {'; '.join(sorted({q.remedy for q in open_}))}"
+            )

@@ -1,0 +1,108 @@
+"""Estimation of the stick-slip base in its direction of use: from a wrench to the base's motion, one fit a source.
+
+    covariance = H^-1 + H^-1 (sum_k g_k g_k') H^-1,     p_(-k) = p + (H - H_k)^-1 g_k
+
+H the information and g_k a trial's gradient at the optimum: the second term is what trials disagree about, which no
+curvature shows. p_(-k), the parameters without trial k, is a step of Gauss-Newton from there. The motion predicted
+with them says what the model is worth on an axis of the floor's plane, and how wide its band is.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.stages.stick_slip.band import LeftOut, block_means, ensemble_of, fitted_band, slid_path
+from calibration.stages.stick_slip.likelihood import Trials
+from calibration.stages.stick_slip.model import Direction
+from calibration.stages.stick_slip.search import searched, warmed
+from calibration.stages.stick_slip.wheels import PRIOR_SIGMA, SlipParameters, preloads
+from calibration.stages.suspension.cross_validation import HeldOut
+from calibration.stages.suspension.model import Source
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Parameters by one source of the wrench.
+
+    Attributes:
+        logarithms: (12,) see `wheels.NAMES`.
+        covariance: (12, 12).
+        others: (k, 12) without each of the trials.
+        cost: -2 log of the posterior.
+        starts: Costs to which the starts of the search came.
+    """
+
+    logarithms: np.ndarray
+    covariance: np.ndarray
+    others: np.ndarray
+    cost: float
+    starts: tuple[float, ...]
+
+    @property
+    def parameters(self) -> SlipParameters:
+        """The parameters themselves."""
+        return SlipParameters.of(self.logarithms)
+
+
+def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
+    """The parameters that predict the trials best; from a known start (12,), where there is one, without a search."""
+    best, starts = searched(trials) if start is None else (warmed(trials, start), ())
+    H_k, g_k = trials.normal(best.logarithms, best.errors, both=True)
+    H = H_k.sum(axis=0) + np.diag(PRIOR_SIGMA**-2.0)
+    inverse = np.linalg.inv(H)
+    covariance = inverse + inverse @ (g_k.T @ g_k) @ inverse
+    others = np.array([best.logarithms + _without(H, H_k[k], g_k[k]) for k in range(len(g_k))])
+    return Fitted(best.logarithms, covariance, others, best.cost, starts)
+
+
+def _without(H: np.ndarray, H_k: np.ndarray, g_k: np.ndarray) -> np.ndarray:
+    """Step of the logarithms when a trial is left out, none longer than its prior is wide."""
+    return np.clip(np.linalg.solve(H - H_k, g_k), -PRIOR_SIGMA, PRIOR_SIGMA)
+
+
+def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = None) -> Direction:
+    """Parameters, ensemble, band and what trials say that were left out, from one source of the wrench."""
+    found = fitted(trials, start)
+    ensemble = ensemble_of(trials, found.logarithms, found.covariance)
+    members = [trials.simulated(own) for own in ensemble]
+    x, share = left_out(trials, found.others)
+    preloaded = _preloaded(trials, found.parameters, members[0][0])
+    spread = np.var([m[0] for m in members], axis=0)
+    path = np.concatenate([slid_path(x[a:b], share[a:b]) for a, b in trials.spans])
+    error, seen = trials.measured - block_means(trials, x), np.concatenate([m.valid for m in trials.motions])
+    masked = np.where(seen[:, None], error, np.nan)
+    spread, preloaded, path = (block_means(trials, v) for v in (spread, preloaded, path))
+    rows = LeftOut(masked, spread, preloaded, path, _weights(trials))
+    band = fitted_band(rows, trials.noise)
+    return Direction(source, found.logarithms, found.covariance, ensemble, band, _held_out(trials, masked))
+
+
+def _weights(trials: Trials) -> np.ndarray:
+    """(b,) of blocks: every trial counts alike, and tours of postures, which are few, like all others together."""
+    tours = sum(m.postures for m in trials.motions)
+    alike = {True: max(tours, 1), False: max(len(trials.motions) - tours, 1)}
+    return np.concatenate([np.full(len(m.valid), 1.0 / (len(m.valid) * alike[m.postures])) for m in trials.motions])
+
+
+def _preloaded(trials: Trials, p: SlipParameters, x: np.ndarray) -> np.ndarray:
+    """Mean square (n, 3) of what preloaded wheels change of positions x (n, 3)."""
+    load = trials.drive[0, 3:6]
+    moved = [trials.simulated(p.logarithms, e)[0] - x for e in preloads(trials.wheels, p, load)]
+    return np.asarray(np.mean(np.square(moved), axis=0))
+
+
+def left_out(trials: Trials, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n, 3) and shares that slid (n,) of each trial by the parameters (k, 12) of the others."""
+    found = [trials.alone(k).simulated(own) for k, own in enumerate(others)]
+    return np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found])
+
+
+def _held_out(trials: Trials, errors: np.ndarray) -> HeldOut:
+    """Sums over trials of errors (b, 3), which are NaN where there is no marker."""
+    rows, before = [], 0
+    for motion in trials.motions:
+        own = slice(before, before + len(motion.valid))
+        e, x, before = errors[own][motion.valid], motion.x[motion.valid], own.stop
+        rows.append(((e**2).sum(axis=0), (x**2).sum(axis=0), len(e) * motion.noise**2, len(e)))
+    error, moved, noise, count = (np.array(a, dtype=float) for a in zip(*rows, strict=True))
+    return HeldOut(error, moved, noise, count)

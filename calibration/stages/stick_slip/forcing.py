@@ -1,0 +1,168 @@
+"""What drives the base in the floor's plane in one trial.
+
+    w = (Fx, Fy, Mz) of nominal inverse dynamics, base at rest  -  M_ph d2/dt2 (z, rx, ry)
+    vertical load (-Fz, My, -Mx) of the plate, or of inverse dynamics less M_h. d2/dt2 (z, rx, ry)
+
+all in frame 0, about its origin; p: x, y, yaw, h: z, rx, ry; M(q) the composite inertia of the nominal robot with the
+payload of the trial. Heave and tilt are those of the 6x6 compliance under the same source. Forces in the floor's plane
+count from their mean in the first second. Where there are no joint readings the base has no inertia: then the plate
+alone moves it, at the rate of the correction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicSpline
+
+from calibration.errors import NotEnoughData
+from calibration.numerics.signals import RATE, Signal, even, low_passed
+from calibration.recording.clock import Clock
+from calibration.recording.trial import REST, Trial
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.stick_slip.kernel import COLUMNS, PLATE
+from calibration.stages.suspension.base_response import WrenchSources, forcing_of
+from calibration.stages.suspension.floor_wrench import Load, dynamics_load, plate_load
+from calibration.stages.suspension.modal_response import predicted
+from calibration.stages.suspension.model import Source
+
+CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
+STEPS = 2  # of the integration to a sample
+STEP = 1.0 / (RATE * STEPS)
+PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
+_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+_INERTIA_STRIDE = 5  # samples from one composite inertia to the next
+UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
+
+
+@dataclass(frozen=True)
+class PlanarForcing:
+    """What the kernel takes of one trial, n samples.
+
+    Attributes:
+        trial_id: The trial.
+        source: `plate` or `dynamics`.
+        t: (n,) [s, mocap clock], spacing 1 / RATE.
+        drive: (STEPS n, 11), see `kernel.advance`.
+        inertia: (n, 15).
+        heave: (n, 3) z, rx, ry by the compliance [m, rad].
+        rest: (n,) True in the first second.
+        linear: (n, 3) x, y, yaw by the compliance.
+    """
+
+    trial_id: str
+    source: Source
+    t: np.ndarray
+    drive: np.ndarray
+    inertia: np.ndarray
+    heave: np.ndarray
+    rest: np.ndarray
+    linear: np.ndarray
+
+
+@dataclass(frozen=True)
+class Tilting:
+    """The 6x6 compliance that heave and tilt follow: K, C (6, 6)."""
+
+    K: np.ndarray
+    C: np.ndarray
+
+
+@dataclass(frozen=True)
+class Wrenches:
+    """Wrenches of one trial, read once for every source.
+
+    Attributes:
+        trial_id: The trial.
+        start: Its first time [s, mocap clock].
+        plate: By the plate; None without one.
+        dynamics: By inverse dynamics; None without joint readings.
+        t: (k,) times of the inertia; empty without.
+        M: (k, 6, 6) composite inertia.
+    """
+
+    trial_id: str
+    start: float
+    plate: Load | None
+    dynamics: Load | None
+    t: np.ndarray
+    M: np.ndarray
+
+
+def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wrenches:
+    """What the instruments of a trial show of its wrench."""
+    start, lab = float(trial.t_mocap[0]), sources.lab
+    plate, dynamics, t, M = None, None, np.zeros(0), np.zeros((0, 6, 6))
+    if sources.plate is not None and len(trial.t_plate):
+        plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
+    if sources.robot is not None and len(trial.t_robot):
+        dynamics = dynamics_load(lab, trial, sources.robot, T_lab_0, CUTOFF)
+        t, M = composite_inertia(lab, trial, sources.robot, T_lab_0)
+    return Wrenches(trial.id, start, plate, dynamics, t, M)
+
+
+def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> PlanarForcing:
+    """The forcing by the plate with inverse dynamics, or by inverse dynamics alone.
+
+    Raises:
+        NotEnoughData: The wrench asked for was not recorded.
+    """
+    main, dynamics = wrenches.plate if source == "plate" else wrenches.dynamics, wrenches.dynamics
+    if main is None:
+        what = "force plate" if source == "plate" else "encoder readings"
+        raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")
+    lower = forcing_of(main, wrenches.start)
+    first, last = lower.t[0], lower.t[-1]
+    if dynamics is not None:
+        first, last = max(first, dynamics.signal.t[0]), min(last, dynamics.signal.t[-1])
+    n = int((last - first) * RATE + 1e-6)
+    t, fine = first + np.arange(n) / RATE, first + np.arange(n * STEPS) * STEP
+    rest = fine <= wrenches.start + REST
+    compliant = predicted(tilting.K, tilting.C, lower)
+    heave, linear = (CubicSpline(lower.t, compliant[:, axes]) for axes in (HEAVE, PLANE))
+    tilt, load, rows, drive = heave(fine), _at(main.signal, fine), np.zeros((n, 15)), np.zeros((len(fine), COLUMNS))
+    rows[:, [0, 3, 5]] = UNMOVED
+    if dynamics is not None:
+        M = _resampled(wrenches.t, wrenches.M, t)
+        shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], heave(fine, 2))
+        drive[:, :3] = (_at(dynamics.signal, fine) - shift)[:, PLANE]
+        drive[:, :3] -= drive[rest, :3].mean(axis=0)
+        rows[:, :6] = np.stack([M[:, PLANE[i], PLANE[j]] for i, j in _UPPER], axis=1)
+        if main is dynamics:
+            load = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0)
+            rows[:, 6:] = (M[:, (2, 4, 3)][:, :, PLANE] * np.array([1.0, -1.0, 1.0])[:, None]).reshape(n, 9)
+    drive[:, 3:6] = load[:, (2, 4, 3)] * (-1.0, 1.0, -1.0)
+    drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:]
+    if source == "plate":
+        drive[:, PLATE:] = load[:, PLANE] - load[rest][:, PLANE].mean(axis=0)
+    early = t <= wrenches.start + REST
+    return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[::STEPS], early, linear(t))
+
+
+def _at(signal: Signal, t: np.ndarray) -> np.ndarray:
+    return np.asarray(CubicSpline(signal.t, signal.x)(t))
+
+
+def composite_inertia(
+    lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (k,) [s, mocap clock] and M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes."""
+    model, description = lab.floating, lab.description
+    order = [description.joint_names.index(name) for name in list(model.names)[2:]]
+    q = low_passed(even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order]), CUTOFF)
+    T_0_root = model.frames[model.getFrameId(description.base_frame)].placement.inverse()
+    root = pin.SE3ToXYZQUAT(pin.SE3(T_lab_0) * T_0_root)
+    neutral = pin.neutral(model)
+    neutral[:7] = root
+    data, to_0, of_0 = model.createData(), T_0_root.dualAction, T_0_root.inverse().action
+    found = []
+    for row in q.x[::_INERTIA_STRIDE]:
+        M = pin.crba(model, data, pin.integrate(model, neutral, np.concatenate([np.zeros(6), row])))[:6, :6]
+        found.append(to_0 @ (np.triu(M) + np.triu(M, 1).T) @ of_0)
+    return q.t[::_INERTIA_STRIDE], np.array(found)
+
+
+def _resampled(t: np.ndarray, M: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """M (n, 6, 6) at times (n,), linear."""
+    columns = [np.interp(at, t, c) for c in M.reshape(len(M), 36).T]
+    return np.stack(columns, axis=1).reshape(len(at), 6, 6)

@@ -1,0 +1,175 @@
+"""Likelihood of the stick-slip parameters: windows whose variances are unknown, one for each window and axis.
+
+    -2 log L = sum_w sum_a  n_w log(var_w (x - x(p))_a + s_a^2),        n_w samples that are independent
+
+Windows of 4 s overlap by half, each relative to its own mean: what slipped before a window is no error of it, so that
+errors of a hundred slips do not add up along a trial, and a window that slips as nobody could know counts little. s is
+the noise of the markers. Parameters are logarithms, p with a normal prior.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from calibration.numerics.signals import RATE
+from calibration.stages.stick_slip.forcing import STEP, PlanarForcing
+from calibration.stages.stick_slip.kernel import simulated
+from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, blocks, pooled_noise
+from calibration.stages.stick_slip.wheels import PRIOR, PRIOR_SIGMA, SlipParameters, WheelSet
+
+CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel`
+WINDOW = round(4.0 * RATE / BLOCK)  # blocks
+_MEMORY = 1.0  # [s] between independent samples of the error
+_FAR = 0.2  # [m, rad] an error that counts as no larger
+DIFFERENCE = 0.01  # of a logarithm, for derivatives
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Forcings and measured motions of calibration trials, one after the other.
+
+    Attributes:
+        ids: Of the trials.
+        wheels: The robot's.
+        corrected: Whether a plate corrects the prediction.
+        starts: (k + 1,) first sample of each trial, and the number of samples.
+        drive: (STEPS n, 11).
+        inertia: (n, 15).
+        rest: (n,) True in the first second of a trial.
+        motions: Measured.
+    """
+
+    ids: tuple[str, ...]
+    wheels: WheelSet
+    corrected: bool
+    starts: np.ndarray
+    drive: np.ndarray
+    inertia: np.ndarray
+    rest: np.ndarray
+    motions: tuple[PlanarMotion, ...]
+
+    @cached_property
+    def spans(self) -> tuple[tuple[int, int], ...]:
+        """First sample of each trial, and of the next."""
+        return tuple((int(a), int(b)) for a, b in pairwise(self.starts))
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """(3,) of a block."""
+        return pooled_noise(self.motions)
+
+    @cached_property
+    def windows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Trial (w,) of each window, its blocks (w, WINDOW) among all, and whether they count (w, WINDOW)."""
+        trial, index, counts, before = [], [], [], 0
+        for k, motion in enumerate(self.motions):
+            b = len(motion.valid)
+            for start in range(0, max(b - WINDOW // 2, 1), WINDOW // 2):
+                rows = np.arange(start, start + WINDOW)
+                inside = rows < b
+                rows = np.minimum(rows, b - 1)
+                trial.append(k)
+                index.append(before + rows)
+                counts.append(inside & motion.valid[rows])
+            before += b
+        return np.array(trial), np.array(index), np.array(counts)
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """(b, 3) of all trials."""
+        return np.concatenate([m.x for m in self.motions])
+
+    def alone(self, k: int) -> "Trials":
+        """Trial k alone."""
+        a, b = self.spans[k]
+        per = len(self.drive) // len(self.inertia)
+        drive, inertia, rest = self.drive[a * per : b * per], self.inertia[a:b], self.rest[a:b]
+        motions = self.motions[k : k + 1]
+        return Trials(
+            self.ids[k : k + 1], self.wheels, self.corrected, np.array([0, b - a]), drive, inertia, rest, motions
+        )
+
+    def simulated(self, logarithms: np.ndarray, preload: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (n, 3) since the first second of each trial, and shares of wheels that slid (n,).
+
+        Deflections of the wheels (m, 2) at the start of each trial may be given.
+        """
+        p = SlipParameters.of(logarithms)
+        e = np.zeros(self.wheels.position.shape) if preload is None else preload
+        x, share = simulated(
+            self.starts, self.drive, self.inertia, self.wheels.rows(p), body(p, self.corrected), STEP, e
+        )
+        for a, b in self.spans:
+            x[a:b] -= x[a:b][self.rest[a:b]].mean(axis=0)
+        return x, share
+
+    def errors(self, logarithms: np.ndarray) -> np.ndarray:
+        """Measured minus predicted in each window (w, WINDOW, 3), its mean taken off; 0 where it does not count."""
+        x, _ = self.simulated(logarithms)
+        e = self.measured - np.concatenate([blocks(x[a:b]) for a, b in self.spans])
+        _, index, counts = self.windows
+        r = np.clip(np.nan_to_num(e, nan=_FAR, posinf=_FAR, neginf=-_FAR), -_FAR, _FAR)[index]
+        mask = counts[..., None]
+        mean = (r * mask).sum(axis=1, keepdims=True) / np.maximum(counts.sum(axis=1), 1)[:, None, None]
+        return np.asarray((r - mean) * mask)
+
+    @cached_property
+    def independent(self) -> np.ndarray:
+        """n_w (w,): windows overlap by half."""
+        return self.windows[2].sum(axis=1) * (0.5 * BLOCK / RATE / _MEMORY)
+
+    def variances(self, errors: np.ndarray) -> np.ndarray:
+        """Of each window and axis (w, 3), noise included."""
+        count = np.maximum(self.windows[2].sum(axis=1), 1)
+        return np.asarray((errors**2).sum(axis=1) / count[:, None] + self.noise**2)
+
+    def cost(self, logarithms: np.ndarray, errors: np.ndarray) -> float:
+        """-2 log of the posterior."""
+        prior = (((logarithms - PRIOR) / PRIOR_SIGMA) ** 2).sum()
+        return float((self.independent[:, None] * np.log(self.variances(errors))).sum() + prior)
+
+    def normal(self, logarithms: np.ndarray, errors: np.ndarray, both: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Information (k, p, p) and gradient (k, p) of half the cost of each trial, prior left out.
+
+        Derivatives are differences, forward or, if `both`, central.
+        """
+        p = len(logarithms)
+        J = np.empty((p, *errors.shape))
+        for i in range(p):
+            step = DIFFERENCE * np.eye(p)[i]
+            after = self.errors(logarithms + step)
+            J[i] = (after - self.errors(logarithms - step)) / 2.0 if both else after - errors
+        J /= DIFFERENCE
+        trial, _, _ = self.windows
+        count = np.maximum(self.windows[2].sum(axis=1), 1)
+        weight = (self.independent / count)[:, None] / self.variances(errors)
+        root = np.sqrt(weight)[:, None, :]
+        H, g = np.zeros((len(self.ids), p, p)), np.zeros((len(self.ids), p))
+        for k in range(len(self.ids)):
+            own = trial == k
+            A = (J[:, own] * root[own]).reshape(p, -1)
+            H[k], g[k] = A @ A.T, A @ (errors[own] * root[own]).ravel()
+        return H, g
+
+
+def body(p: SlipParameters, corrected: bool) -> np.ndarray:
+    """(4,) as the kernel takes it."""
+    return np.array([p.body_c, p.body_cr, CORRECTION[0] if corrected else 0.0, CORRECTION[1]])
+
+
+def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]]) -> Trials:
+    """Trials of one source one after the other."""
+    forcings, motions = zip(*rows, strict=True)
+    return Trials(
+        tuple(f.trial_id for f in forcings),
+        wheels,
+        forcings[0].source == "plate",
+        np.cumsum([0, *(len(f.t) for f in forcings)]),
+        np.ascontiguousarray(np.concatenate([f.drive for f in forcings])),
+        np.ascontiguousarray(np.concatenate([f.inertia for f in forcings])),
+        np.concatenate([f.rest for f in forcings]),
+        motions,
+    )

@@ -1,0 +1,137 @@
+"""The stick-slip base as a model of prediction: a wrench in, the base's motion and its band out."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calibration.errors import NoSuchElement
+from calibration.stages.stick_slip.band import Band, slid_path
+from calibration.stages.stick_slip.forcing import HEAVE, PLANE, STEP, STEPS, PlanarForcing, Tilting
+from calibration.stages.stick_slip.kernel import PLATE, simulated
+from calibration.stages.stick_slip.likelihood import body
+from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet, preloads
+from calibration.stages.suspension.cross_validation import HeldOut
+from calibration.stages.suspension.model import Source
+
+
+@dataclass(frozen=True)
+class PlanarPrediction:
+    """Predicted motion in the floor's plane.
+
+    Attributes:
+        x: (n, 3) x, y, yaw since the first second [m, rad, frame 0].
+        variance: (n, 3).
+        share: (n,) of the wheels that slid.
+        kept: (n, 3) w: how much of the predicted slip is believed [-].
+    """
+
+    x: np.ndarray
+    variance: np.ndarray
+    share: np.ndarray
+    kept: np.ndarray
+
+
+@dataclass(frozen=True)
+class Direction:
+    """What was fitted from one source of the wrench.
+
+    Attributes:
+        source: Of the wrench.
+        logarithms: (12,) of the parameters, see `wheels.NAMES`.
+        covariance: (12, 12).
+        ensemble: (e, 12) draws of the posterior, the optimum first.
+        band: Of the prediction.
+        held_out: Trials left out, (k, 3) for x, y, yaw.
+        linear: (3,) axes that the compliance predicts better.
+        linear_variance: (3,) what it left of trials it had not seen [m2, rad2].
+    """
+
+    source: Source
+    logarithms: np.ndarray
+    covariance: np.ndarray
+    ensemble: np.ndarray
+    band: Band
+    held_out: HeldOut
+    linear: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=bool))
+    linear_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def parameters(self) -> SlipParameters:
+        """The most likely parameters."""
+        return SlipParameters.of(self.logarithms)
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """A fitted base.
+
+    Attributes:
+        wheels: Of the robot.
+        tilting: Compliance of heave and tilt.
+        heave_variance: (3,) of z, rx, ry: what the compliance left of trials it had not seen.
+        directions: One for each source.
+    """
+
+    wheels: WheelSet
+    tilting: Tilting
+    heave_variance: np.ndarray
+    directions: tuple[Direction, ...]
+
+    def direction(self, source: Source) -> Direction:
+        """What was fitted from a source.
+
+        Raises:
+            NoSuchElement: Nothing was.
+        """
+        found = next((d for d in self.directions if d.source == source), None)
+        if found is None:
+            raise NoSuchElement("source", source, [d.source for d in self.directions])
+        return found
+
+    def predict(self, forcing: PlanarForcing) -> PlanarPrediction:
+        """The motion in the floor's plane under a forcing; by trials left out, an axis is left still or linear.
+
+        Raises:
+            NoSuchElement: Nothing was fitted from its source.
+        """
+        found = self.direction(forcing.source)
+        p = found.parameters
+        members = [self._motion(forcing, SlipParameters.of(own)) for own in found.ensemble]
+        one, share = members[0]
+        every = np.array([m[0] for m in members])
+        starts = preloads(self.wheels, p, forcing.drive[0, 3:6])
+        preloaded = np.mean([(self._motion(forcing, p, e)[0] - one) ** 2 for e in starts], axis=0)
+        x = every.mean(axis=0)
+        variance = found.band.variance(every.var(axis=0), preloaded, slid_path(x, share))
+        force = forcing.drive[::STEPS, PLATE:] if forcing.source == "plate" else forcing.drive[::STEPS, :3]
+        elastic = force @ np.linalg.inv(self.wheels.stiffness(p))
+        kept = believed(x - elastic, variance - found.band.floor**2)
+        x = elastic + kept * (x - elastic)
+        moves, tried = found.held_out.moves, found.held_out
+        still = tried.variance(np.zeros(3, dtype=bool))
+        x, variance = np.where(moves, x, 0.0), np.where(moves, variance, still)
+        x = np.where(found.linear, forcing.linear, x)
+        return PlanarPrediction(x, np.where(found.linear, found.linear_variance, variance), share, kept)
+
+    def _motion(
+        self, forcing: PlanarForcing, p: SlipParameters, preload: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Positions since the first second (n, 3), and shares of wheels that slid (n,)."""
+        starts, settings = np.array([0, len(forcing.inertia)]), body(p, forcing.source == "plate")
+        e = np.zeros(self.wheels.position.shape) if preload is None else preload
+        x, share = simulated(starts, forcing.drive, forcing.inertia, self.wheels.rows(p), settings, STEP, e)
+        return x - x[forcing.rest].mean(axis=0), share
+
+    def displacement(self, forcing: PlanarForcing) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement of the base frame (n, 6) [m, rad, frame 0] and its variances (n, 6)."""
+        plane = self.predict(forcing)
+        x, variance = np.empty((len(plane.x), 6)), np.empty((len(plane.x), 6))
+        x[:, PLANE], variance[:, PLANE] = plane.x, plane.variance
+        x[:, HEAVE], variance[:, HEAVE] = forcing.heave, self.heave_variance
+        return x, variance
+
+
+def believed(slip: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """w (n, 3): the share of a predicted slip (n, 3) that is believed, by the variance that slips add."""
+    largest = np.maximum.accumulate(slip**2, axis=0)
+    return np.asarray(np.clip(1.0 - variance / np.maximum(largest, np.finfo(float).tiny), 0.0, 1.0))

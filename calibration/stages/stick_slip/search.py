@@ -1,0 +1,101 @@
+"""Search for the stick-slip parameters: Gauss-Newton with Levenberg's damping, and scans of the frictions.
+
+    step = -(H + l diag H)^-1 g,     H = sum_k H_k + S^-2,   g = sum_k g_k + S^-2 (p - p_0)
+
+Whether a wheel slides in a jolt at all is a threshold: far from the right friction the cost has valleys of its own.
+So a few steps are made from several starts, and whenever the search ends, each friction is tried at other values; it
+goes on from a better one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.stages.stick_slip.likelihood import Trials
+from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA
+
+_LONGEST = 0.7  # step of a logarithm, at most
+_DAMPING = 1e-2, 6.0, 1e-5, 1e5  # at the start, factor, least, most
+_GAIN = 0.5  # of the cost, below which a search ends
+_FIRST, _MOST = 2, 20  # steps of every start, and of the best
+_SPREAD = (0.0, -0.5)  # of the frictions' logarithms between starts
+_SCAN = tuple(np.log([0.6, 0.8, 0.92, 1.15, 1.5]))
+_FRICTIONS = tuple(i for i, name in enumerate(NAMES) if name.endswith("_mu"))
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a search.
+
+    Attributes:
+        logarithms: (p,).
+        errors: See `Trials.errors`.
+        cost: -2 log of the posterior.
+        damping: Levenberg's.
+        ended: Whether the last step gained next to nothing.
+    """
+
+    logarithms: np.ndarray
+    errors: np.ndarray
+    cost: float
+    damping: float = _DAMPING[0]
+    ended: bool = False
+
+
+def searched(trials: Trials) -> tuple[Point, tuple[float, ...]]:
+    """The best point, and the costs to which the starts came."""
+    frictions = np.array([float(i in _FRICTIONS) for i in range(len(NAMES))])
+    points = [point(trials, PRIOR + s * frictions) for s in _SPREAD]
+    for _ in range(_FIRST):
+        points = [p if p.ended else stepped(trials, p) for p in points]
+    return descended(trials, scanned(trials, min(points, key=lambda p: p.cost))), tuple(p.cost for p in points)
+
+
+def warmed(trials: Trials, start: np.ndarray) -> Point:
+    """The best point from a start (p,) near it, as another source found it."""
+    return descended(trials, scanned(trials, point(trials, start)))
+
+
+def descended(trials: Trials, best: Point) -> Point:
+    """Steps, and scans where they end, until neither gains."""
+    for _ in range(_MOST):
+        best = stepped(trials, best)
+        if best.ended:
+            best = scanned(trials, best)
+            if best.ended:
+                break
+    return best
+
+
+def scanned(trials: Trials, at: Point) -> Point:
+    """The point with other frictions, one after the other, where that is better by more than a step's least gain."""
+    best = at
+    for i in _FRICTIONS:
+        tried = [point(trials, best.logarithms + step * np.eye(len(NAMES))[i]) for step in _SCAN]
+        new = min(tried, key=lambda p: p.cost)
+        if new.cost < best.cost - _GAIN:
+            best = new
+    return best
+
+
+def point(trials: Trials, logarithms: np.ndarray) -> Point:
+    """A start."""
+    errors = trials.errors(logarithms)
+    return Point(logarithms, errors, trials.cost(logarithms, errors))
+
+
+def stepped(trials: Trials, at: Point) -> Point:
+    """One step on, or the same point, ended, where no step gains."""
+    H_k, g_k = trials.normal(at.logarithms, at.errors, both=False)
+    H = H_k.sum(axis=0) + np.diag(PRIOR_SIGMA**-2.0)
+    g = g_k.sum(axis=0) + (at.logarithms - PRIOR) / PRIOR_SIGMA**2
+    damping, factor, least, most = _DAMPING
+    damping = at.damping
+    while damping < most:
+        step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+        new = point(trials, at.logarithms + np.clip(step, -_LONGEST, _LONGEST))
+        if new.cost < at.cost:
+            ended = at.cost - new.cost < _GAIN
+            return Point(new.logarithms, new.errors, new.cost, max(damping / factor, least), ended)
+        damping *= factor
+    return Point(at.logarithms, at.errors, at.cost, damping, True)

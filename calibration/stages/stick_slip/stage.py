@@ -1,0 +1,159 @@
+"""Stage `stick_slip`: the base that slips in the floor's plane, from calibration trials alone.
+
+1  forcing of every trial by each source of the wrench, tilt and heave by the suspension's 6x6 compliance
+2  parameters by wheel type, ensemble and band by each source: the plate first, inverse dynamics from its optimum
+3  what is said: the worth of each axis on trials that were left out, against a base that stays
+"""
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.recording.schema import Description
+from calibration.recording.trial import Trial
+from calibration.stages.stick_slip.fit import fit_direction
+from calibration.stages.stick_slip.forcing import (
+    HEAVE,
+    PLANE,
+    PlanarForcing,
+    Tilting,
+    Wrenches,
+    planar_forcing,
+    wrenches_of,
+)
+from calibration.stages.stick_slip.likelihood import joined
+from calibration.stages.stick_slip.measured import PlanarMotion, planar_motion
+from calibration.stages.stick_slip.model import Direction, StickSlip
+from calibration.stages.stick_slip.wheels import wheel_set
+from calibration.stages.suspension.base_response import WrenchSources
+from calibration.stages.suspension.model import Source, Suspension
+from calibration.stages.suspension.rest_frame import Rest, rest_of
+from calibration.verdict import Verdict
+
+STAGE = "stick_slip"
+SOURCES: tuple[Source, ...] = ("plate", "dynamics")
+_AXES = ("x", "y", "yaw")
+_LEAST_TRIALS, _LEAST_WHEELS = 2, 3
+_BETTER = 0.8  # mean square over that of the slipping base, below which the compliance takes an axis
+_WORTH, _LESS = 0.8, 0.1  # R2 of yaw; by which that of the plate may be less
+_FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Read:
+    """A trial: where it begins, its wrenches."""
+
+    trial: Trial
+    rest: Rest
+    wrenches: Wrenches
+
+
+def fit_stick_slip(
+    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension
+) -> tuple[StickSlip | None, tuple[Verdict, ...]]:
+    """The base by calibration trials in which it is not driven, None where it is not identified, and the findings."""
+    description = sources.lab.description
+    if len(description.wheels) < _LEAST_WHEELS:
+        return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
+    tilting = Tilting(suspension.K, suspension.C)
+    wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
+    directions: list[Direction] = []
+    read = _read(sources, trials)
+    for source in SOURCES:
+        rows = _rows(description, read, tilting, source)
+        if len(rows) >= _LEAST_TRIALS:
+            start = directions[0].logarithms if directions else None
+            directions.append(_linear(fit_direction(source, joined(wheels, rows), start), suspension))
+    if not directions:
+        message = "no stick-slip base: it takes two trials that show the base and its wrench"
+        return None, (Verdict(STAGE, "missing", message),)
+    model = StickSlip(wheels, tilting, _heave_variance(suspension), tuple(directions))
+    names = [one.trial.id for one in read]
+    return model, (*(_judged(d) for d in directions), *_doubted(directions), *_moved(directions[0], names))
+
+
+def _read(sources: WrenchSources, trials: Sequence[Trial]) -> list[Read]:
+    found = []
+    for trial in trials:
+        try:
+            rest = rest_of(sources.lab.description, trial, sources.T_base_B)
+            found.append(Read(trial, rest, wrenches_of(sources, trial, rest.T_lab_0)))
+        except NotEnoughData as error:
+            _log.info("%s: %s", trial.id, error)
+    return found
+
+
+def _rows(
+    description: Description, read: Sequence[Read], tilting: Tilting, source: Source
+) -> list[tuple[PlanarForcing, PlanarMotion]]:
+    found = []
+    for one in read:
+        try:
+            forcing = planar_forcing(one.wrenches, tilting, source)
+            found.append((forcing, planar_motion(description, one.trial, one.rest, forcing)))
+        except NotEnoughData as error:
+            _log.info("%s from %s: %s", one.trial.id, source, error)
+    return found
+
+
+def _linear(direction: Direction, suspension: Suspension) -> Direction:
+    """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off."""
+    tried = dict(suspension.held_out).get(direction.source)
+    if tried is None:
+        return direction
+    plane, moved = list(PLANE), np.ones(6, dtype=bool)
+    variance = tried.variance(moved)[plane]
+    own = direction.held_out.variance(np.asarray(direction.held_out.moves))
+    return replace(direction, linear=tried.moves[plane] & (variance < _BETTER * own), linear_variance=variance)
+
+
+def _heave_variance(suspension: Suspension) -> np.ndarray:
+    """(3,) of z, rx, ry."""
+    tried = suspension.held_out[0][1]
+    return np.asarray(tried.variance(np.ones(6, dtype=bool))[list(HEAVE)])
+
+
+def _doubted(directions: Sequence[Direction]) -> Iterator[Verdict]:
+    """Axes of which the plate says less than inverse dynamics, which a right plate never does."""
+    if len(directions) == len(SOURCES):
+        plate, dynamics = (np.where(d.linear, 1.0, d.held_out.r2) for d in directions)
+        doubted = [a for a, p, d in zip(_AXES, plate, dynamics, strict=True) if p < d - _LESS]
+        if doubted:
+            message = (
+                f"the plate explains less of {', '.join(doubted)} than inverse dynamics do: check its axes and signs"
+            )
+            yield Verdict(STAGE, "warning", message)
+
+
+def _moved(direction: Direction, names: Sequence[str]) -> Iterator[Verdict]:
+    """Trials in which the base was farther from where it was predicted than slip leaves it."""
+    tried = direction.held_out
+    if len(names) != len(tried.count):
+        return
+    far = np.sqrt(tried.error / np.maximum(tried.count, 1.0)[:, None])
+    for name, (x, y, yaw) in zip(names, far, strict=True):
+        if max(x, y) > _FAR or yaw > _TURNED:
+            message = (
+                f"{name}: base {1e3 * np.hypot(x, y):.0f} mm, {1e3 * yaw:.0f} mrad off its prediction: was it moved?"
+            )
+            yield Verdict(STAGE, "warning", message)
+
+
+def _judged(direction: Direction) -> Verdict:
+    """What the axes are worth on trials that were left out."""
+    r2 = np.maximum(direction.held_out.r2, -9.99)
+    worth = ", ".join(f"{a} {v:.2f}" for a, v in zip(_AXES, r2, strict=True))
+    message = f"from {direction.source}, left-out trials: R2 against a base that stays {worth}"
+    if direction.linear.any():
+        linear = [a for a, is_linear in zip(_AXES, direction.linear, strict=True) if is_linear]
+        message += f"; linear, as the 6x6 compliance has them: {', '.join(linear)}"
+    still = [a for a, moves in zip(_AXES, direction.held_out.moves | direction.linear, strict=True) if not moves]
+    if still:
+        message += f"; left still: {', '.join(still)}"
+    if r2[2] < _WORTH and not direction.linear[2]:
+        message += "; check the wheels' declared places, the plate's axes and clock, and that nobody moved the base"
+    return Verdict(STAGE, "ok" if r2[2] >= _WORTH or direction.linear[2] else "warning", message)

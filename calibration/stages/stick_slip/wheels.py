@@ -1,0 +1,148 @@
+"""Wheels of the stick-slip base: stiffness, damping, friction and share of the vertical load, tied by type.
+
+    k = (kx, ky) of a drive, (k, k) of a front or back caster       c of drives, of casters      mu of the three types
+    N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i, y_i) = (-Fz, My, -Mx)        k_i 1; load share of a drive
+
+A wheel carries its own weight n_i, of the nominal robot; the base's weight is shared as by vertical springs under a
+rigid base. Casters are front or back of the axle of the drives. Priors are log-normal and wide: nothing here is of a
+particular robot.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from calibration.recording.schema import Wheel
+
+NAMES = (
+    "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
+    "drive_c", "caster_c", "body_c", "body_cr", "drive_load",
+)  # fmt: skip
+PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0])
+PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.15])
+PRELOADS = 8  # ways in which a base may stand before a trial
+PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
+_NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
+
+
+@dataclass(frozen=True)
+class SlipParameters:
+    """Parameters by wheel type, all positive.
+
+    Attributes:
+        drive_kx: Stiffness along x of a drive wheel [N/m].
+        drive_ky: Along y.
+        front_k: Of a front caster, in both directions [N/m].
+        back_k: Of a back caster [N/m].
+        drive_mu: Friction of a drive wheel [-].
+        front_mu: Of a front caster.
+        back_mu: Of a back caster.
+        drive_c: Damping of a drive wheel [N.s/m].
+        caster_c: Of a caster [N.s/m].
+        body_c: Damper of the base against the floor [N.s/m].
+        body_cr: The same about the vertical [N.m.s/rad].
+        drive_load: Share of the base's weight on a drive wheel, over what a caster in its place would bear [-].
+    """
+
+    drive_kx: float
+    drive_ky: float
+    front_k: float
+    back_k: float
+    drive_mu: float
+    front_mu: float
+    back_mu: float
+    drive_c: float
+    caster_c: float
+    body_c: float
+    body_cr: float
+    drive_load: float
+
+    @classmethod
+    def of(cls, logarithms: np.ndarray) -> "SlipParameters":
+        """From logarithms (12,) in the order of NAMES."""
+        return cls(*(float(v) for v in np.exp(logarithms)))
+
+    @property
+    def logarithms(self) -> np.ndarray:
+        """(12,) in the order of NAMES."""
+        return np.log([getattr(self, name) for name in NAMES])
+
+
+@dataclass(frozen=True)
+class WheelSet:
+    """Wheels as the stick-slip base sees them, m of them.
+
+    Attributes:
+        names: Of the wheels.
+        types: `drive`, `front` or `back`.
+        position: (m, 2) contact points [m, base frame].
+        weight: (m,) their own [N].
+    """
+
+    names: tuple[str, ...]
+    types: tuple[str, ...]
+    position: np.ndarray
+    weight: np.ndarray
+
+    def rows(self, p: SlipParameters) -> np.ndarray:
+        """(m, 10) x, y, kx, ky, c, mu, n, G as the kernel takes them."""
+        k = {"drive": (p.drive_kx, p.drive_ky), "front": (p.front_k, p.front_k), "back": (p.back_k, p.back_k)}
+        mu = {"drive": p.drive_mu, "front": p.front_mu, "back": p.back_mu}
+        c = [p.drive_c if kind == "drive" else p.caster_c for kind in self.types]
+        n, G = self.loads(p.drive_load)
+        columns = self.position, [k[kind] for kind in self.types], c, [mu[kind] for kind in self.types], n, G
+        return np.ascontiguousarray(np.column_stack(columns))
+
+    def loads(self, drive_load: float) -> tuple[np.ndarray, np.ndarray]:
+        """n (m,) [N] and G (m, 3) of N = n + G (-Fz, My, -Mx)."""
+        share = np.where([kind == "drive" for kind in self.types], drive_load, 1.0)
+        A = np.column_stack([np.ones(len(share)), self.position])
+        G = share[:, None] * (A @ np.linalg.pinv(A.T @ (share[:, None] * A)))
+        return self.weight - G @ (A.T @ self.weight), G
+
+    def stiffness(self, p: SlipParameters) -> np.ndarray:
+        """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""
+        K = np.zeros((3, 3))
+        for x, y, kx, ky in self.rows(p)[:, :4]:
+            A = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])
+            K += A.T @ np.diag([kx, ky]) @ A
+        return K
+
+
+def wheel_set(urdf: str, wheels: Sequence[Wheel], gravity: float) -> WheelSet:
+    """The declared wheels; their masses where the nominal robot has a joint at their hub."""
+    model = pin.buildModelFromXML(urdf)
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    hubs = np.array([data.oMi[i].translation for i in range(1, model.njoints)])
+    weights = []
+    for wheel in wheels:
+        near = np.flatnonzero(np.linalg.norm(hubs - np.array(wheel.centre), axis=1) < _NEAR)
+        weights.append(gravity * sum(model.inertias[int(i) + 1].mass for i in near))
+    position = np.array([w.contact[:2] for w in wheels])
+    drives = [w.type == "drive" for w in wheels]
+    axle = float(position[drives if any(drives) else slice(None), 0].mean())
+    types = tuple("drive" if w.type == "drive" else "front" if w.contact[0] >= axle else "back" for w in wheels)
+    return WheelSet(tuple(w.name for w in wheels), types, position, np.array(weights))
+
+
+def preloads(wheels: WheelSet, p: SlipParameters, load: np.ndarray) -> np.ndarray:
+    """Deflections (PRELOADS, m, 2) [m] in which a base at rest may stand: forces that are in balance.
+
+        f_i uniform in a disk of min(mu_i N_i, PRELOAD),     e = K^-1 (f - K A K_0^-1 sum A' f)
+
+    What happened before a trial is not known, and is lost with the first slip: not without leaving a set. `load` (3,)
+    is (-Fz, My, -Mx) at rest.
+    """
+    rows = wheels.rows(p)
+    N = np.maximum(rows[:, 6] + rows[:, 7:] @ load, 0.0)
+    limit = np.minimum(rows[:, 5] * N, PRELOAD)
+    rng = np.random.Generator(np.random.PCG64(0))
+    shape = PRELOADS, len(rows)
+    radius, angle = limit * np.sqrt(rng.uniform(size=shape)), rng.uniform(0.0, 2.0 * np.pi, shape)
+    f = radius[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    A = np.array([[[1.0, 0.0, -y], [0.0, 1.0, x]] for x, y in wheels.position])
+    shift = np.einsum("eia,iab->eb", f, A) @ np.linalg.inv(wheels.stiffness(p))
+    return f / rows[:, 2:4] - np.einsum("iab,eb->eia", A, shift)

@@ -1,0 +1,117 @@
+"""Torques against closed forms; samples one by one against a recording in one go; JSON; payloads left alone."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from calibration.estimate.plain_values import plain, restored
+from calibration.stages.drive_trains import DriveTrain, DriveTrains, stream_of
+from calibration.stages.drive_trains.drive_train import Quantity
+from calibration.stages.drive_trains.torques import Dynamics, derivatives, inertial_tolerances, inertials
+
+LINK = (
+    '<link name="{0}"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>'
+    '<inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+JOINT = (
+    '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="0 0 {3}"/>'
+    '<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint>'
+)
+URDF = (
+    '<robot name="two"><link name="base"/>'
+    + LINK.format("one")
+    + LINK.format("two")
+    + JOINT.format("first", "base", "one", 0.0)
+    + JOINT.format("second", "one", "two", -0.6)
+    + "</robot>"
+)
+T = np.arange(0.0, 6.0, 0.01)
+Q = np.column_stack([0.8 * np.sin(1.1 * T), 0.9 * np.sin(1.7 * T + 0.4)])
+
+
+def dynamics() -> Dynamics:
+    model = pin.buildModelFromXML(URDF, pin.JointModelFreeFlyer())
+    model.gravity = pin.Motion.Zero()
+    return Dynamics(model, ("first", "second"), np.zeros(2), np.array([0.0, 0.0, -9.81]))
+
+
+def trains() -> DriveTrains:
+    robot, values = dynamics(), np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0])
+    shown = (Quantity("backlash.second.gap", "rad", 6e-3, 1e-4, "estimated"),)
+    of = (
+        DriveTrain("first", "dead_zone", values, dynamic=False, motor=np.array([1e-3, 0.0, 2e-4, 0.0])),
+        DriveTrain("second", "dead_zone", values, inertials=np.full(len(inertials(robot)), 1e-3), parameters=shown),
+    )
+    return DriveTrains(robot, of, np.zeros(2), "", None)  # type: ignore[arg-type]
+
+
+def test_gravity_and_inertia_of_a_pendulum() -> None:
+    robot, q = dynamics(), np.array([[0.3, 0.0]])
+    still = np.zeros((1, 2))
+    torque, inertia, _, _ = robot.evaluated(q, still, still, None, False)
+    assert torque[0, 1] == pytest.approx(2.0 * 9.81 * 0.3 * np.sin(0.3), rel=1e-12)
+    assert inertia[0, 1] == pytest.approx(0.02 + 2.0 * 0.3**2, rel=1e-12)
+
+
+def test_regressors_are_what_other_masses_do() -> None:
+    robot, q = dynamics(), np.array([[0.3, -0.5]])
+    v, a = np.array([[0.7, 0.2]]), np.array([[1.0, -2.0]])
+    torque, _, R, _ = robot.evaluated(q, v, a, None, True)
+    heavier = robot.model.copy()
+    heavier.inertias[3] = heavier.inertias[3] + pin.Inertia(0.1, np.array([0.01, 0.0, 0.2]), np.zeros((3, 3)))
+    again, _, _, _ = replace(robot, model=heavier).evaluated(q, v, a, None, False)
+    dphi = np.zeros(R.shape[2])
+    dphi[4:8] = 0.1, 1e-3, 0.0, 0.02
+    point = 0.1 * np.array([0.2**2 + 0.01**2])  # of a point mass about its joint, which first moments leave out
+    assert (torque + R @ dphi)[0, 1] + point[0] * (a[0].sum()) == pytest.approx(again[0, 1], rel=1e-9)
+    assert inertial_tolerances(robot, 0.1, 0.01).shape == (R.shape[2], R.shape[2])
+
+
+def test_a_tilt_of_the_base_is_a_turned_gravity() -> None:
+    robot, q, still = dynamics(), np.array([[0.3, -0.5]]), np.zeros((1, 2))
+    torque, _, R, _ = robot.evaluated(q, still, still, None, True)
+    tilted = replace(robot, gravity=9.81 * np.array([np.sin(1e-5), 0.0, -np.cos(1e-5)]))
+    again, _, _, _ = tilted.evaluated(q, still, still, None, False)
+    assert (again - torque)[0] / 1e-5 == pytest.approx(R[0, :, -2], rel=1e-4)
+
+
+def test_samples_one_by_one_are_the_recording_in_one_go() -> None:
+    of = trains()
+    smooth, v, a = derivatives(T, Q, 20.0)
+    loads = replace(of.dynamics.loads("", T, Q, None, True), q=smooth)
+    batch, stream = of.of_loads(loads), stream_of(of)
+    state, angles = stream.begin(T[0], smooth[0], v[0], a[0])
+    found = [angles]
+    for i in range(1, len(T)):
+        state, angles = stream.step(state, T[i], smooth[i], v[i], a[i])
+        found.append(angles)
+    for name in ("q", "low", "high", "variance"):
+        one_by_one = np.concatenate([getattr(x, name) for x in found])
+        assert np.abs(one_by_one - getattr(batch, name)).max() < 1e-12
+    assert (np.concatenate([x.determined for x in found]) == batch.determined).all()
+
+
+def test_a_step_leaves_the_state_before_it_as_it_was() -> None:
+    stream = stream_of(trains())
+    state, _ = stream.begin(0.0, Q[0], np.zeros(2), np.zeros(2))
+    kept = state.states.copy()
+    stream.step(state, 0.01, Q[1], np.ones(2), np.zeros(2))
+    assert (state.states == kept).all()
+
+
+def test_link_angles_lag_behind_their_motors_by_half_the_gap_at_least() -> None:
+    of = trains()
+    found = of.link_angles(T, Q)
+    delta = Q - found.q
+    assert 3e-3 < np.abs(delta[:, 1]).max() < 3e-3 + 8e-4 * 20.0
+    assert (found.low <= found.q + 1e-12).all() and (found.q <= found.high + 1e-12).all()
+
+
+def test_drive_trains_come_back_from_json() -> None:
+    of = trains()
+    read = restored(tuple[DriveTrain, ...], json.loads(json.dumps(plain(of.trains))))
+    again = replace(of, trains=read)
+    assert (again.link_angles(T, Q).q == of.link_angles(T, Q).q).all()

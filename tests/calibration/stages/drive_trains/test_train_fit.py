@@ -1,0 +1,113 @@
+"""Recovery of a drive train from data of its own model; derivatives; purity; intervals of an unknown history."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
+from calibration.stages.drive_trains.joint_data import JointData
+from calibration.stages.drive_trains.quantities import reported, uncertainty
+from calibration.stages.drive_trains.train_fit import FLOORS, Problem, derivatives, fit_train, prior_of
+
+TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
+ECCENTRICITY = np.array([4e-3, 1e-3, -2e-3, 3e-4, -5e-4])
+SECONDS = 30.0
+
+
+def data(of: DriveTrain = TRUTH, load: float = 1.2, noise: float = 2e-5, seed: int = 0) -> JointData:
+    rng, t = np.random.default_rng(seed), np.arange(0.0, SECONDS, 0.01)
+    q = np.concatenate([a * np.sin(w * t + p) for a, w, p in ((0.9, 0.9, 0.0), (0.6, 1.7, 1.0), (1.0, 0.6, 2.0))])
+    v, a = np.gradient(q, 0.01), np.gradient(np.gradient(q, 0.01), 0.01)
+    torque = load * np.sin(1.3 * q + 0.2 * np.tile(t, 3))
+    begins = np.array([0, len(t), 2 * len(t), 3 * len(t)])
+    motion = DriveMotion(np.tile(t, 3), q, v, a, torque, np.full(len(q), 0.02), begins)
+    first = np.arange(0, len(q), 10)
+    n = len(first)
+    bare = JointData(
+        ("a", "b", "c"), motion, np.zeros((len(q), 0)), first, np.repeat(np.arange(3), n // 3), np.zeros(n),
+        np.zeros((n, 5)), np.ones(n),
+    )  # fmt: skip
+    terms = np.column_stack([np.ones(n), harmonic_terms(bare.means(q))])
+    low, high = of.ends(torque[begins[:-1]])
+    delta = bare.means(of.deltas(motion, torque, 0.5 * (low + high)))
+    return replace(bare, terms=terms, y=delta + terms @ ECCENTRICITY + noise * rng.normal(size=n))
+
+
+def problem(of_data: JointData) -> Problem:
+    return Problem("joint", of_data, prior_of(of_data, "dead_zone", 8e-3, 1e-2), dynamic=False)
+
+
+START = np.array([2e-3, 5e-4, 0.3, 0.02, 0.0])
+
+
+def test_a_drive_train_is_recovered_from_its_own_data() -> None:
+    fit = fit_train(problem(data()), START)
+    assert fit.theta[0] == pytest.approx(3e-3, rel=0.02)
+    assert fit.theta[1] == pytest.approx(8e-4, rel=0.1)
+    assert fit.theta[2] == pytest.approx(0.15, rel=0.4)  # exchanged for viscous friction in part
+    assert np.abs(fit.gamma - ECCENTRICITY).max() < 2e-4
+    assert np.nanmedian(np.abs(fit.residuals)) < 3e-5
+
+
+def test_no_gap_is_estimated_as_none() -> None:
+    none = replace(TRUTH, values=np.array([0.0, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]))
+    of_data = data(none)
+    fit = fit_train(problem(of_data), START)
+    train = reported(fit.problem.train(fit.theta), fit, uncertainty(fit), 0.0)
+    gap = next(p for p in train.parameters if p.name == "backlash.joint.gap")
+    assert gap.status == "estimated" and gap.value - 1.96 * gap.sigma <= 0.0 < 5e-4
+    assert gap.value < 2e-4
+
+
+def test_a_gap_that_is_never_crossed_is_not_identifiable_and_says_what_would() -> None:
+    of_data = data(load=0.0)
+    loaded = replace(of_data.motion, torque=of_data.motion.torque + 8.0)
+    constant = replace(of_data, motion=loaded, y=of_data.terms @ ECCENTRICITY)
+    fit = fit_train(problem(constant), START, FLOORS[:1])
+    train = reported(fit.problem.train(fit.theta), fit, uncertainty(fit), 0.0)
+    gap = next(p for p in train.parameters if p.name == "backlash.joint.gap")
+    assert gap.status == "not_identifiable" and gap.sigma > 1e-3
+    assert "changes sign" in gap.remedy
+
+
+def test_derivatives_are_those_of_a_smaller_step() -> None:
+    of = problem(data(noise=0.0))
+    theta, gamma = np.append(TRUTH.values[:4], 0.0), ECCENTRICITY
+    J = derivatives(of, theta, gamma)
+    finer = replace(of, prior=replace(of.prior, step=0.1 * of.prior.step))
+    K = derivatives(finer, theta, gamma)
+    for j in range(2):
+        assert np.median(np.abs(J[:, j] - K[:, j])) < 0.02 * np.abs(K[:, j]).max()
+    assert (J[:, 5:] == of.data.terms).all()
+
+
+def test_a_fit_leaves_its_data_and_start_as_they_were() -> None:
+    of_data, start = data(), START.copy()
+    before = {name: getattr(of_data.motion, name).copy() for name in ("q", "v", "torque", "inertia")}
+    y = of_data.y.copy()
+    fit_train(problem(of_data), start, FLOORS[:1])
+    assert (start == START).all() and (of_data.y == y).all()
+    assert all((getattr(of_data.motion, name) == x).all() for name, x in before.items())
+
+
+def test_a_trial_without_readings_is_left_out() -> None:
+    of_data = data().without(1)
+    fit = fit_train(problem(of_data), START, FLOORS[:2])
+    assert np.isnan(fit.residuals[of_data.trial == 1]).all()
+    assert fit.theta[0] == pytest.approx(3e-3, rel=0.05)
+
+
+def test_the_interval_of_an_unknown_start_closes_once_the_gap_was_crossed() -> None:
+    of_data = data(load=0.0)
+    train = replace(TRUTH, torque_sigma=0.0)
+    found = train.backlash(of_data.motion)
+    width = found.high - found.low
+    assert width[0] == pytest.approx(2.0 * (3e-3 + 0.15 * 8e-4), rel=0.02)
+    assert width[600:3000].max() < 1e-9
+    assert (found.low <= found.value + 1e-12).all() and (found.value <= found.high + 1e-12).all()
+
+
+def test_a_known_start_has_no_interval() -> None:
+    found = TRUTH.backlash(data().motion, np.array([1e-3, 0.0, -1e-3]))
+    assert (found.low == found.high).all()

@@ -1,0 +1,114 @@
+"""A base on six wheels that slips as the model says, integrated literally, step by step and wheel by wheel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.numerics.signals import RATE
+from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing
+from calibration.stages.stick_slip.kernel import STATE, advance
+from calibration.stages.stick_slip.likelihood import Trials, body, joined
+from calibration.stages.stick_slip.measured import PlanarMotion, blocks
+from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet
+
+POSITION = np.array([[0.0, -0.2], [0.0, 0.2], [0.15, -0.1], [0.15, 0.1], [-0.19, -0.1], [-0.19, 0.1]])
+WHEELS = WheelSet(
+    ("right", "left", "front_right", "front_left", "back_right", "back_left"),
+    ("drive", "drive", "front", "front", "back", "back"),
+    POSITION,
+    np.array([40.0, 40.0, 0.0, 0.0, 0.0, 0.0]),
+)
+TRUTH = SlipParameters(4200.0, 7700.0, 14e3, 24e3, 0.55, 0.24, 0.065, 140.0, 70.0, 3.0, 0.5, 1.05)
+MASS = np.array([[74.0, 0.0, -1.5], [0.0, 74.0, 2.0], [-1.5, 2.0, 3.5]])
+WEIGHT = np.array([730.0, 20.0, 3.0])  # -Fz, My, -Mx
+
+
+@dataclass(frozen=True)
+class Motion:
+    """At every step: position (n, 3), velocity, force on the floor, and deflections (n, m, 2)."""
+
+    x: np.ndarray
+    v: np.ndarray
+    force: np.ndarray
+    e: np.ndarray
+    slides: np.ndarray
+
+
+def literal(w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.ndarray | None = None) -> Motion:
+    """The equations of `kernel` without a plate, under w (n, 3), as its docstring has them."""
+    rows = WHEELS.rows(p)
+    x, v, e = np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
+    out = []
+    for k, force in enumerate(w):
+        F = np.array([p.body_c, p.body_c, p.body_cr]) * v
+        rx, ry = (0.0, 0.0) if tilt is None else tilt[k]
+        slides = np.zeros(len(rows), dtype=bool)
+        for i, (px, py, kx, ky, c, mu, n, *G) in enumerate(rows):
+            A = np.array([[1.0, 0.0, -py], [0.0, 1.0, px]])
+            N, K = max(n + np.dot(G, WEIGHT), 0.0), np.array([kx, ky])
+            q = N * np.array([-ry, rx])
+            new = e[i] + A @ v * h
+            f = K * new + c * (A @ v) + q
+            if np.linalg.norm(f) > mu * N:
+                f = f * mu * N / np.linalg.norm(f)
+                new = (f - q + c / h * e[i]) / (K + c / h)
+                slides[i] = True
+            e[i] = new
+            F += A.T @ f
+        x = x + h * v
+        a = np.linalg.solve(MASS, force - F)
+        out.append((x, v, F, e.copy(), slides))
+        v = v + h * a
+    return Motion(*(np.array(column) for column in zip(*out, strict=True)))
+
+
+def slid(w: np.ndarray, p: SlipParameters = TRUTH) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n, 3) and forces on the floor (n, 3) at every step, by the kernel itself, under w (n, 3)."""
+    state, e, rows, settings = np.zeros(STATE), np.zeros((len(POSITION), 2)), WHEELS.rows(p), body(p, False)
+    drive, inertia = np.zeros((len(w), 11)), np.zeros(15)
+    drive[:, :3], drive[:, 3:6], inertia[:6] = w, WEIGHT, MASS[np.triu_indices(3)]
+    x, a = np.empty((len(w), 3)), np.empty((len(w), 3))
+    for k in range(len(w)):
+        advance(state, e, drive[k : k + 1], inertia, rows, settings, STEP)
+        x[k], a[k] = state[:3], state[9:12]
+    return x, w - a @ MASS
+
+
+def push(rng: np.random.Generator, seconds: float = 8.0, size: float = 1.0) -> np.ndarray:
+    """Forces (n, 3) in the plane at every step: a second of rest, then swings with two jolts."""
+    t = np.arange(round(seconds / STEP)) * STEP
+    f, phase = rng.uniform(0.2, 0.6, 3), rng.uniform(0.0, 6.0, 3)
+    swing = np.sin(2.0 * np.pi * f * (t[:, None] - 1.0) + phase) - np.sin(phase)
+    jolts = sum(np.exp(-(((t - at) / 0.06) ** 2)) for at in rng.uniform(1.5, seconds - 1.0, 2))
+    w = swing * [4.0, 6.0, 3.0] + jolts[:, None] * rng.choice([-1.0, 1.0], 3) * [30.0, 60.0, 40.0]
+    return size * w * (t >= 1.0)[:, None]
+
+
+def forcing(w: np.ndarray, plate: np.ndarray | None = None) -> PlanarForcing:
+    """What the kernel takes under w (n, 3), with a plate that reads `plate` (n, 3) or without."""
+    n = len(w) // STEPS
+    drive = np.zeros((n * STEPS, 11))
+    drive[:, :3], drive[:, 3:6] = w[: n * STEPS], WEIGHT
+    if plate is not None:
+        drive[:, 8:] = plate[: n * STEPS]
+    inertia = np.zeros((n, 15))
+    inertia[:, :6] = MASS[np.triu_indices(3)]
+    t = np.arange(n) / RATE
+    source, none = "dynamics" if plate is None else "plate", np.zeros((n, 3))
+    return PlanarForcing("a", source, t, drive, inertia, none, t <= 1.0, none)
+
+
+def recorded(rng: np.random.Generator, noise: float = 2e-5, plate: bool = True) -> tuple[PlanarForcing, PlanarMotion]:
+    """A trial and what its markers show."""
+    w = push(rng)
+    x, force = slid(w)
+    one = forcing(w, force if plate else None)
+    sigma = noise * np.array([1.0, 1.0, 4.0])
+    x = blocks(x[STEPS - 1 :: STEPS])
+    return one, PlanarMotion(x + sigma * rng.normal(size=x.shape), np.ones(len(x), dtype=bool), sigma)
+
+
+def campaign(n: int, seed: int, plate: bool = True) -> Trials:
+    """n trials."""
+    rng = np.random.default_rng(seed)
+    return joined(WHEELS, [recorded(rng, plate=plate) for _ in range(n)])

@@ -1,0 +1,54 @@
+import numpy as np
+
+from calibration.stages.stick_slip.band import Band, LeftOut, ensemble_of, fitted_band, slid_path
+from calibration.stages.stick_slip.model import believed
+from calibration.stages.stick_slip.wheels import NAMES
+from tests.calibration.stages.stick_slip import slipping
+from tests.calibration.stages.stick_slip.slipping import TRUTH
+
+NOISE = np.array([1e-6, 1e-6, 1e-6])
+
+
+def rows(rng, n=6000):
+    """Errors whose variances are known, that grow with the path and the members' spread."""
+    ensemble = rng.gamma(1.0, 1e-9, (n, 3))
+    preloaded, path = rng.gamma(1.0, 1e-10, (n, 3)), np.cumsum(rng.gamma(0.1, 1e-5, (n, 3)), axis=0)
+    V = (2e-5) ** 2 + 4.0 * ensemble + 1.0 * preloaded + 3e-7 * path
+    return LeftOut(np.sqrt(V) * rng.normal(size=(n, 3)), ensemble, preloaded, path, np.ones(n)), V
+
+
+def test_the_band_holds_its_share_of_what_it_has_not_seen():
+    rng = np.random.default_rng(1)
+    band = fitted_band(rows(rng)[0], NOISE)
+    new, _ = rows(rng)
+    V = band.variance(new.ensemble, new.preloaded, new.path)
+    share = (np.abs(new.errors) < 1.96 * np.sqrt(V)).mean(axis=0)
+    assert np.all(share > 0.90) and np.all(share < 0.98)
+
+
+def test_the_band_grows_with_what_slid_and_never_shrinks_below_its_floor():
+    band = Band(*(np.full(3, v) for v in (2e-5, 1.0, 1.0, 1e-7)))
+    x = np.cumsum(np.full((100, 3), 1e-4), axis=0)
+    share = np.repeat([0.0, 0.5], 50)
+    path = slid_path(x, share)
+    V = band.variance(np.zeros((100, 3)), np.zeros((100, 3)), path)
+    np.testing.assert_allclose(V[:50], 4e-10)
+    assert np.all(np.diff(V[50:], axis=0) > 0.0)
+    np.testing.assert_allclose(path[-1], 50 * 0.5 * 1e-4)
+
+
+def test_a_slip_is_believed_as_far_as_it_is_larger_than_its_band():
+    slip = np.array([[0.0, 1e-3, 1e-3], [1e-3, 1e-3, 1e-4]])
+    kept = believed(slip, np.array([[0.0, 0.0, 1e-6], [2e-6, 5e-7, 2.5e-7]]))
+    np.testing.assert_allclose(kept, [[1.0, 1.0, 0.0], [0.0, 0.5, 0.75]])
+
+
+def test_members_are_draws_of_the_posterior_that_the_data_bear():
+    trials = slipping.campaign(3, seed=2)
+    p = TRUTH.logarithms
+    one_sided = np.diag(np.where([name == "drive_mu" for name in NAMES], 0.7, 1e-4) ** 2)
+    members = ensemble_of(trials, p, one_sided)
+    np.testing.assert_array_equal(members[0], p)
+    drives = members[1:, NAMES.index("drive_mu")] - p[NAMES.index("drive_mu")]
+    assert (drives > 0.0).mean() > 0.6  # less friction would slip, and none of the trials does
+    np.testing.assert_array_equal(members, ensemble_of(trials, p, one_sided))

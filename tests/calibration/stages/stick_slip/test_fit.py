@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+
+from calibration.stages.stick_slip.fit import fit_direction, fitted, left_out
+from calibration.stages.stick_slip.likelihood import joined
+from calibration.stages.stick_slip.search import searched
+from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, SlipParameters
+from tests.calibration.stages.stick_slip import slipping
+from tests.calibration.stages.stick_slip.slipping import TRUTH
+
+SHOWN = ("drive_kx", "drive_ky", "front_k", "back_k", "front_mu", "back_mu")
+
+
+ROWS = [NAMES.index(name) for name in SHOWN]
+NEAR = TRUTH.logarithms + np.array([0.2, -0.2] * 6)
+
+
+@pytest.fixture(scope="module")
+def trials():
+    """From inverse dynamics alone, which here are exact."""
+    return slipping.campaign(4, seed=5, plate=False)
+
+
+@pytest.fixture(scope="module")
+def found(trials):
+    return fitted(trials, NEAR)
+
+
+def test_a_fit_finds_what_made_the_data_and_is_sure_of_no_more(trials, found):
+    error = (found.logarithms - TRUTH.logarithms)[ROWS]
+    sigma = np.sqrt(np.diag(found.covariance))[ROWS]
+    np.testing.assert_allclose(error[:4], 0.0, atol=0.02)  # stiffnesses
+    np.testing.assert_allclose(error[4:], 0.0, atol=0.05)  # frictions: slip shows mu N, the prior N's share
+    assert np.all(np.abs(error) < 4.0 * np.maximum(sigma, 2e-3))
+    assert found.cost <= trials.cost(TRUTH.logarithms, trials.errors(TRUTH.logarithms)) + 1.0
+
+
+def test_from_far_off_the_search_comes_to_the_same(trials, found):
+    best, _ = searched(trials)
+    np.testing.assert_allclose(best.logarithms[ROWS], found.logarithms[ROWS], atol=0.03)
+
+
+def test_several_starts_are_made_and_the_best_is_kept(trials):
+    best, starts = searched(trials)
+    assert len(starts) >= 2 and best.cost <= min(starts)
+
+
+def test_the_gradient_is_that_of_the_cost(trials):
+    at = TRUTH.logarithms + 0.02
+    _, g = trials.normal(at, trials.errors(at), both=True)
+    gradient = 2.0 * (g.sum(axis=0) + (at - PRIOR) / PRIOR_SIGMA**2)
+    for i in (0, 2, 3, 6):
+        step = 0.01 * np.eye(len(NAMES))[i]
+        ends = [trials.cost(p, trials.errors(p)) for p in (at + step, at - step)]
+        assert gradient[i] == pytest.approx((ends[0] - ends[1]) / 0.02, rel=0.05, abs=2.0)
+
+
+def test_a_friction_that_nothing_reaches_keeps_its_prior(found):
+    i = NAMES.index("drive_mu")
+    assert np.sqrt(found.covariance[i, i]) > 0.8 * PRIOR_SIGMA[i]
+
+
+def test_without_a_trial_the_parameters_are_near_those_of_all(trials, found):
+    assert found.others.shape == (len(trials.ids), len(NAMES))
+    assert np.abs(found.others - found.logarithms)[:, ROWS].max() < 0.1
+
+
+def test_trials_left_out_are_predicted(trials):
+    direction = fit_direction("dynamics", trials, NEAR)
+    assert np.all(direction.held_out.r2 > 0.98)
+    assert direction.held_out.error.shape == (4, 3)
+    x, share = left_out(trials, np.repeat(direction.logarithms[None], 4, axis=0))
+    np.testing.assert_array_equal(x, trials.simulated(direction.logarithms)[0])
+    assert len(share) == len(x)
+
+
+def test_a_window_that_slips_as_nobody_could_know_counts_little():
+    rng = np.random.default_rng(8)
+    rows = [slipping.recorded(rng, plate=False) for _ in range(4)]
+    rows[1][1].x[80:] += [3e-3, -2e-3, 20e-3]  # pushed
+    found = fitted(joined(slipping.WHEELS, rows), NEAR).logarithms
+    np.testing.assert_allclose((found - TRUTH.logarithms)[ROWS], 0.0, atol=0.05)
+
+
+def test_twice_the_same(trials):
+    p = SlipParameters.of(PRIOR).logarithms
+    np.testing.assert_array_equal(trials.errors(p), trials.errors(p))

@@ -1,0 +1,122 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.errors import NoSuchElement
+from calibration.estimate.plain_values import plain, restored
+from calibration.stages.stick_slip.fit import fit_direction
+from calibration.stages.stick_slip.forcing import STEPS, Tilting
+from calibration.stages.stick_slip.model import StickSlip
+from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
+from calibration.stages.stick_slip.stream import Sample, slip_stream
+from tests.calibration.stages.stick_slip import slipping
+from tests.calibration.stages.stick_slip.slipping import MASS, TRUTH, WEIGHT, WHEELS
+
+
+@pytest.fixture(scope="module")
+def model():
+    direction = fit_direction("plate", slipping.campaign(3, seed=21), TRUTH.logarithms)
+    return StickSlip(WHEELS, Tilting(np.eye(6), np.eye(6)), np.full(3, 1e-10), (direction,))
+
+
+@pytest.fixture(scope="module")
+def new():
+    return trial(33)
+
+
+def trial(seed, size=1.0):
+    """A forcing and the true motion."""
+    w = slipping.push(np.random.default_rng(seed), size=size)
+    x, force = slipping.slid(w)
+    return slipping.forcing(w, force), x[STEPS - 1 :: STEPS]
+
+
+def test_new_trials_are_predicted_within_their_bands(model):
+    inside, left, moved = [], [], []
+    for seed in range(40, 48):
+        forcing, true = trial(seed, size=0.7)  # less than in the calibration trials
+        found = model.predict(forcing)
+        error = found.x - true
+        left.append((error**2).sum(axis=0))
+        moved.append((true**2).sum(axis=0))
+        assert found.share.max() > 0.0 and np.all(found.kept <= 1.0)
+        inside.append((np.abs(error) < 1.96 * np.sqrt(found.variance)).mean(axis=0))
+    assert np.all(np.median(np.array(left) / moved, axis=0) < 0.05)
+    assert np.all(np.mean(inside, axis=0) > 0.9)
+
+
+def test_the_band_sees_a_slip_coming_that_nobody_can_predict(model):
+    forcing, true = trial(42)  # its jolts reach the friction of the drives, which no calibration trial did
+    known, _ = trial(43)
+    found = model.predict(forcing)
+    sigma = np.sqrt([p.variance[-1] for p in (found, model.predict(known))])
+    assert np.all(sigma[0] > 10.0 * sigma[1])
+    assert np.all(np.abs(found.x - true)[-1] < 4.0 * sigma[0])
+
+
+def test_prediction_is_pure(model, new):
+    before = new[0].drive.copy()
+    first, second = model.displacement(new[0]), model.displacement(new[0])
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(before, new[0].drive)
+    assert first[0].shape == first[1].shape == (len(new[0].t), 6)
+
+
+def test_an_axis_that_is_linear_is_the_compliances(model, new):
+    linear = np.array([False, False, True])
+    direction = replace(model.directions[0], linear=linear, linear_variance=np.full(3, 4e-8))
+    forcing = replace(new[0], linear=np.full((len(new[0].t), 3), 1e-3))
+    found, before = replace(model, directions=(direction,)).predict(forcing), model.predict(new[0])
+    np.testing.assert_array_equal(found.x[:, 2], 1e-3)
+    np.testing.assert_array_equal(found.variance[:, 2], 4e-8)
+    np.testing.assert_array_equal(found.x[:, :2], before.x[:, :2])
+
+
+def test_a_source_that_was_not_fitted_is_refused(model):
+    with pytest.raises(NoSuchElement, match="dynamics"):
+        model.predict(slipping.forcing(np.zeros((200, 3))))
+
+
+def test_samples_one_by_one_are_what_a_recording_is(model, new):
+    forcing, _ = new
+    batch, stream, state, x = model.predict(forcing), slip_stream(model), None, []
+    for k, t in enumerate(forcing.t):
+        last = forcing.drive[STEPS * k + STEPS - 1]
+        wrench = np.array([*last[8:10], -WEIGHT[0], -WEIGHT[2], WEIGHT[1], last[10]])
+        sample = Sample(float(t), wrench, np.zeros(2), last[:3], MASS[np.triu_indices(3)])
+        state = stream.stepped(sample, state)
+        x.append(state.x)
+    moved = np.abs(batch.x).max(axis=0)
+    assert np.all(np.abs(np.array(x) - batch.x).max(axis=0) < 0.1 * moved)
+    np.testing.assert_allclose(state.variance, batch.variance[-1], rtol=0.5)
+
+
+def test_a_plate_alone_moves_a_base_of_no_inertia(model, new):
+    forcing, true = new
+    stream, state, x = slip_stream(model), None, []
+    for k, t in enumerate(forcing.t):
+        last = forcing.drive[STEPS * k + STEPS - 1]
+        wrench = np.array([*last[8:10], -WEIGHT[0], -WEIGHT[2], WEIGHT[1], last[10]])
+        state = stream.stepped(Sample(float(t), wrench, np.zeros(2)), state)
+        x.append(state.x)
+    error = np.abs(np.array(x) - true).mean(axis=0)
+    assert np.all(error < 0.5 * np.abs(true).mean(axis=0))
+
+
+def test_parameters_have_the_names_of_the_contract(model):
+    found = {p.name: p for p in wheel_parameters(WHEELS, model.directions[0])}
+    assert found["suspension.front_left.kx"].value == found["suspension.front_right.ky"].value
+    assert found["suspension.front_left.kx"].status == "estimated"
+    assert found["contact.left.mu"].status == found["suspension.left.cx"].status == "not_identifiable"
+    assert found["contact.back_left.mu"].unit == "-" and found["slip.body_cr"].unit == "N.m.s/rad"
+    C = covariance_of(WHEELS, model.directions[0])
+    np.testing.assert_allclose(np.sqrt(np.diag(C)), [p.sigma for p in found.values()])
+
+
+def test_a_model_is_the_same_after_it_was_written(model, new):
+    again = restored(StickSlip, json.loads(json.dumps(plain(model))))
+    for a, b in zip(model.displacement(new[0]), again.displacement(new[0]), strict=True):
+        np.testing.assert_array_equal(a, b)

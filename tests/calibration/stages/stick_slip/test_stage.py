@@ -1,0 +1,110 @@
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import mjcf
+from calibration.recording.clock import Clock
+from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses
+from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
+from calibration.stages.suspension.base_response import laboratory
+from calibration.stages.suspension.cross_validation import HeldOut
+from calibration.stages.suspension.modal_response import modes_of
+from calibration.stages.suspension.model import Suspension
+from tests.doubles import rigid_robot
+from tests.doubles.swaying_base import T_LAB_BASE, WHEELS, moved
+
+DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
+RECORDED = rigid_robot.Truth(marker_sigma=1e-5, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))
+ROBOT, PLATE = (Clock(i, 0.0, 0.0, np.zeros((2, 2)), 0.0, 1e-4) for i in ("robot", "plate"))
+STUCK = SlipParameters(5e3, 9e3, 12e3, 20e3, 9.0, 9.0, 9.0, 100.0, 80.0, 1.0, 0.1, 1.0)
+
+
+def stiffness():
+    """K and C (6, 6): the wheels in the plane, and a soft tilt."""
+    K, plane = np.diag([1.0, 1.0, 9e5, 2e4, 2e4, 1.0]), [0, 1, 5]
+    K[np.ix_(plane, plane)] = wheel_set(mjcf.urdf(), WHEELS, 9.81).stiffness(STUCK)
+    return K, 0.006 * K
+
+
+def record(name, joints, rng):
+    """A trial of a base that answers the arm's wrench without inertia and without slip."""
+    amplitudes = np.zeros(8)
+    amplitudes[joints] = 0.12
+    motor = rigid_robot.swing(amplitudes, rng.uniform(0.3, 0.6, 8), 6.0)
+    trial = rigid_robot.record(RECORDED, motor, 0.0, rng)
+    t = np.arange(len(motor) // 5) / (rigid_robot.GRID / 5.0)
+    w = rigid_robot.plate_wrench(RECORDED, motor[::5], T_LAB_BASE, rigid_robot.GRID / 5.0)[: len(t)]
+    w_0 = np.linalg.solve(pin.SE3(T_LAB_BASE).dualAction, w.T).T
+    K, C = stiffness()
+    G = np.zeros((6, 6))
+    G[0, 4], G[1, 3] = w_0[0, 2], -w_0[0, 2]
+    x = modes_of(K + G, C, np.zeros((6, 6))).respond(w_0 - w_0[0], 5.0 / rigid_robot.GRID)
+    clean = np.stack([np.interp(trial.t_plate, t, column) for column in w.T], axis=1)
+    return replace(moved(trial, x, t), id=name, plate_wrench=clean[:, None]), x, t
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    rng = np.random.default_rng(1)
+    return [record(name, joints, rng) for name, joints in {"a": [1, 2], "b": [1, 3], "c": [1, 4], "d": [1, 2]}.items()]
+
+
+@pytest.fixture(scope="module")
+def suspension():
+    K, C = stiffness()
+    none, sums = np.zeros((6, 6)), np.ones((3, 6))
+    tried = HeldOut(1e-6 * sums, 1e-6 * sums, 1e-12 * sums, np.ones(3))
+    return Suspension("compliance", K, C, none, none, none, none, (("plate", tried),), (), ())
+
+
+def fit(trials, suspension, robot=ROBOT, plate=PLATE, description=DESCRIPTION):
+    return fit_stick_slip(laboratory(mjcf.urdf(), description, robot, plate), trials, suspension)
+
+
+def test_without_joints_the_plate_alone_moves_the_base(recorded, suspension):
+    model, said = fit([r[0] for r in recorded[:3]], suspension, robot=None)
+    assert [d.source for d in model.directions] == ["plate"] and said[0].verdict == "ok"
+    assert "yaw 0.9" in said[0].message
+    new, x, t = recorded[3]
+    lab = laboratory(mjcf.urdf(), DESCRIPTION, None, PLATE)
+    found = slipping_base_poses(model, lab, new, "plate")
+    true = np.interp(new.t_mocap, t, x[:, 5])
+    heading = np.arctan2(found.T_lab_B[:, 1, 0], found.T_lab_B[:, 0, 0])
+    error = heading - heading[:50].mean() - true
+    assert (error**2).sum() < 0.1 * (true**2).sum()
+    assert found.variance.shape == (len(new.t_mocap), 6)
+
+
+def test_a_base_that_was_moved_is_named(recorded, suspension):
+    trials = [r[0] for r in recorded[:3]]
+    position = trials[1].marker_position.copy()
+    position[len(position) // 2 :] += [0.03, 0.0, 0.0]
+    trials[1] = replace(trials[1], marker_position=position)
+    _, said = fit(trials, suspension, robot=None)
+    assert [v.message.split(":")[0] for v in said if "was it moved" in v.message] == ["b"]
+
+
+def test_axes_that_the_compliance_predicts_better_are_linear(recorded, suspension):
+    sums = np.ones((3, 6))
+    better = (("plate", HeldOut(1e-14 * sums, 1e-6 * sums, 0.0 * sums, np.ones(3))),)
+    model, said = fit([r[0] for r in recorded[:3]], replace(suspension, held_out=better), robot=None)
+    assert model.directions[0].linear.all() and "linear" in said[0].message
+
+
+def test_what_is_missing_is_named(recorded, suspension):
+    trials = [r[0] for r in recorded[:2]]
+    model, said = fit(trials, suspension, description=DESCRIPTION.model_copy(update={"wheels": ()}))
+    assert model is None and "wheels" in said[0].message and said[0].verdict == "missing"
+    model, said = fit(trials, suspension, robot=None, plate=None)
+    assert model is None and "two trials" in said[0].message
+    model, said = fit(trials[:1], suspension)
+    assert model is None
+
+
+def test_trials_that_contradict_the_wheels_are_named(recorded, suspension):
+    """Here the plate does not feel the base's own inertia, which no real one does."""
+    model, said = fit([r[0] for r in recorded[:2]], suspension)
+    assert [d.source for d in model.directions] == ["plate", "dynamics"]
+    assert said[0].verdict == "warning" and "left still" in said[0].message and "plate's axes" in said[0].message

@@ -1,0 +1,46 @@
+import numpy as np
+
+import mjcf
+from calibration.stages.stick_slip.wheels import NAMES, PRIOR, SlipParameters, preloads, wheel_set
+from tests.calibration.stages.stick_slip.slipping import POSITION, TRUTH, WEIGHT, WHEELS
+from tests.doubles.swaying_base import WHEELS as DECLARED
+
+
+def test_parameters_are_their_logarithms():
+    assert SlipParameters.of(TRUTH.logarithms) == SlipParameters.of(SlipParameters.of(TRUTH.logarithms).logarithms)
+    np.testing.assert_allclose(SlipParameters.of(PRIOR).logarithms, PRIOR)
+    assert len(NAMES) == len(PRIOR) == 12
+
+
+def test_the_wheels_bear_the_weight_where_it_is():
+    n, G = WHEELS.loads(1.1)
+    N = n + G @ WEIGHT
+    np.testing.assert_allclose([N.sum(), N @ POSITION[:, 0], N @ POSITION[:, 1]], WEIGHT)
+    lighter = np.subtract(*(WHEELS.loads(share)[0] + WHEELS.loads(share)[1] @ WEIGHT for share in (1.2, 1.0)))
+    assert np.all(lighter[:2] > 0.0) and np.all(lighter[2:] < 0.0)
+
+
+def test_stiffness_is_the_sum_over_wheels():
+    K = WHEELS.stiffness(TRUTH)
+    assert K[0, 0] == 2 * (TRUTH.drive_kx + TRUTH.front_k + TRUTH.back_k)
+    assert K[1, 1] == 2 * (TRUTH.drive_ky + TRUTH.front_k + TRUTH.back_k)
+    x = 0.15 * TRUTH.front_k - 0.19 * TRUTH.back_k
+    np.testing.assert_allclose(K[1, 2], 2 * x)
+
+
+def test_preloaded_wheels_are_in_balance_and_as_strong_as_said():
+    e = preloads(WHEELS, TRUTH, WEIGHT)
+    f = e * WHEELS.rows(TRUTH)[:, 2:4]
+    total = np.stack([f[..., 0].sum(axis=1), f[..., 1].sum(axis=1)])
+    moment = (POSITION[:, 0] * f[..., 1] - POSITION[:, 1] * f[..., 0]).sum(axis=1)
+    assert np.abs(total).max() < 1e-9 and np.abs(moment).max() < 1e-9
+    assert 0.5 < np.linalg.norm(f, axis=2).mean() < 2.0
+    np.testing.assert_array_equal(e, preloads(WHEELS, TRUTH, WEIGHT))
+
+
+def test_a_wheel_weighs_what_the_nominal_robot_says():
+    found = wheel_set(mjcf.urdf(), DECLARED, 9.81)
+    assert found.types.count("drive") == 2 and found.types.count("front") == 2 and found.types.count("back") == 2
+    drives = found.weight[[kind == "drive" for kind in found.types]]
+    np.testing.assert_allclose(drives, 4.4 * 9.81)
+    assert np.all(found.weight[[kind != "drive" for kind in found.types]] < 2.0)
