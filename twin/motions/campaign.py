@@ -70,6 +70,7 @@ class Campaign:
 
     Attributes:
         ramp: Duration of the velocity ramp that starts and stops a motion [s].
+        posture_ramp: The same of a move between postures, which a laboratory plays softly [s]; None: `ramp`.
         rest: Rest at the start and end of each trial [s].
         speed: Of moves between postures [rad/s].
         dwell: Rest in each static posture [s].
@@ -107,6 +108,7 @@ class Campaign:
     push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     confirmation: bool = False
     driving: Driving = field(default_factory=Driving)
+    posture_ramp: Annotated[float, Field(gt=0.0, le=3.0)] | None = None
     carried: bool = False
     only: tuple[TrialName, ...] = ()
     given_postures: tuple[GivenPosture, ...] = ()

@@ -52,8 +52,9 @@ def no_dwells() -> tuple[np.ndarray, np.ndarray]:
 
 def _straight(a: np.ndarray, b: np.ndarray, campaign: Campaign) -> np.ndarray:
     """Set-points (n, 8) of a move, its start left out."""
-    move = float(np.ceil(RATE * max(0.5, np.abs(b - a)[1:].max() / campaign.speed)) / RATE) + campaign.ramp
-    s = path_time(_times(move)[1:], move, campaign.ramp) / (move - min(campaign.ramp, move / 2.0))
+    ramp = campaign.ramp if campaign.posture_ramp is None else campaign.posture_ramp
+    move = float(np.ceil(RATE * max(0.5, np.abs(b - a)[1:].max() / campaign.speed)) / RATE) + ramp
+    s = path_time(_times(move)[1:], move, ramp) / (move - min(ramp, move / 2.0))
     return np.asarray(a + s[:, None] * (b - a))
 
 

@@ -64,6 +64,21 @@ def test_a_soft_start_is_soft(config):
     assert first_step(1.5) < 0.2 * first_step(0.12)
 
 
+def test_moves_between_postures_have_a_ramp_of_their_own(config):
+    through = np.zeros((2, 8))
+    through[1, 1] = 1.0
+
+    def command(**ramps):
+        return motions.static_postures("a", "calibration", through, replace(config.campaign, **ramps)).command[:, 1]
+
+    soft, abrupt = command(ramp=0.12, posture_ramp=0.6), command(ramp=0.12, posture_ramp=None)
+    speed = [np.abs(np.diff(q)).max() * RATE for q in (soft, abrupt)]
+    np.testing.assert_allclose(speed, min(config.campaign.speed, 2.0), rtol=0.02)
+    acceleration = [np.abs(np.diff(q, 2)).max() * RATE**2 for q in (soft, abrupt)]
+    np.testing.assert_allclose(acceleration, [speed[0] / 0.6, speed[1] / 0.12], rtol=0.05)
+    np.testing.assert_array_equal(command(ramp=0.6, posture_ramp=None), soft)
+
+
 @pytest.mark.parametrize(("duration", "amplitude"), [(3.0, 0.15), (6.0, 0.3), (12.0, 0.6), (20.0, 0.6)])
 def test_a_short_sweep_is_smaller_rather_than_faster(duration, amplitude):
     path = motions.sweep_path("arm_1_joint", duration)
