@@ -3,6 +3,7 @@
 import re
 import tomllib
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 from ruamel.yaml import YAML
@@ -54,7 +55,7 @@ def test_every_command_that_is_written_down_exists_and_the_other_way_round():
 @pytest.mark.parametrize("name", PAGES)
 def test_python_in_the_documents_compiles(name):
     for block in blocks((ROOT / name).read_text(encoding="utf-8"), "python"):
-        compile(block, name, "exec")
+        compile(dedent(block), name, "exec")
 
 
 @pytest.mark.parametrize("name", PAGES)
