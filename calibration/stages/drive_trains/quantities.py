@@ -15,6 +15,7 @@ from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, Q
 from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, TrainFit, derivatives, weights
 
 _NARROWED, _SHARE = 0.5, 0.33
+_RARER = 0.01  # share of the samples, at least, in which a mesh may lie on its rarer side
 _SPOKEN = 1e-6  # share of the prior's standard deviation: less, and no block speaks for a parameter
 _MOTOR = np.array([3e-4, 3e-4, 1e-4, 1e-4])  # [rad] prior of a motor encoder's eccentricity, seen at the joint
 _REMEDIES = {
@@ -84,6 +85,10 @@ def reported(train: DriveTrain, fit: TrainFit, known: Uncertainty, motor_offset:
             continue
         i = names.index(what)
         status = _status(float(fit.theta[i]), float(sigma[i]), float(fit.problem.prior.width[i]))
+        if what == "half_gap" and not reverses(
+            fit.problem.data.motion.torque, float(fit.theta[names.index("coulomb")])
+        ):
+            status, sigma[i] = "not_identifiable", fit.problem.prior.width[i]
         found.append(_quantity(train.joint, name, unit, factor * fit.theta[i], factor * sigma[i], status, what))
     if np.isfinite(train.link).all():
         name = f"encoder.{train.joint}.link.offset"
@@ -99,6 +104,15 @@ def reported(train: DriveTrain, fit: TrainFit, known: Uncertainty, motor_offset:
             _quantity(train.joint, name, "rad", train.motor[k], _MOTOR[k], "not_identifiable", "motor")
         )  # fmt: skip
     return replace(train, parameters=tuple(found))
+
+
+def reverses(torque: np.ndarray, coulomb: float) -> bool:
+    """Whether torques (n,) [N.m] with dry friction press the mesh against both its sides: only then is a gap seen.
+
+    A load beyond friction in all but a hundredth of the samples, always of one sign, keeps the mesh on one side.
+    """
+    shares = np.mean(torque > coulomb), np.mean(torque < -coulomb)
+    return bool(max(shares) < 1.0 - _RARER)
 
 
 def _status(value: float, sigma: float, width: float) -> Status:

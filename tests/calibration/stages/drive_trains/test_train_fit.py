@@ -7,7 +7,7 @@ import pytest
 
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.joint_data import JointData
-from calibration.stages.drive_trains.quantities import reported, uncertainty
+from calibration.stages.drive_trains.quantities import reported, reverses, uncertainty
 from calibration.stages.drive_trains.train_fit import FLOORS, Problem, derivatives, fit_train, prior_of
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
@@ -111,3 +111,11 @@ def test_the_interval_of_an_unknown_start_closes_once_the_gap_was_crossed() -> N
 def test_a_known_start_has_no_interval() -> None:
     found = TRUTH.backlash(data().motion, np.array([1e-3, 0.0, -1e-3]))
     assert (found.low == found.high).all()
+
+
+def test_a_load_that_keeps_its_sign_shows_no_gap() -> None:
+    load = 5.0 + np.sin(np.linspace(0.0, 60.0, 1000))
+    assert not reverses(load, 0.5)
+    assert not reverses(-load, 0.5)
+    assert reverses(load, 4.5)  # friction of a reversing joint takes it to the other side
+    assert reverses(load - 5.0, 0.5)
