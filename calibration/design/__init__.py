@@ -1,11 +1,15 @@
 """Which postures and motions to record."""
 
+from calibration.design.exchange import Criterion
 from calibration.design.next_motions import drive_next, sweeps_next, swings_next
 from calibration.design.next_postures import record_next
-from calibration.design.plan import Plan, Task, compared, nominal_task, plan
+from calibration.design.plan import Comparison, Plan, Sample, Task, compared, nominal_task, plan
 
 __all__ = [
+    "Comparison",
+    "Criterion",
     "Plan",
+    "Sample",
     "Task",
     "compared",
     "drive_next",

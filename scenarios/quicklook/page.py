@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from calibration.recording import Dataset, PostureMeans, Trial, load, schema
-from calibration.robot.chain import chain_of
+from calibration.robot import chain_of
 from scenarios.files import output_folder
 from scenarios.files.errors import ScenarioError
 from scenarios.plots.style import drawing, figure

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+import calibration.evaluation
 from calibration import Estimate, Evaluation
-from calibration.evaluation import Row, TrialErrors, ladder, pose_errors, row_entry, scored_errors
+from calibration.evaluation import Row, TrialErrors, row_entry, scored_errors
 from calibration.inference import Model
 from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
@@ -63,7 +64,7 @@ def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path)
     estimated = {p.name for p in estimate.parameters}
     parameters, models = judge_estimate(estimate, _read_parameters(truth_folder / "truth.json", estimated))
     pairs = [(p, _read_trial(truth_folder / "trials" / f"{p.trial_id}.nc")) for p in evaluation.predicted]
-    rows = tuple(ladder(list(_errors(pairs, _derived(truth_folder)["T_base_base"])), "truth"))
+    rows = tuple(calibration.evaluation.ladder(list(_errors(pairs, _derived(truth_folder)["T_base_base"])), "truth"))
     main = {f.name: getattr(models[0][1], f.name) for f in fields(ParameterScore)} | {"parameters": parameters}
     skill = tuple(_skill(row, rows) for row in rows)
     return Score(**main, rows=rows, skill=skill, base=base_scores(pairs), models=models)
@@ -87,7 +88,7 @@ def _errors(pairs: Iterable[tuple[PredictedTrial, TruthTrial]], T_base_body: np.
     floors = []
     for trial, true in pairs:
         for p in (*trial.rows, _floor(trial, true, T_base_body)):
-            errors = pose_errors(p.T_lab_hand, true.hand_pose)
+            errors = calibration.evaluation.pose_errors(p.T_lab_hand, true.hand_pose)
             scored = scored_errors(p.t, errors, trial.dwells, p.kind == "static")
             found = TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
             if p.model == FLOOR:

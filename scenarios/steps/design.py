@@ -14,8 +14,7 @@ from scenarios.files import output_folder
 from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from calibration.design.exchange import Criterion
-    from calibration.design.plan import Comparison, Plan, Sample
+    from calibration.design import Comparison, Criterion, Plan, Sample
     from scenarios.files.scenario import Scenario
 
 
@@ -34,8 +33,9 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
         NotEnoughData: The robot has hardly any posture clear of itself and in sight.
         ScenarioError: `out` cannot be written.
     """
+    import calibration.design
     import mjcf
-    from calibration.design.plan import compared, nominal_task, plan
+    from calibration.design import compared, nominal_task
     from calibration.recording import plans_text
     from scenarios.files import yaml_file
     from twin.campaign import describe_dataset
@@ -43,7 +43,7 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
 
     description = describe_dataset(scenario.twin, ())
     rng = generator(scenario.seed, "design")
-    found = plan(nominal_task(mjcf.urdf(), description, rng, _work()), n, criterion, rng)
+    found = calibration.design.plan(nominal_task(mjcf.urdf(), description, rng, _work()), n, criterion, rng)
     against = compared(found, rng)
     worst, usual = 1e3 * against.designed, 1e3 * float(np.median(against.random))
     why = (

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Sequence
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +10,7 @@ from scenarios.files.errors import ScenarioError
 from scenarios.steps import drawing_file
 
 if TYPE_CHECKING:
-    from calibration.formats.mapping.channels import Reader
-    from calibration.formats.mapping.mapping import Mapping, MappingFile
+    from calibration.formats import Mapping
 
 PACKAGED = "tiago"
 """What a mapping calls the nominal robot that comes with this program."""
@@ -37,9 +35,8 @@ def import_files(
         ScenarioError: The mapping is malformed, or `out` must not be overwritten.
         InputError: A file is not what the mapping says; every finding of every file.
     """
-    from calibration.formats.importer import import_files as write
-    from calibration.formats.importer import refuse_foreign
-    from calibration.formats.mapping.mapping import MappingFile
+    from calibration.formats import MappingFile, reader_of, refuse_foreign
+    from calibration.formats import import_files as write
     from calibration.recording import load
 
     described = read_mapping(mapping)
@@ -49,7 +46,7 @@ def import_files(
     source = MappingFile(mapping, described, _urdf(described, mapping))
     before = None if add_to is None else load(add_to)
     with output_folder.replacing(out, output_folder.DATASET) as new:
-        return write(files, _reader(kind, source), source, new, before)
+        return write(files, reader_of(kind, source), source, new, before)
 
 
 def read_mapping(path: Path) -> "Mapping":
@@ -58,8 +55,7 @@ def read_mapping(path: Path) -> "Mapping":
     Raises:
         ScenarioError: It is malformed; all findings.
     """
-    from calibration.formats.mapping.mapping import Mapping
-    from calibration.formats.mapping.short_form import written_out
+    from calibration.formats import Mapping, written_out
 
     def prepared(values: dict[str, Any]) -> dict[str, Any]:
         values = dict(values)
@@ -103,9 +99,7 @@ def init_mapping(files: Sequence[Path], out: Path, urdf: Path | None = None) -> 
         ScenarioError: `out` exists, or the URDF cannot be read.
         InputError: A file cannot be read; all findings.
     """
-    from calibration.formats.importer import refuse_foreign
-    from calibration.formats.survey.draft import draft
-    from calibration.formats.survey.session import Drawing, session_of
+    from calibration.formats import Drawing, draft, refuse_foreign, session_of
 
     if out.exists():
         raise ScenarioError(
@@ -163,7 +157,7 @@ def export_files(kind: str, dataset: Path, out: Path, ros: int = 1) -> tuple[str
         ScenarioError: `out` must not be overwritten.
         InputError: The dataset cannot be read, or the format cannot hold it.
     """
-    from calibration.formats.exporter import export_trials
+    from calibration.formats import export_trials
     from calibration.recording import load
 
     source = load(dataset)
@@ -181,7 +175,7 @@ def export_urdf(estimate: Path, out: Path) -> None:
         InputError: There is no estimate, or it must not be used.
     """
     from calibration.errors import NotCalibrated
-    from calibration.estimate.files import CALIBRATED, load_estimate
+    from calibration.estimate import CALIBRATED, load_estimate
 
     found = load_estimate(estimate)
     path = (estimate if estimate.is_dir() else estimate.parent) / CALIBRATED
@@ -207,37 +201,6 @@ def _exported(kind: str, trials: Sequence[str]) -> output_folder.Kind:
     return output_folder.Kind(
         f"{kind} export", MAPPING, frozenset(files | {MAPPING, "nominal.urdf", drawing_file.NAME})
     )
-
-
-def _reader(kind: str | None, mapping: "MappingFile") -> "Reader":
-    """Of one format, or of each file by its suffix."""
-    from calibration.formats.importer import format_of
-    from calibration.formats.mapping.channels import Reader, Recorded
-
-    if kind is not None:
-        return _reader_of(kind, mapping)
-
-    def read(paths: Sequence[Path]) -> Recorded:
-        kinds = dict.fromkeys(format_of(p) for p in paths)
-        parts = (_reader_of(k, mapping).read([p for p in paths if format_of(p) == k]) for k in kinds)
-        return reduce(Recorded.with_channels_of, parts)
-
-    return Reader(read, lambda path: _reader_of(format_of(path), mapping).stem(path))
-
-
-def _reader_of(kind: str, mapping: "MappingFile") -> "Reader":
-    from calibration.formats.bag.read import bag_reader
-    from calibration.formats.c3d.read import c3d_reader
-    from calibration.formats.csv.read import csv_reader
-
-    content = mapping.content
-    if kind == "csv" and content.csv:
-        return csv_reader(content.csv, content.setup)
-    if kind == "c3d" and content.c3d is not None:
-        return c3d_reader(content.c3d, content.setup)
-    if kind == "bag" and content.bag is not None:
-        return bag_reader(content.bag)
-    raise mapping.error(kind, "missing; say what is what in the files")
 
 
 def _urdf(mapping: "Mapping", path: Path) -> str:

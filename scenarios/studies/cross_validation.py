@@ -17,13 +17,12 @@ import numpy as np
 from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.estimate import Estimate
 from calibration.evaluation import PointRow, point_rows
-from calibration.formats.mapping.mapping import Mapping
+from calibration.formats import Mapping
 from calibration.mocap import Postures, mean_postures
 from calibration.pipeline import calibrate
 from calibration.recording import Dataset, load
-from calibration.robot.chain import chain_of
-from calibration.stages.geometry.gear_deflection import calibrate_gears
-from calibration.stages.geometry.stage import calibrate_geometry
+from calibration.robot import chain_of
+from calibration.stages.geometry import calibrate_gears, calibrate_geometry
 from calibration.verdict import Verdict
 from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError

@@ -10,17 +10,13 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
+from calibration import robot
 from calibration.errors import NotCalibrated
 from calibration.mocap import Postures, body_poses
 from calibration.numerics.lie import adjoint, exp6, inverse
 from calibration.recording import Description
-from calibration.robot.chain import chain_of
-from calibration.robot.hand import HandModel, nominal_hand
-from calibration.robot.nominal_frames import nominal_frames
-from calibration.stages.geometry.model_of_fit import hand_of
-from calibration.stages.geometry.parameters import geometry_parameters, reading_sigma
-from calibration.stages.geometry.registration import register
-from calibration.stages.geometry.stage import calibrate_geometry
+from calibration.robot import HandModel, chain_of, nominal_hand
+from calibration.stages.geometry import calibrate_geometry, geometry_parameters, hand_of, reading_sigma, register
 from scenarios.datasets.run_spec import Magnitude
 from scenarios.files.scenario import Scenario
 from scenarios.score.parameters import judge_parameters
@@ -44,7 +40,7 @@ def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     rng, campaign = generator(scenario.seed, "matched"), scenario.twin.campaign
     description, n = describe_dataset(scenario.twin, ()), campaign.calibration_postures
     chain = chain_of(mjcf.urdf(), description)
-    parameters, frames = geometry_parameters(chain, description), nominal_frames(chain, description)
+    parameters, frames = geometry_parameters(chain, description), robot.nominal_frames(chain, description)
     theta = parameters.nominal + parameters.tolerance * rng.normal(size=len(parameters))
     true = nominal_hand(chain, frames).with_theta(theta, parameters.names)
     readings = rng.permutation(sample_postures(mjcf.model(), n + _NEW, rng))

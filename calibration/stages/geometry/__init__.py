@@ -3,6 +3,7 @@
 from calibration.stages.geometry.from_arrays import GeometryFit, fit_geometry
 from calibration.stages.geometry.gear_deflection import calibrate_gears
 from calibration.stages.geometry.model_of_fit import hand_of, model_of
+from calibration.stages.geometry.parameters import geometry_parameters, reading_sigma
 from calibration.stages.geometry.registration import fit_frames, register
 from calibration.stages.geometry.stage import calibrate_geometry
 
@@ -12,7 +13,9 @@ __all__ = [
     "calibrate_geometry",
     "fit_frames",
     "fit_geometry",
+    "geometry_parameters",
     "hand_of",
     "model_of",
+    "reading_sigma",
     "register",
 ]

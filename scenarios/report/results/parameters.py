@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration import Estimate
-from calibration.inference.parameters import Model
+from calibration.inference import Model
 from scenarios.plots.forest import Interval
 from scenarios.report.results.formatting import readable
 from scenarios.report.results.result_files import Score

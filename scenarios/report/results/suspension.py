@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from calibration.inference.parameters import Model
+from calibration.inference import Model
 from calibration.recording import Description
 from calibration.stages.suspension import STAGE, Point, wheel_model
 from scenarios.report.results.run_results import Results
