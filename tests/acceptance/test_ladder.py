@@ -15,6 +15,9 @@ BANDS = {
     Key("model_3"): (1.45, 1.8),
     Key("model_2", "measured"): (1.6, 2.0),
     Key("model_3", "measured"): (1.15, 1.5),
+    Key("full"): (0.45, 0.7),
+    Key("full", "dynamics"): (0.65, 1.0),
+    Key("full", "measured"): (0.45, 0.7),
     Key("floor", "measured", "link"): (0.25, 0.3),
 }
 

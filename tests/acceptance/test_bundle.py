@@ -1,0 +1,51 @@
+"""Row `full`: simulated backlash, wheels and slip are recovered, and the hand is predicted with them."""
+
+import json
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def score(quick_run):
+    return json.loads((quick_run.folder / "score.json").read_text(encoding="utf-8"))
+
+
+def figure(score, model, base, trials="dynamic", name="position_rmse_component_mm"):
+    rows = (r for r in score["rows"] if (r["model"], r["base"], r["trials"]) == (model, base, trials))
+    return next(r[name] for r in rows if r["encoder"] == "motor")
+
+
+@pytest.mark.parametrize("base", ["plate", "dynamics", "measured"])
+def test_it_predicts_unseen_motions_better_than_the_printed_joint_model(score, base):
+    assert figure(score, "full", base) < 0.7 * figure(score, "model_3", base)
+    angle = [figure(score, model, base, name="orientation_rmse_deg") for model in ("full", "model_3")]
+    assert angle[0] < 0.5 * angle[1]
+
+
+def test_the_base_it_predicts_is_better_than_one_that_stays(score):
+    assert figure(score, "full", "plate") < 0.5 * figure(score, "full", "fixed")
+
+
+@pytest.mark.parametrize("joint", [3, 4, 5, 6, 7])
+def test_simulated_backlash_is_recovered(score, joint):
+    found = next(p for p in score["parameters"] if p["name"] == f"backlash.arm_{joint}_joint.gap")
+    assert found["status"] == "estimated"
+    assert found["estimate"] == pytest.approx(found["truth"], rel=0.05)
+
+
+def test_a_gap_that_no_load_reversal_shows_is_not_called_estimated(score):
+    found = next(p for p in score["parameters"] if p["name"] == "backlash.arm_2_joint.gap")
+    assert found["status"] == "not_identifiable"
+
+
+def test_the_estimate_reads_back_and_predicts_the_same(quick_run):
+    from calibration import load, load_estimate
+    from calibration.prediction import predict
+
+    dataset = load(quick_run.folder / "dataset")
+    saved = load_estimate(quick_run.folder / "estimate")
+    for own, read in zip(predict(quick_run.estimate, dataset), predict(saved, dataset), strict=True):
+        for a, b in zip(own.rows, read.rows, strict=True):
+            if a.model == "full":
+                np.testing.assert_allclose(a.T_lab_hand, b.T_lab_hand, rtol=0.0, atol=1e-9)
