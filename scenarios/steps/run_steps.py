@@ -94,7 +94,9 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
     with folder.replacing(out, folder.RUN) as new, one_blas_thread():
         _simulate(scenario, new, progress)
         try:
-            estimate = _calibrate(new / "dataset", new / "estimate", None, scenario.calibration, progress)
+            estimate = _calibrate(
+                new / "dataset", new / "estimate", None, scenario.calibration, progress, cross_validate=True
+            )
             evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
             score = _score(new / "estimate", new, new / "truth", evaluation, progress)
             _report(new, progress)

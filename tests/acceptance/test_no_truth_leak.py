@@ -10,8 +10,7 @@ import pytest
 import calibration
 import twin
 from calibration.recording.trial import sha256
-from scenarios import load
-from scenarios.steps import run as steps
+from scenarios import load, steps
 
 FILES = ("estimate.json", "estimate.nc", "calibrated.urdf", "master_calibration.yaml")
 

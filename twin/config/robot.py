@@ -20,6 +20,15 @@ class ArmJoint(Gear):
     """Drive train and encoders of one arm joint.
 
     Attributes:
+        gap: Total backlash [rad].
+        stiffness: Of the mesh in contact [N.m/rad].
+        damping: Of the mesh in contact [N.m.s/rad].
+        coulomb: Friction of the link side [N.m].
+        viscous: Friction of the link side [N.m.s/rad].
+        rotor_inertia: Reflected to the joint [kg.m2].
+        servo_stiffness: Position gain on the motor side [N.m/rad].
+        link_inertia: Of the output gear, fixed to the link [kg.m2].
+        servo_damping: Velocity gain on the motor side [N.m.s/rad]; None: 1.2 sqrt(servo_stiffness rotor_inertia).
         offset: Motor encoder's reading at true zero [rad].
         quantum: Of the motor encoder, at the joint [rad].
         torque_per_ampere: Of the drive, at the joint [N.m/A].

@@ -68,7 +68,8 @@ def test_geometry_is_calibrated_from_means_alone_and_predicts_others(tmp_path):
     estimate = calibrate(load(folder))
     said = {v.stage: v.verdict for v in estimate.verdicts}
     assert said == {
-        "clocks": "missing", "registration": "ok", "suspension": "missing", "geometry": "ok", "joints": "missing"
+        "clocks": "missing", "registration": "ok", "suspension": "missing", "geometry": "ok", "joints": "missing",
+        "bundle": "missing",
     }  # fmt: skip
     assert estimate.calibrated and estimate.main == "full"
     ladder = evaluate(estimate, load(folder))

@@ -57,9 +57,9 @@ def test_cutting_the_plate_leaves_the_robot_s_motion_as_it_was(config, lab, stat
     np.testing.assert_array_equal(whole.plates[:, 0], whole.wrench)
 
 
-def test_plates_are_recorded_declared_and_worn_each_for_itself(lab, states, motion):
+def test_plates_are_recorded_declared_and_worn_each_for_itself(config, lab, states, motion):
     trial, _ = measure(lab, motion, states, 100.0)
-    declared = describe_dataset(lab.config, ()).plates
+    declared = describe_dataset(cut(config, (2, 1)), ()).plates
     assert trial.plate == tuple(p.name for p in declared) == ("plate1", "plate2")
     np.testing.assert_allclose(trial.plate_centre, [p.centre for p in declared])
     assert all(p.size == (0.45, 0.9) for p in declared)

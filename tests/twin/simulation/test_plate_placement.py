@@ -47,9 +47,9 @@ def test_the_robot_does_on_it_what_it_does_on_the_nominal_one(lab, motion, turne
     np.testing.assert_allclose(load_test(there.twin)[0], load_test(lab.twin)[0], rtol=1e-4, atol=1.0)
 
 
-def test_it_is_declared_and_recorded_where_it_lies(turned, motion):
+def test_it_is_declared_and_recorded_where_it_lies(config, turned, motion):
     lab, states = turned
-    (declared,) = describe_dataset(lab.config, ()).plates
+    (declared,) = describe_dataset(laid(config), ()).plates
     np.testing.assert_allclose(np.transpose(declared.axes), R, atol=1e-12)
     np.testing.assert_allclose(declared.centre, [0.93, 0.43, 0.005], atol=1e-12)
     trial, _ = measure(lab, motion, states, 100.0)
@@ -59,7 +59,7 @@ def test_it_is_declared_and_recorded_where_it_lies(turned, motion):
 def test_tiles_are_turned_with_the_whole(config, motion, turned):
     lab = laboratory(laid(config, plate_grid=(2, 1)), 0)
     states = simulate(lab.twin, motion, lab.T_lab_base)
-    centres = np.array([p.centre for p in describe_dataset(lab.config, ()).plates])
+    centres = np.array([p.centre for p in describe_dataset(laid(config, plate_grid=(2, 1)), ()).plates])
     np.testing.assert_allclose(centres[1] - centres[0], R @ [0.45, 0.0, 0.0], atol=1e-12)
     lever = centres - [0.93, 0.43, 0.005]
     w = states.plates
