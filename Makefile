@@ -5,13 +5,15 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help demo test check slow bench bench-peer clean
+.PHONY: help demo test test-fast check slow claims bench bench-peer clean
 
 help:
 	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
 	@echo "make test        the fast tests"
+	@echo "make test-fast   the fast tests of one folder while working: make test-fast FOLDER=twin"
 	@echo "make check       format, lint, types"
 	@echo "make slow        the tests that take minutes"
+	@echo "make claims      measure the claims on ten fixed and ten sampled robots into docs/claims.md (half an hour)"
 	@echo "make bench       the benchmarks"
 	@echo "make bench-peer  geometric calibration beside FIGAROH's, in an environment of its own"
 	@echo "make clean       remove .venv, caches and built files; runs/ stays"
@@ -22,6 +24,11 @@ demo: $(READY)
 test: $(READY)
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
+FOLDER ?= calibration
+
+test-fast: $(READY)
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile tests/$(FOLDER)
+
 check: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -29,6 +36,10 @@ check: $(READY)
 
 slow: $(READY)
 	$(BIN)/python -m pytest -q -m slow -n 2 --dist loadfile
+
+claims: $(READY)
+	$(BIN)/python -m pytest -q -m slow tests/acceptance/test_ladder.py
+	$(BIN)/python -m tests.acceptance.claims
 
 bench: $(READY)
 	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench --ignore=tests/bench/bench_peer.py
