@@ -102,7 +102,9 @@ def calibrate(
     estimate = _concluded(context)
     if cross_validate and estimate.calibrated and context.data.postures is not None:
         tell("cross-validation", 0.97)
-        found = cross_validated(lab.chain, lab.description, context.data.postures, estimate.models, estimate.main)
+        # link angles of `full` take the drive trains of every posture: none can be left out of it alone
+        row = "model_2" if _bundled(estimate) else estimate.main
+        found = cross_validated(lab.chain, lab.description, context.data.postures, estimate.models, row)
         estimate = replace(estimate, verdicts=(*estimate.verdicts, *found))
     tell("done", 1.0)
     return estimate
@@ -174,10 +176,17 @@ def _concluded(context: Context) -> Estimate:
     """Whether the estimate may be used, and by which row."""
     estimate = context.estimate
     names = [m.name for m in estimate.models]
-    rows = MAIN[1:] if context.data.moving else MAIN  # joint models go with the geometry they were fitted beside
+    rows = (
+        MAIN if _bundled(estimate) or not context.data.moving else MAIN[1:]
+    )  # joint models go with the geometry of model_2
     main = next((name for name in rows if name in names), names[-1] if names else "")
     usable = bool(names) and not context.data.rejected
     return replace(estimate, main=main, status="calibrated" if usable else "not_calibrated")
+
+
+def _bundled(estimate: Estimate) -> bool:
+    """Whether row `full` has drive trains."""
+    return estimate.bundle is not None and bool(estimate.bundle.trains)
 
 
 def _empty(dataset: Dataset, options: Options) -> Estimate:

@@ -21,9 +21,11 @@ import numpy as np
 
 from calibration.errors import NotEnoughData, ShapeError
 from calibration.numerics.lie import adjoint, inverse
+from calibration.numerics.signals import CUTOFF
 from calibration.numerics.wrench import in_frame
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
+from calibration.stages.stick_slip.stream import SlipState
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, floor_load
 from calibration.stages.suspension.model import Source, Suspension
@@ -54,13 +56,21 @@ class LoadedBase:
         Raises:
             NotEnoughData: Less than a second, or nothing says what point the wrench is about.
         """
+        forcing = forcing_of(self.load(t, wrench), float(t[0]))
+        x = self.suspension.displaced(forcing, "plate")
+        return self.in_lab(np.stack([np.interp(t, forcing.t, column) for column in x.T], axis=1))
+
+    def load(self, t: np.ndarray, wrench: np.ndarray, cutoff: float = CUTOFF) -> Load:
+        """The wrench (n, 6) as the floor has it, without what is faster than `cutoff` [Hz].
+
+        Raises:
+            NotEnoughData: Less than a second, or nothing says what point the wrench is about.
+        """
         self._need_centre()
         if wrench.shape != (len(t), 6):
             raise ShapeError("wrench", wrench.shape, (len(t), 6))
         w = in_frame(wrench[:, None], self.centre[None], self.T_lab_0)
-        forcing = forcing_of(floor_load(t, w, self.T_lab_0, self.centre), float(t[0]))
-        x = self.suspension.displaced(forcing, "plate")
-        return self._in_lab(np.stack([np.interp(t, forcing.t, column) for column in x.T], axis=1))
+        return floor_load(t, w, self.T_lab_0, self.centre, cutoff)
 
     def stepped(self, t: float, wrench: np.ndarray, before: "BaseState | None") -> "BaseState":
         """The base one sample on: its wrench (6,) at t [s]; without a state before, this sample is the first at rest.
@@ -73,26 +83,32 @@ class LoadedBase:
             raise ShapeError("wrench", wrench.shape, (6,))
         w, modes = in_frame(wrench[None, None], self.centre[None], self.T_lab_0)[0], self.suspension.modes
         if before is None:
-            return BaseState(t, t, w, 1, np.zeros(len(modes.tau)), np.zeros(len(modes.tau)), np.eye(4)[None])
+            none = np.zeros(len(modes.tau))
+            return BaseState(t, t, w, w, 1, none, none, np.zeros(6), np.eye(4)[None])
         if t <= before.start + REST:
             n = before.n + 1
-            return replace(before, t=t, rest=before.rest + (w - before.rest) / n, n=n)
+            return replace(before, t=t, wrench=w, rest=before.rest + (w - before.rest) / n, n=n)
         u = modes.b @ (w - before.rest)
         y = modes.advanced(before.y, before.u, u, t - before.t)
-        x = (modes.a @ y).real * self.suspension.moves("plate")
-        return replace(before, t=t, u=u, y=y, moved=self._in_lab(x[None]))
+        x = (modes.a @ y).real
+        moved = self.in_lab((x * self.suspension.moves("plate"))[None])
+        return replace(before, t=t, wrench=w, u=u, y=y, x=x, moved=moved)
 
     def covariance(self, T_base_hand: np.ndarray, moves: bool) -> np.ndarray:
         """Covariance (n, 6, 6) that the base adds to the hand's local twist, at T_base_hand (n, 4, 4)."""
         tried = dict(self.suspension.held_out).get("plate") or self.suspension.held_out[0][1]
+        return self.carried(tried.variance(tried.moves & moves), T_base_hand)
+
+    def carried(self, variance: np.ndarray, T_base_hand: np.ndarray) -> np.ndarray:
+        """Covariance (n, 6, 6) of the hand's local twist by variances (6,) or (n, 6) of displacements in frame 0."""
         Ad = adjoint(inverse(self.T_0_base @ T_base_hand))
-        return np.asarray(Ad * tried.variance(tried.moves & moves) @ np.swapaxes(Ad, 1, 2))
+        return np.asarray(Ad * variance[..., None, :] @ np.swapaxes(Ad, 1, 2))
 
     def _need_centre(self) -> None:
         if not np.isfinite(self.centre).all():
             raise NotEnoughData("the laboratory has no plate: give a wrench about the base's origin, and no start pose")
 
-    def _in_lab(self, x: np.ndarray) -> np.ndarray:
+    def in_lab(self, x: np.ndarray) -> np.ndarray:
         """Motions of the lab (n, 4, 4) by displacements x (n, 6) of frame 0."""
         return Rest(self.T_lab_0, inverse(self.T_lab_0)).poses(x)
 
@@ -113,20 +129,26 @@ class BaseState:
     Attributes:
         start: Time of the first sample [s].
         t: The sample's time [s].
+        wrench: (6,) its wrench [N, N.m, frame 0].
         rest: (6,) wrench at rest, the mean of the first second [N, N.m, frame 0].
         n: Samples in it.
         u: (k,) how the wrench drives the modes.
         y: (k,) where the modes are.
+        x: (6,) displacement by the springs on all axes [m, rad, frame 0].
         moved: (1, 4, 4) how the base moved in the lab.
+        slip: State of a base that slips; None of one that does not.
     """
 
     start: float
     t: float
+    wrench: np.ndarray
     rest: np.ndarray
     n: int
     u: np.ndarray
     y: np.ndarray
+    x: np.ndarray
     moved: np.ndarray
+    slip: SlipState | None = None
 
 
 @dataclass(frozen=True)

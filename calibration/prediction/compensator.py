@@ -8,7 +8,8 @@ covariance    of the local twist:   J Sigma J' + J_joint diag(sigma^2) J_joint' 
 
 Sigma is that of the parameters; sigma a joint's random reading error at rest or, where its model is used, that of the
 flank and of left-out trials; v what the suspension left of trials it had not seen, for a pose in the lab.
-The geometry is that of the estimate's main model, as in calibrated.urdf.
+The geometry is that of the estimate's main model, as in calibrated.urdf. Where that is `full` with drive trains, q are
+link angles and sigma theirs, the column bends, and the base sticks and slips (`bundled_arm`, `slipping_base`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -19,20 +20,37 @@ import numpy as np
 from calibration.errors import InputError, NotCalibrated, NotEnoughData, ShapeError
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.files import load_estimate
+from calibration.estimate.rows import row_of
 from calibration.inference.parameters import Model
 from calibration.numerics.lie import from_vector
 from calibration.prediction.base_pose import BaseState, LoadedBase, loaded_base
+from calibration.prediction.bundled_arm import ArmPositions, ArmState, BundledArm
+from calibration.prediction.slipping_base import Motion, SlippingBase
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
+from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
 from calibration.stages.suspension.model import Suspension
 
 _SPACING, _SPAN = 0.05, 1.0  # [s] between samples at most, and of all of them at least, for velocities
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """State after a sample.
+
+    Attributes:
+        arm: Its drive trains; None where the estimate has none.
+        base: The base under a wrench; None without one.
+    """
+
+    arm: ArmState | None = None
+    base: BaseState | None = None
 
 
 @dataclass(frozen=True)
@@ -42,17 +60,17 @@ class HandPose:
     Attributes:
         T: (n, 4, 4) in the lab, or in the base frame at rest where the base's pose was not given.
         covariance: (n, 6, 6) of the local twist [m, rad], for a base frame located by its own markers.
-        base: Where the base is, for the next step under a wrench; None else.
+        state: For the next step; None of a recording.
     """
 
     T: np.ndarray
     covariance: np.ndarray
-    base: BaseState | None = None
+    state: RobotState | None = None
 
 
 @dataclass(frozen=True)
 class Compensator:
-    """The main model of an estimate, with its joint models and its suspension.
+    """The main model of an estimate, with what corrects its readings and moves its base.
 
     Attributes:
         hand: The calibrated robot.
@@ -63,6 +81,8 @@ class Compensator:
         joints: Joint models, None where the estimate has none.
         suspension: None where the estimate has none.
         laboratory: Where it was found, None where the estimate does not say.
+        arm: Drive trains and column of row `full`; None of another row.
+        slipping: Its base; None where the suspension alone moves it.
     """
 
     hand: HandModel
@@ -73,6 +93,8 @@ class Compensator:
     joints: JointModels | None = None
     suspension: Suspension | None = None
     laboratory: Description | None = None
+    arm: BundledArm | None = None
+    slipping: SlippingBase | None = None
 
     @property
     def spread(self) -> Spread:
@@ -110,7 +132,19 @@ class Compensator:
         if estimate.joint_models and laboratory is not None:
             inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
-        return cls(hand, *_covariance(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)
+        found = cls(hand, *_covariance(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)
+        return found._bundled(estimate, payload)
+
+    def _bundled(self, estimate: Estimate, payload: float | None) -> "Compensator":
+        """With drive trains and base of row `full`, where it is the main one and has them."""
+        parts, laboratory, urdf = estimate.bundle, self.laboratory, str(estimate.urdf)
+        if parts is None or laboratory is None or not parts.trains or not row_of(estimate.main).bundle:
+            return self
+        robot = BundledRobot.of(self.hand, parts, urdf, laboratory)
+        arm, slipping = BundledArm(robot.trains.carrying(payload), robot.bending), None
+        if robot.stick_slip is not None and robot.knows("plate"):
+            slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)))
+        return replace(self, joints=None, arm=arm, slipping=slipping)
 
     def predict(
         self,
@@ -123,7 +157,8 @@ class Compensator:
         """Hand poses at readings q_motor (n, n_joints) [rad, m], taken at t (n,) [s].
 
         Args:
-            t: Times; from a second of readings at 20 Hz or more the joint models have their velocities.
+            t: Times; from a second of readings at 20 Hz or more the joints have velocities. With drive trains, readings
+                without are each taken to be at rest.
             q_motor: Readings, columns as in the estimate.
             wrench: (n, 6) action on the plate [N, N.m, lab axes, about the plate's centre], the first second at rest;
                 where the base's pose is not given, in the base's axes about its origin.
@@ -136,17 +171,30 @@ class Compensator:
         t, q = np.asarray(t, dtype=float), np.asarray(q_motor, dtype=float)
         if q.ndim != 2 or len(t) != len(q):
             raise ShapeError("q_motor", q.shape, (len(t), "n_joints"))
-        base = self._base(T_lab_base_start)
-        moved = None if wrench is None else _needed(base).moved(t, np.asarray(wrench, dtype=float))
-        found = self._hand(t, q, velocity if velocity is not None else _velocities(t, q))
-        return _in_lab(found, base, moved, T_lab_base_start)
+        base, moved, variance = self._base(T_lab_base_start), None, None
+        if wrench is not None:
+            w, there = np.asarray(wrench, dtype=float), _needed(base)
+            if self.slipping is None:
+                moved = there.moved(t, w)
+            else:
+                moved, variance = self.slipping.moved(there, t, q, w)
+        known = velocity is not None or _continuous(t)
+        if self.arm is not None:
+            found = self._on_links(self.arm.along(t, q, velocity) if known else self.arm.at_rest(q))
+        else:
+            found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
+        return _in_lab(found, base, moved, T_lab_base_start, variance)
+
+    def at_rest(self, q_motor: np.ndarray) -> np.ndarray:
+        """Positions (n, n_joints) [rad, m] the geometry is evaluated at, of readings at rest, each for itself."""
+        return q_motor if self.arm is None else self.arm.at_rest(q_motor).q
 
     def points(self, markers: np.ndarray, q_motor: np.ndarray, session: Session | None = None) -> Predicted:
         """Markers (m, 3) [m] of the hand's body, as the base's marker body sees them, with their band.
 
         Args:
             markers: As `bodies` of dataset.json has them.
-            q_motor: (n, n_joints) readings at rest [rad, m].
+            q_motor: (n, n_joints) readings at rest [rad, m]; with drive trains `at_rest` of them.
             session: Another day: base and marker body are not quite where they were; `Session()` for what is usual.
         """
         return predicted_points(self.hand, self.spread, np.asarray(markers, dtype=float), q_motor, session)
@@ -158,25 +206,35 @@ class Compensator:
         wrench: np.ndarray | None = None,
         T_lab_base_start: np.ndarray | None = None,
         velocity: np.ndarray | None = None,
-        before: BaseState | None = None,
+        before: RobotState | None = None,
     ) -> HandPose:
         """The same for one sample q_motor (n_joints,) and nothing after it; arrays of length 1.
 
         `predict` looks half a second ahead for velocities and for a wrench below 10 Hz. Here the caller's velocity
-        (n_joints,) is used as it is, and none leaves the readings as they are; the wrench (6,) is used as it comes.
-        The base's springs are carried on from `before`, the `base` of the pose one step earlier; its first second is
-        the rest.
+        (n_joints,) is used as it is, and none leaves the readings as they are, or the torques of drive trains as those
+        of rest; the wrench (6,) is used as it comes. Drive trains and base are carried on from `before`, the `state`
+        of the pose one step earlier; the first second is the rest.
 
         Raises:
             NotEnoughData: A wrench without a suspension.
         """
         q, base = np.asarray(q_motor, dtype=float)[None], self._base(T_lab_base_start)
         v = None if velocity is None else np.asarray(velocity, dtype=float)[None]
-        in_base = self._hand(np.array([t]), q, v)
+        before, arm, motion = before or RobotState(), None, None
+        if self.arm is not None:
+            arm = self.arm.stepped(t, q[0], None if v is None else v[0], before.arm)
+            motion = None if v is None else Motion(q[0], arm.v, arm.a)
+        in_base = self._hand(np.array([t]), q, v) if arm is None else self._on_links(arm.positions)
         if wrench is None:
-            return _in_lab(in_base, base, None, T_lab_base_start)
-        state = _needed(base).stepped(t, np.asarray(wrench, dtype=float), before)
-        return replace(_in_lab(in_base, base, state.moved, T_lab_base_start), base=state)
+            return replace(_in_lab(in_base, base, None, T_lab_base_start), state=RobotState(arm))
+        w, there, variance = np.asarray(wrench, dtype=float), _needed(base), None
+        if self.slipping is None:
+            state = there.stepped(t, w, before.base)
+        else:
+            state = self.slipping.stepped(there, t, w, motion, before.base)
+            variance = self.slipping.variance(state)
+        found = _in_lab(in_base, base, state.moved, T_lab_base_start, variance)
+        return replace(found, state=RobotState(arm, state))
 
     def _base(self, T_lab_base: np.ndarray | None) -> LoadedBase | None:
         """The base at its pose, None without a suspension or a laboratory."""
@@ -185,14 +243,26 @@ class Compensator:
         return loaded_base(self.suspension, self.laboratory, T_lab_base)
 
     def _hand(self, t: np.ndarray, q: np.ndarray, velocity: np.ndarray | None) -> HandPose:
-        """In the base frame."""
+        """In the base frame, by readings less the joint models."""
         variance = np.broadcast_to(self.reading_sigma**2, (len(q), len(self.reading_sigma)))
         if velocity is not None and self.joints is not None:
             corrected = correct(self.joints, t, q, velocity)
             q, columns = corrected.q, self.hand.chain.columns
             variance = np.where(corrected.modelled[columns], corrected.variance[:, columns], variance)
+        return self._at(q, variance)
+
+    def _on_links(self, positions: ArmPositions) -> HandPose:
+        """In the base frame, by link angles and with the column bent."""
+        if self.arm is None:
+            raise NotEnoughData("this estimate has no drive trains")
+        variance = self.arm.variance(self.hand, positions, self.reading_sigma)
+        found = self._at(positions.q, variance, self.arm.bends(self.hand, positions))
+        return replace(found, covariance=found.covariance + self.arm.column_covariance(self.hand, positions, found.T))
+
+    def _at(self, q: np.ndarray, variance: np.ndarray, bends: np.ndarray | None = None) -> HandPose:
+        """In the base frame at positions q of variance (n, k), moved in the base's marker body by `bends` (n, 4, 4)."""
         found = self.hand.poses_and_derivatives(q, names=self.names)
-        T_base_hand = from_vector(self.hand.base) @ found.T
+        T_base_hand = from_vector(self.hand.base) @ (found.T if bends is None else bends @ found.T)
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
         covariance += np.diag(self.spread.hand_variances)
@@ -206,11 +276,17 @@ def _needed(base: LoadedBase | None) -> LoadedBase:
 
 
 def _in_lab(
-    in_base: HandPose, base: LoadedBase | None, moved: np.ndarray | None, T_lab_base: np.ndarray | None
+    in_base: HandPose,
+    base: LoadedBase | None,
+    moved: np.ndarray | None,
+    T_lab_base: np.ndarray | None,
+    variance: np.ndarray | None = None,
 ) -> HandPose:
-    """A pose in the base frame from where the base is, which may have moved (n, 4, 4)."""
+    """A pose in the base frame from where the base is, which may have moved (n, 4, 4), of variance (6,) or (n, 6)."""
     covariance = in_base.covariance
-    if base is not None and (moved is not None or T_lab_base is not None):
+    if base is not None and variance is not None:
+        covariance = covariance + base.carried(variance, in_base.T)
+    elif base is not None and (moved is not None or T_lab_base is not None):
         covariance = covariance + base.covariance(in_base.T, moved is not None)
     T = in_base.T if T_lab_base is None else np.asarray(T_lab_base, dtype=float) @ in_base.T
     return HandPose(T if moved is None else moved @ T, covariance)
@@ -229,9 +305,7 @@ def _covariance(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndar
     return names, np.asarray(G @ model.covariance @ G.T)
 
 
-def _velocities(t: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """Motor-side velocities (n, n_joints), None where the readings are too few or too far apart to have any."""
+def _continuous(t: np.ndarray) -> bool:
+    """Whether readings are many and close enough to have velocities."""
     steps = np.diff(t)
-    if len(t) < 2 or steps.min() <= 0.0 or steps.max() > _SPACING or t[-1] - t[0] < _SPAN:
-        return None
-    return velocities(t, q)
+    return len(t) > 1 and steps.min() > 0.0 and steps.max() <= _SPACING and t[-1] - t[0] >= _SPAN

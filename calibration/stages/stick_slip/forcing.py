@@ -9,7 +9,7 @@ count from their mean in the first second. Where there are no joint readings the
 alone moves it, at the rate of the correction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -17,12 +17,11 @@ from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE, Signal, even, low_passed
-from calibration.recording.clock import Clock
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.stick_slip.kernel import COLUMNS, PLATE
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
-from calibration.stages.suspension.floor_wrench import Load, dynamics_load, plate_load
+from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source
 
@@ -30,7 +29,7 @@ CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEPS = 2  # of the integration to a sample
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
-_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 _INERTIA_STRIDE = 5  # samples from one composite inertia to the next
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
 
@@ -91,14 +90,21 @@ class Wrenches:
 
 def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wrenches:
     """What the instruments of a trial show of its wrench."""
-    start, lab = float(trial.t_mocap[0]), sources.lab
-    plate, dynamics, t, M = None, None, np.zeros(0), np.zeros((0, 6, 6))
+    start, plate = float(trial.t_mocap[0]), None
     if sources.plate is not None and len(trial.t_plate):
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
-    if sources.robot is not None and len(trial.t_robot):
-        dynamics = dynamics_load(lab, trial, sources.robot, T_lab_0, CUTOFF)
-        t, M = composite_inertia(lab, trial, sources.robot, T_lab_0)
-    return Wrenches(trial.id, start, plate, dynamics, t, M)
+    if sources.robot is None or not len(trial.t_robot):
+        return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)))
+    t = sources.robot.to_mocap(trial.t_robot)
+    return replace(wrenches_along(sources.lab, t, trial.q_motor, plate, T_lab_0), trial_id=trial.id, start=start)
+
+
+def wrenches_along(
+    lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, plate: Load | None, T_lab_0: np.ndarray
+) -> Wrenches:
+    """The wrench of the plate, and that of readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock]."""
+    dynamics = motion_load(lab, t, q_motor, T_lab_0, CUTOFF)
+    return Wrenches("readings", float(t[0]), plate, dynamics, *composite_inertia(lab, t, q_motor, T_lab_0))
 
 
 def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> PlanarForcing:
@@ -127,7 +133,7 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
         shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], heave(fine, 2))
         drive[:, :3] = (_at(dynamics.signal, fine) - shift)[:, PLANE]
         drive[:, :3] -= drive[rest, :3].mean(axis=0)
-        rows[:, :6] = np.stack([M[:, PLANE[i], PLANE[j]] for i, j in _UPPER], axis=1)
+        rows[:, :6] = np.stack([M[:, PLANE[i], PLANE[j]] for i, j in UPPER], axis=1)
         if main is dynamics:
             load = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0)
             rows[:, 6:] = (M[:, (2, 4, 3)][:, :, PLANE] * np.array([1.0, -1.0, 1.0])[:, None]).reshape(n, 9)
@@ -144,12 +150,12 @@ def _at(signal: Signal, t: np.ndarray) -> np.ndarray:
 
 
 def composite_inertia(
-    lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarray
+    lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (k,) [s, mocap clock] and M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes."""
     model, description = lab.floating, lab.description
     order = [description.joint_names.index(name) for name in list(model.names)[2:]]
-    q = low_passed(even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order]), CUTOFF)
+    q = low_passed(even(t, q_motor[:, order]), CUTOFF)
     T_0_root = model.frames[model.getFrameId(description.base_frame)].placement.inverse()
     root = pin.SE3ToXYZQUAT(pin.SE3(T_lab_0) * T_0_root)
     neutral = pin.neutral(model)

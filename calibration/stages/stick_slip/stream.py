@@ -146,7 +146,13 @@ def slip_stream(model: StickSlip) -> SlipStream:
     bodies = np.column_stack([[body(p, True) for p in parameters], members])
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
     return SlipStream(
-        found, model.wheels, wheels, bodies, compliance, found.held_out.moves & ~found.linear, found.band.floor**2
+        found,
+        model.wheels,
+        wheels,
+        bodies,
+        compliance,
+        found.held_out.moves & ~found.linear.astype(bool),
+        found.band.floor**2,
     )
 
 

@@ -66,11 +66,16 @@ def floor_load(t: np.ndarray, w: np.ndarray, T_lab_0: np.ndarray, centre: np.nda
 
 def dynamics_load(lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarray, cutoff: float = CUTOFF) -> Load:
     """What the nominal robot does along q_motor, its base standing still."""
+    return motion_load(lab, robot.to_mocap(trial.t_robot), trial.q_motor, T_lab_0, cutoff)
+
+
+def motion_load(lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np.ndarray, cutoff: float) -> Load:
+    """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock]."""
     model, description = lab.floating, lab.description
     order = [description.joint_names.index(name) for name in list(model.names)[2:]]
-    q = low_passed(even(robot.to_mocap(trial.t_robot), trial.q_motor[:, order]), cutoff)
+    q = low_passed(even(t, q_motor[:, order]), cutoff)
     spline = CubicSpline(q.t, q.x)
-    T_0_root = _root_in_base(model, description)
+    T_0_root = root_in_base(model, description)
     root = pin.SE3(T_lab_0) * T_0_root
     at = configurations(model, np.tile(root.homogeneous, (len(q.t), 1, 1)), q.x)
     still = np.zeros((len(q.t), 6))
@@ -86,6 +91,6 @@ def dynamics_load(lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarr
     return Load(Signal(q.t, -w, q.valid), M, weight, com, np.eye(4))
 
 
-def _root_in_base(model: pin.Model, description: Description) -> pin.SE3:
+def root_in_base(model: pin.Model, description: Description) -> pin.SE3:
     """T_base_root, root = the body of the free flyer."""
     return model.frames[model.getFrameId(description.base_frame)].placement.inverse()
