@@ -102,9 +102,7 @@ def calibrate(
     estimate = _concluded(context)
     if cross_validate and estimate.calibrated and context.data.postures is not None:
         tell("cross-validation", 0.97)
-        # link angles of `full` take the drive trains of every posture: none can be left out of it alone
-        row = "model_2" if _bundled(estimate) else estimate.main
-        found = cross_validated(lab.chain, lab.description, context.data.postures, estimate.models, row)
+        found = cross_validated(lab.chain, lab.description, context.data.postures, estimate.models, _refitted(estimate))
         estimate = replace(estimate, verdicts=(*estimate.verdicts, *found))
     tell("done", 1.0)
     return estimate
@@ -187,6 +185,11 @@ def _concluded(context: Context) -> Estimate:
 def _bundled(estimate: Estimate) -> bool:
     """Whether row `full` has drive trains."""
     return estimate.bundle is not None and bool(estimate.bundle.trains)
+
+
+def _refitted(estimate: Estimate) -> str:
+    """Row that is fitted again without postures: drive trains are fitted to whole trials, and not again without one."""
+    return "model_2" if _bundled(estimate) else estimate.main
 
 
 def _empty(dataset: Dataset, options: Options) -> Estimate:
