@@ -23,8 +23,9 @@ from calibration.estimate.files import load_estimate
 from calibration.estimate.rows import row_of
 from calibration.inference.parameters import Model
 from calibration.numerics.lie import from_vector
-from calibration.prediction.base_pose import BaseState, LoadedBase, loaded_base
-from calibration.prediction.bundled_arm import ArmPositions, ArmState, BundledArm
+from calibration.prediction.base_pose import LoadedBase, loaded_base
+from calibration.prediction.bundled_arm import ArmPositions, BundledArm
+from calibration.prediction.hand_pose import HandPose, RobotState
 from calibration.prediction.slipping_base import Motion, SlippingBase
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of_frames
@@ -38,34 +39,6 @@ from calibration.stages.joints.correction import JointModels, correct, input_mod
 from calibration.stages.suspension.model import Suspension
 
 _SPACING, _SPAN = 0.05, 1.0  # [s] between samples at most, and of all of them at least, for velocities
-
-
-@dataclass(frozen=True)
-class RobotState:
-    """State after a sample.
-
-    Attributes:
-        arm: Its drive trains; None where the estimate has none.
-        base: The base under a wrench; None without one.
-    """
-
-    arm: ArmState | None = None
-    base: BaseState | None = None
-
-
-@dataclass(frozen=True)
-class HandPose:
-    """Predicted poses of the hand body.
-
-    Attributes:
-        T: (n, 4, 4) in the lab, or in the base frame at rest where the base's pose was not given.
-        covariance: (n, 6, 6) of the local twist [m, rad], for a base frame located by its own markers.
-        state: For the next step; None of a recording.
-    """
-
-    T: np.ndarray
-    covariance: np.ndarray
-    state: RobotState | None = None
 
 
 @dataclass(frozen=True)
