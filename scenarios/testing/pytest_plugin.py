@@ -140,6 +140,7 @@ def assert_improves() -> Callable[..., None]:
         base: str = "",
         encoder: str = "motor",
     ) -> None:
+        """Fail unless `model` is better than `over` by the share `by` [-] in position RMSE [mm]."""
         ours, theirs = result.row(model, trials, base, encoder), result.row(over, trials)
         found, before = (row["position_rmse_norm_mm"] for row in (ours, theirs))
         if not found <= (1.0 - by) * before:
@@ -169,6 +170,7 @@ def assert_within() -> Callable[..., None]:
         base: str = "",
         encoder: str = "motor",
     ) -> None:
+        """Fail unless the errors of `model` are at most `mm` [mm] and `deg` [deg]; None: no limit."""
         row = result.row(model, trials, base, encoder)
         for name, limit, unit in (("position_rmse_norm_mm", mm, "mm"), ("orientation_rmse_deg", deg, "deg")):
             found = row[name]
