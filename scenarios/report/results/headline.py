@@ -73,7 +73,7 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
         useless = any(n.stage == "evaluation" and n.level == "refused" for n in found)
         badge = "calibrated" if estimate.calibrated and not useless else "not calibrated"
     model = headline_model(results, steps)
-    best = predictive(steps, model)
+    best = predictive(steps, model) or oracle_base(steps, model)
     shares = _shares(steps, best) if best else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
     ranked = (*refused, *_next_steps(steps, best, found))[:_STEPS]
@@ -94,8 +94,8 @@ def better(ours: Row, theirs: Row) -> bool:
 
 def _sentence(steps: Sequence[Step], best: Step | None) -> str:
     if best is None:
-        return "No row predicts from motor encoders alone; see the ladder."
-    nominal = predictive(steps, NOMINAL)
+        return "No row predicts from motor encoders; see the ladder."
+    nominal = predictive(steps, NOMINAL) or oracle_base(steps, NOMINAL)
     base = BASES.get(best.base, best.base)
     trials = "moving" if best.trials == "dynamic" else best.trials
     text = f"Error of the hand on unseen {trials} trials: {figures(best.main)}"

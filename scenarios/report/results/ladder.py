@@ -16,9 +16,10 @@ BASES = {
     "plate": "base from the force plate",
     "dynamics": "base from inverse dynamics",
     "measured": "base measured",
+    "submitted": "as submitted",
 }
 _MODELS, _BASES, _ENCODERS = tuple(MEANINGS), tuple(BASES), ("motor", "link")
-_PREDICTIVE = ("dynamics", "plate", "fixed")
+_PREDICTIVE = ("plate", "dynamics", "fixed", "submitted")
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def readable(steps: Sequence[Step]) -> tuple[Step, ...]:
 def predictive(steps: Iterable[Step], model: str) -> Step | None:
     """The row of a model that reads motor encoders and no measured base.
 
-    The base's motion from dynamics, which needs no instrument beside the robot; else from a plate, else none.
+    The base's motion from the plate where one was recorded, as `Compensator` takes it; else from dynamics, else none.
     """
     return _first(steps, model, _PREDICTIVE)
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 
 from matplotlib.figure import Figure
 
-from scenarios.report.results.ladder import Step, headline_model, ladder, predictive
+from scenarios.report.results.ladder import Step, headline_model, ladder, oracle_base, predictive
 from scenarios.report.results.parameters import Known, known
 from scenarios.report.results.run_results import Results
 
@@ -44,8 +44,8 @@ class RunView:
 
     @property
     def headline(self) -> Step | None:
-        """Its predictive row."""
-        return predictive(self.steps, self.model)
+        """Its predictive row; with the base measured where nothing predicts without, as of posture means."""
+        return predictive(self.steps, self.model) or oracle_base(self.steps, self.model)
 
     @property
     def has_truth(self) -> bool:

@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+from functools import cache
 
 import pytest
 
@@ -16,13 +17,18 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 MEASURE = """
 const frame = document.querySelector("iframe"), page = frame.contentDocument, width = page.documentElement.clientWidth;
 const low = selector => Math.max(...[...page.querySelectorAll(selector)].map(e => e.getBoundingClientRect().bottom));
-const first = {badge: low(".badge"), sentence: low(".sentence"), next: low(".next"), plot: low(".verdict .drawing")};
+const first = {badge: low(".badge"), sentence: low(".sentence"), shares: low(".shares"), next: low(".next"),
+  plot: low(".verdict .drawing")};
+const text = Object.fromEntries(["badge", "sentence", "shares", "next li"].map(c => [c, page.querySelector("." + c).innerText]));
+const luminance = e => { const c = frame.contentWindow.getComputedStyle(e); return [c.color, c.backgroundColor]; };
+const broken = [...page.images].filter(i => !i.naturalWidth).length;
+const outside = frame.contentWindow.performance.getEntriesByType("resource").map(e => e.name).filter(n => !n.startsWith("data:"));
 page.querySelectorAll("details").forEach(d => d.open = true);
 const inside = e => e.closest("svg, .scroll, .drawing, pre");
 const wide = e => e.getBoundingClientRect().right > width + 1;
 const over = [...page.querySelectorAll("body *")].filter(e => !inside(e) && wide(e));
 const cut = [...page.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth + 1);
-document.title = JSON.stringify({width, page: page.documentElement.scrollWidth, first,
+document.title = JSON.stringify({width, page: page.documentElement.scrollWidth, first, text, broken, outside, body: luminance(page.body),
   over: over.map(e => e.outerHTML.slice(0, 80)), cut: cut.map(e => e.ariaLabel)});
 """
 
@@ -44,21 +50,31 @@ def run(tmp_path_factory):
     return folder
 
 
-def measured(run, width):
+@cache
+def measured(run, width, scheme="light"):
     """What a browser with a window so wide makes of the page."""
     outer = run / f"outer_{width}.html"
     frame = f'<iframe src="report.html" style="width:{width}px;height:900px;border:0"></iframe>'
     outer.write_text(f"<body>{frame}<script>onload = () => {{{MEASURE}}}</script></body>")
     command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--dump-dom"]
-    options = ["--allow-file-access-from-files", "--window-size=1600,1000", outer.as_uri()]
+    dark = ["--blink-settings=preferredColorScheme=0"] if scheme == "dark" else []
+    options = ["--allow-file-access-from-files", "--window-size=1600,1000", *dark, outer.as_uri()]
     done = subprocess.run([*command, *options], capture_output=True, text=True, timeout=120)
     return json.loads(html.unescape(re.search(r"<title>(.*?)</title>", done.stdout)[1]))
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1280])
-def test_nothing_overflows(run, width):
-    found = measured(run, width)
+def test_nothing_overflows_is_broken_or_comes_from_elsewhere(run, width, scheme):
+    found = measured(run, width, scheme)
     assert (found["width"], found["page"], found["over"]) == (width, width, [])
+    assert (found["broken"], found["outside"]) == (0, [])
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_is_dark_on_light_or_light_on_dark(run, scheme):
+    text, paper = (sum(map(int, re.findall(r"\d+", colour)[:3])) / 765 for colour in measured(run, 1280, scheme)["body"])
+    assert (text > 0.8 and paper < 0.2) if scheme == "dark" else (text < 0.2 and paper > 0.8)
 
 
 def test_no_table_is_cut_on_a_laptop(run):
@@ -68,3 +84,11 @@ def test_no_table_is_cut_on_a_laptop(run):
 def test_the_first_screen_answers(run):
     found = measured(run, 1280)["first"]
     assert {name: bottom < 900 for name, bottom in found.items()} == dict.fromkeys(found, True)
+
+
+def test_it_says_whether_how_well_of_what_and_what_next(run):
+    text = measured(run, 1280)["text"]
+    assert text["badge"] in ("calibrated", "not calibrated")
+    assert re.search(r"unseen .*: [\d.]+\smm per component", text["sentence"])
+    assert re.search(r"base [\d.]+\smm|joints.* [\d.]+\smm", text["shares"])
+    assert re.search(r"−[\d.]+\smm ", text["next li"])
