@@ -19,17 +19,19 @@ const frame = document.querySelector("iframe"), page = frame.contentDocument, wi
 const low = selector => Math.max(...[...page.querySelectorAll(selector)].map(e => e.getBoundingClientRect().bottom));
 const first = {badge: low(".badge"), sentence: low(".sentence"), shares: low(".shares"), next: low(".next"),
   plot: low(".verdict .drawing")};
-const text = Object.fromEntries(["badge", "sentence", "shares", "next li"].map(c => [c, page.querySelector("." + c).innerText]));
+const shown = c => [c, page.querySelector("." + c).innerText];
+const text = Object.fromEntries(["badge", "sentence", "shares", "next li"].map(shown));
 const luminance = e => { const c = frame.contentWindow.getComputedStyle(e); return [c.color, c.backgroundColor]; };
 const broken = [...page.images].filter(i => !i.naturalWidth).length;
-const outside = frame.contentWindow.performance.getEntriesByType("resource").map(e => e.name).filter(n => !n.startsWith("data:"));
+const asked = frame.contentWindow.performance.getEntriesByType("resource").map(e => e.name);
+const outside = asked.filter(n => !n.startsWith("data:"));
 page.querySelectorAll("details").forEach(d => d.open = true);
 const inside = e => e.closest("svg, .scroll, .drawing, pre");
 const wide = e => e.getBoundingClientRect().right > width + 1;
 const over = [...page.querySelectorAll("body *")].filter(e => !inside(e) && wide(e));
 const cut = [...page.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth + 1);
-document.title = JSON.stringify({width, page: page.documentElement.scrollWidth, first, text, broken, outside, body: luminance(page.body),
-  over: over.map(e => e.outerHTML.slice(0, 80)), cut: cut.map(e => e.ariaLabel)});
+document.title = JSON.stringify({width, page: page.documentElement.scrollWidth, first, text, broken, outside,
+  body: luminance(page.body), over: over.map(e => e.outerHTML.slice(0, 80)), cut: cut.map(e => e.ariaLabel)});
 """
 
 pytestmark = [
@@ -73,7 +75,9 @@ def test_nothing_overflows_is_broken_or_comes_from_elsewhere(run, width, scheme)
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_is_dark_on_light_or_light_on_dark(run, scheme):
-    text, paper = (sum(map(int, re.findall(r"\d+", colour)[:3])) / 765 for colour in measured(run, 1280, scheme)["body"])
+    text, paper = (
+        sum(map(int, re.findall(r"\d+", colour)[:3])) / 765 for colour in measured(run, 1280, scheme)["body"]
+    )
     assert (text > 0.8 and paper < 0.2) if scheme == "dark" else (text < 0.2 and paper > 0.8)
 
 
