@@ -2,7 +2,8 @@
 
 from calibration.evaluation.comparison import compare
 from calibration.evaluation.evaluate import evaluate
-from calibration.evaluation.ladder import Row, TrialErrors, ladder, row_entry, scored_errors
+from calibration.evaluation.ladder import Row, TrialErrors, ladder, scored_errors
+from calibration.evaluation.main_row import headline
 from calibration.evaluation.marker_errors import PointRow, point_rows
 from calibration.evaluation.pose_errors import pose_errors
 from calibration.evaluation.results import Evaluation
@@ -15,10 +16,10 @@ __all__ = [
     "TrialErrors",
     "compare",
     "evaluate",
+    "headline",
     "ladder",
     "point_rows",
     "pose_errors",
     "read_submission",
-    "row_entry",
     "scored_errors",
 ]

@@ -108,6 +108,7 @@ def evaluate(
         verdicts=(*remarks, *moved_in_trials(scored)),
         points=point_rows(estimate, dataset.description, means),
         predicted=tuple(one.predicted for one in scored),
+        main=estimate.main if submitted is None else submitted.name,
     )
 
 

@@ -48,6 +48,13 @@ class Row:
     against: str
     metrics: RowMetrics
 
+    def entry(self) -> dict[str, Any]:
+        """As evaluation.json and score.json have it."""
+        figures = asdict(self.metrics) | turned(self.metrics)
+        figures["per_axis_mm"] = dict(zip("xyz", self.metrics.per_axis_mm, strict=True))
+        names = {"model": self.model, "trials": self.trials, "base": self.base, "encoder": self.encoder}
+        return names | {"against": self.against} | figures
+
 
 def scored_errors(t: np.ndarray, errors: PoseErrors, dwells: np.ndarray, static: bool) -> PoseErrors:
     """The errors at t (n,) [s, mocap clock] that count; dwells (k, 2) [s] of a static trial."""
@@ -74,14 +81,6 @@ def ladder(traces: list[TrialErrors], against: str) -> Iterator[Row]:
                     np.concatenate([p.position for p in parts]), np.concatenate([p.rotation for p in parts])
                 )
                 yield Row(model, name, base, encoder, against, row_metrics(errors))
-
-
-def row_entry(row: Row) -> dict[str, Any]:
-    """A row as evaluation.json and score.json have it."""
-    figures = asdict(row.metrics) | turned(row.metrics)
-    figures["per_axis_mm"] = dict(zip("xyz", row.metrics.per_axis_mm, strict=True))
-    names = {"model": row.model, "trials": row.trials, "base": row.base, "encoder": row.encoder}
-    return names | {"against": row.against} | figures
 
 
 def trial_entry(trace: TrialErrors) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The evaluation of an estimate: the ladder, the errors it is made of, its files.
 
-evaluation.json            rows, rows by trial, protocols, fit quality by regime, comparisons, verdicts
+evaluation.json            headline, rows, rows by trial, protocols, fit quality by regime, comparisons, verdicts
 evaluation.nc              errors over time, one group a row and trial
 predictions/<trial>.nc     see `predicted_trial`
 """
@@ -13,7 +13,8 @@ from pathlib import Path
 
 from calibration.errors import NotEnoughData
 from calibration.evaluation.comparison import Comparison, comparisons
-from calibration.evaluation.ladder import Row, TrialErrors, Trials, row_entry, trial_entry
+from calibration.evaluation.ladder import Row, TrialErrors, Trials, trial_entry
+from calibration.evaluation.main_row import Headline, headline
 from calibration.evaluation.marker_errors import PointRow
 from calibration.evaluation.protocols import protocol_rows
 from calibration.prediction.predicted_trial import PredictedTrial
@@ -36,6 +37,7 @@ class Evaluation:
         verdicts: Trials whose errors are not the model's.
         points: Single markers of trials that hold posture means.
         predicted: The predictions that were scored, trial by trial.
+        main: The model that is delivered; empty where there is none.
     """
 
     rows: tuple[Row, ...]
@@ -45,6 +47,12 @@ class Evaluation:
     verdicts: tuple[Verdict, ...] = ()
     points: tuple[PointRow, ...] = ()
     predicted: tuple[PredictedTrial, ...] = ()
+    main: str = ""
+
+    @property
+    def headline(self) -> Headline | None:
+        """What `Compensator` delivers, against the motion capture; None where that was not scored."""
+        return headline(self.rows, self.main)
 
     def row(self, model: str, trials: Trials = "dynamic", base: str = "fixed", encoder: str = "motor") -> Row:
         """One line.
@@ -66,8 +74,9 @@ class Evaluation:
         compared = tuple(comparisons(self.traces))
         content = {
             "schema": 1,
-            "rows": [row_entry(r) for r in self.rows],
-            "confirmation": [row_entry(r) | {"role": "confirmation"} for r in self.confirmation],
+            **({} if self.headline is None else self.headline.entry()),
+            "rows": [r.entry() for r in self.rows],
+            "confirmation": [r.entry() | {"role": "confirmation"} for r in self.confirmation],
             "points": [asdict(p) for p in self.points],
             "trials": [trial_entry(t) for t in self.traces],
             "protocols": [asdict(r) for r in protocol_rows(self.traces, self.rows)],

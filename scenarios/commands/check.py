@@ -23,7 +23,6 @@ _SHORT = {
     "deg": "orientation_rmse_deg",
     "skill": "skill",
 }
-_BASES = ("dynamics", "plate", "fixed")
 
 
 def check(
@@ -83,10 +82,12 @@ def _figure(folder: Path, name: str) -> float:
 
 
 def _row(rows: Sequence[dict[str, Any]], text: str) -> dict[str, Any]:
+    from calibration.estimate import SOURCES
+
     model, base, encoder, trials = (*text.split(":"), "", "", "", "")[:4]
     wanted = (model, encoder or "motor", trials or "dynamic")
     found = {row["base"]: row for row in rows if (row["model"], row["encoder"], row["trials"]) == wanted}
-    source = base or next((b for b in _BASES if b in found), "")
+    source = base or next((b for b in SOURCES if b in found), "")
     if source not in found:
         known = dict.fromkeys(f"{r['model']}:{r['base']}:{r['encoder']}:{r['trials']}" for r in rows)
         raise ScenarioError(f"check: no row {text!r}; there are {', '.join(known)}")

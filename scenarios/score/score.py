@@ -5,7 +5,7 @@ through the same measurements: T_lab_B measured, all that follows it true.
 """
 
 import json
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import numpy as np
 
 import calibration.evaluation
 from calibration import Estimate, Evaluation
-from calibration.evaluation import Row, TrialErrors, row_entry, scored_errors
+from calibration.evaluation import Row, TrialErrors, headline, scored_errors
 from calibration.inference import Model
 from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
@@ -34,23 +34,31 @@ class Score(ParameterScore):
         skill: Of each row: (registration - row) / (registration - floor) in position RMSE per component [-].
         base: The base's roll and pitch by source of the wrench.
         models: Every model by itself, the main one first.
+        main: Model that is delivered; empty where there is none.
     """
 
     rows: tuple[Row, ...]
     skill: tuple[float | None, ...]
     base: tuple[BaseScore, ...] = ()
     models: tuple[ModelScore, ...] = ()
+    main: str = ""
 
     def content(self) -> dict[str, object]:
         """As in score.json."""
-        rows = [row_entry(r) | {"skill": s} for r, s in zip(self.rows, self.skill, strict=True)]
+        rows = [r.entry() | {"skill": s} for r, s in zip(self.rows, self.skill, strict=True)]
         n, covered = (sum(getattr(score, name) for _, score in self.models) for name in ("n_judged", "n_covered"))
         return super().content() | {
             "models": {name: score.coverage() for name, score in self.models},
             "every_model": {"coverage_95": covered / n if n else None, "n_covered": covered, "n_judged": n},
+            **self._headline(dict(zip(self.rows, rows, strict=True))),
             "rows": rows,
             "base": [asdict(b) for b in self.base],
         }
+
+    def _headline(self, entries: Mapping[Row, object]) -> dict[str, object]:
+        """The row that is delivered and the rows beside it; the floor is none of them."""
+        found = headline([row for row in self.rows if row.model != FLOOR], self.main)
+        return {} if found is None else {"main": entries[found.main], "beside": [entries[r] for r in found.beside]}
 
 
 def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path) -> Score:
@@ -67,7 +75,7 @@ def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path)
     rows = tuple(calibration.evaluation.ladder(list(_errors(pairs, _derived(truth_folder)["T_base_base"])), "truth"))
     main = {f.name: getattr(models[0][1], f.name) for f in fields(ParameterScore)} | {"parameters": parameters}
     skill = tuple(_skill(row, rows) for row in rows)
-    return Score(**main, rows=rows, skill=skill, base=base_scores(pairs), models=models)
+    return Score(**main, rows=rows, skill=skill, base=base_scores(pairs), models=models, main=evaluation.main)
 
 
 def _read_parameters(path: Path, estimated: Collection[str]) -> tuple[Parameter, ...]:

@@ -31,7 +31,7 @@ from urllib.request import url2pathname
 
 import pytest
 
-_PREDICTIVE = ("dynamics", "plate", "fixed")  # of the base's motion, without measuring it: the first that is there
+_PREDICTIVE = ("plate", "dynamics", "fixed")  # of the base's motion, without measuring it: the first that is there
 _RARE = 0.001  # how often valid intervals fail `assert_covers`
 _UNUSED = 30 * 86400.0  # [s] after which a cached result is removed
 _PACKAGES = ("calibration", "mjcf", "scenarios", "twin")

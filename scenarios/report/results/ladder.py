@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from calibration.estimate import SOURCES
 from calibration.prediction import BASELINE, LADDER, NOMINAL
 from scenarios.report.results.result_files import Row
 from scenarios.report.results.run_results import Results
@@ -19,7 +20,7 @@ BASES = {
     "submitted": "as submitted",
 }
 _MODELS, _BASES, _ENCODERS = tuple(MEANINGS), tuple(BASES), ("motor", "link")
-_PREDICTIVE = ("plate", "dynamics", "fixed", "submitted")
+_PREDICTIVE = (*SOURCES, "submitted")
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,8 @@ def _first(steps: Iterable[Step], model: str, bases: Sequence[str]) -> Step | No
 
 
 def headline_model(results: Results, steps: Sequence[Step]) -> str:
-    """The model the report is about: the estimate's main one, else the last estimated one of the ladder."""
-    main = results.estimate.main if results.estimate else ""
+    """The model the report is about: the one that is delivered, else the last estimated one of the ladder."""
+    main = results.evaluation.main.model if results.evaluation.main else ""
+    main = main or (results.estimate.main if results.estimate else "")
     known = [s.model for s in steps if s.model not in (NOMINAL, BASELINE, FLOOR)]
     return main if main in known else (known[-1] if known else steps[-1].model)

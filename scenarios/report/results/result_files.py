@@ -116,6 +116,8 @@ class Evaluation(Entry):
     """The whole of evaluation.json."""
 
     rows: tuple[Row, ...]
+    main: Row | None = None
+    beside: tuple[Row, ...] = ()
     trials: tuple[TrialErrors, ...] = ()
     regimes: tuple[Regime, ...] = ()
     protocols: tuple[Protocol, ...] = ()

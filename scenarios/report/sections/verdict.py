@@ -46,7 +46,7 @@ class Verdict:
         baseline, oracle = predictive(steps, BASELINE), oracle_base(steps, best.model)
         if baseline is not None and best.model != BASELINE:
             yield f"Fitting the marker frames alone (registration): {headline.figures(baseline.main)}."
-        if oracle is not None:
+        if oracle is not None and oracle is not best:
             yield f"{best.model} with the measured base (an oracle): {headline.figures(oracle.main)}."
         if best.truth is not None:
             skill = "" if best.truth.skill is None else f", skill {significant(best.truth.skill, 2)}"
