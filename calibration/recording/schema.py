@@ -122,6 +122,9 @@ class Tolerances(Declaration):
         joint_rotation: Joint placement, per axis [rad].
         encoder_offset: Zero of the motor encoder [rad, or m for a prismatic joint scaled by 0.1 m/rad].
         joint_play: Motor-side reading minus joint angle, offset apart [rad].
+        joint_delay: Median delay of a link behind its motor by viscous friction, friction over stiffness [s].
+        joint_delay_spread: Standard deviation of the delay's logarithm [-].
+        joint_windup: By which dry friction winds a gear, friction over stiffness [rad].
         body_translation: Marker cluster on its link, per axis [m].
         body_rotation: Marker cluster on its link, per axis [rad].
         link_mass: Relative to the link's mass [-].
@@ -136,6 +139,9 @@ class Tolerances(Declaration):
     body_rotation: Positive
     link_mass: Positive
     link_com: Positive
+    joint_delay: Positive = 5e-5
+    joint_delay_spread: Positive = 0.6
+    joint_windup: Positive = 1e-4
 
 
 class TrialEntry(Declaration):

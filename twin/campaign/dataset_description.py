@@ -49,6 +49,9 @@ def describe_dataset(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Desc
             body_rotation=d.body_rotation,
             link_mass=d.link_mass,
             link_com=d.link_com,
+            joint_delay=d.joint_delay,
+            joint_delay_spread=d.joint_delay_spread,
+            joint_windup=d.joint_windup,
         ),
         trials=trials,
     )

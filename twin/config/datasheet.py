@@ -17,4 +17,7 @@ class Datasheet:
     body_rotation: FixedPositive
     link_mass: FixedPositive
     link_com: FixedPositive
+    joint_delay: FixedPositive
+    joint_delay_spread: FixedPositive
+    joint_windup: FixedPositive
     payload_mass: FixedNonNegative

@@ -14,13 +14,14 @@ How late an instrument shows a motion, alike in all trials, where no recording c
 Robot: a link is late behind viscous friction c on a mesh of stiffness k by c / k, and where dry friction f winds the
 mesh by f / k over the speed,
 
-    late = c / k + left * wound + u * unseen,     ln(c / k) ~ N(ln 50 us, 0.6^2),   left ~ U(0, 0.2),   u ~ N(1, 1)
+    late = c / k + left * wound + u * unseen,     ln(c / k) ~ N(ln delay, spread^2),   left ~ U(0, 0.2),   u ~ N(1, 1)
 
-c / k of strain-wave gears (0.5 N.m.s/rad on 10 kN.m/rad), a factor of 1.8 either way from cold to worn in; wound is the
-mean lateness of the play that the fit of poses found in the loaded joints. Play operators are not quite what a wound
-gear does, and what a fit leaves of such a term has the sign of what it took: of dry friction alone a tenth was left.
-Friction never makes a link early: play that the fit finds to be early stands for something else, and only widens.
-Short motions do not tell play from lag: of a winding by 0.1 mrad, f / k of such gears (0.6 N.m on 9 kN.m/rad to 0.15 on
+delay and spread are the datasheet's (`Tolerances`): 50 us of strain-wave gears (0.5 N.m.s/rad on 10 kN.m/rad), a factor
+of 1.8 either way from cold to worn in, where it has none; wound is the mean lateness of the hysteresis that the fit of
+poses found in the loaded joints. Play operators are not quite what a wound gear does, and what a fit leaves of such a
+term has the sign of what it took: of dry friction alone a tenth was left. Friction never makes a link early: hysteresis
+that the fit finds to be early stands for something else, and only widens.
+Short motions do not separate hysteresis from lag: of a winding by 0.1 mrad, f / k of such gears (0.6 N.m on 9 kN.m/rad to 0.15 on
 1), unseen is what the fit of each trial would lay to the clock; it is one robot's, and no number of trials averages it.
 Plate: an anti-alias filter's delay is a part of its clock.
 """
@@ -34,11 +35,11 @@ from scipy.stats import theilslopes
 from calibration.errors import NotEnoughData
 from calibration.numerics.time_delay import Lag
 from calibration.recording.clock import Clock
+from calibration.recording.schema import Tolerances
 
 _DRIFT = 1e-4  # prior standard deviation of a clock's drift [-]: 100 ppm
 _FAR = 5.0  # robust standard deviations
 _TRIAL = 5e-5  # [s] floor of a trial's sigma; twice it over the trial is that of its own drift
-_VISCOUS, _COLD = 5e-5, 0.6  # [s] median of c / k; standard deviation of its logarithm
 _LEFT = 0.2  # at most, of what dry friction winds
 _PLATE = 3e-4  # [s]
 
@@ -126,7 +127,7 @@ def _line(
     return (reference, drift), (birge / float(w.sum()), birge / information), centre
 
 
-def allowance(instrument: str, lags: Sequence[TrialLag]) -> tuple[float, float]:
+def allowance(instrument: str, lags: Sequence[TrialLag], known: Tolerances) -> tuple[float, float]:
     """Mean and standard deviation [s] of what all trials share."""
     if instrument == "plate":
         return 0.0, _PLATE
@@ -134,7 +135,7 @@ def allowance(instrument: str, lags: Sequence[TrialLag]) -> tuple[float, float]:
         return 0.0, 0.0
     w = np.array([t.lag.sigma for t in lags]) ** -2.0
     wound, unseen = w @ [(t.wound, t.unseen) for t in lags] / w.sum()
-    viscous = _VISCOUS * np.exp(0.5 * _COLD**2)
-    spread = viscous * np.sqrt(np.expm1(_COLD**2))
+    viscous = known.joint_delay * np.exp(0.5 * known.joint_delay_spread**2)
+    spread = viscous * np.sqrt(np.expm1(known.joint_delay_spread**2))
     sigma = np.linalg.norm([spread, _LEFT / np.sqrt(12.0) * wound, unseen])
     return float(viscous + 0.5 * _LEFT * max(wound, 0.0) + unseen), float(sigma)

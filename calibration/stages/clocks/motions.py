@@ -23,7 +23,7 @@ from calibration.stages.clocks.plate_moments import Carrier, JointMotion, model_
 from calibration.stages.clocks.pose_refinement import Provisional, link_angles
 
 _CUTOFF = 6.0  # robot [Hz]
-_HALF_GAPS = (1e-3, 4e-3, 12e-3)  # rad; a tenth of it in m for a prismatic joint
+_HALF_GAPS = (1 / 8, 1 / 2, 3 / 2)  # of the datasheet's tolerance of backlash; a tenth of it in m if prismatic
 _MOVES = 8.0  # a joint whose range exceeds this many half gaps gets that play term
 _log = logging.getLogger(__name__)
 
@@ -42,7 +42,7 @@ def robot_motions(description: Description, chain: Chain, trials: Sequence[Trial
         try:
             T_base_hand = MeasuredTrial.of(description, trial).T_base_hand
             y = low_passed(even(*body_rates(trial.t_mocap, T_base_hand[:, :3, :3])), _CUTOFF)
-            x, nuisance = _robot_rates(chain, trial)
+            x, nuisance = _robot_rates(chain, trial, description.tolerances.joint_play)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             continue
@@ -65,10 +65,10 @@ def _aligned(y: Signal, x: Signal) -> Signal:
     return replace(y, x=y.x @ U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
 
 
-def _robot_rates(chain: Chain, trial: Trial) -> tuple[Signal, np.ndarray]:
+def _robot_rates(chain: Chain, trial: Trial, backlash: float) -> tuple[Signal, np.ndarray]:
     """Angular velocity of the tool (n, 3) [rad/s, tool] by the nominal chain, and its nuisance terms (n, k, 3)."""
     t, q = trial.t_robot, trial.q_motor[:, chain.columns]
-    half_gaps = np.array([_half_gaps(chain, name) for name in chain.joints])
+    half_gaps = np.array([_half_gaps(chain, name, backlash) for name in chain.joints])
     joint, width = np.nonzero(np.ptp(q, axis=0)[:, None] > _MOVES * half_gaps)
     lost = play(q[:, joint], half_gaps[joint, width]) - q[:, joint]
     axes = chain.joint_jacobians(0.5 * (trial.q_motor[1:] + trial.q_motor[:-1]))[:, 3:]
@@ -83,8 +83,8 @@ def _robot_rates(chain: Chain, trial: Trial) -> tuple[Signal, np.ndarray]:
     return replace(signal, x=x[:, :, 0]), np.swapaxes(x[:, :, 1:], 1, 2)
 
 
-def _half_gaps(chain: Chain, joint: str) -> np.ndarray:
-    return np.array(_HALF_GAPS) * (0.1 if chain.is_prismatic(joint) else 1.0)
+def _half_gaps(chain: Chain, joint: str, backlash: float) -> np.ndarray:
+    return backlash * np.array(_HALF_GAPS) * (0.1 if chain.is_prismatic(joint) else 1.0)
 
 
 def plate_motions(

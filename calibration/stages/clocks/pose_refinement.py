@@ -6,8 +6,8 @@
 
 Behind a gear the link is not where the motor is, and a gear without load lags by 4 gap / (pi amplitude omega): ten
 milliseconds and more. So a joint speaks of the clock only while its gravity torque tau_j keeps it on a flank; zeros of
-either flank, elasticity and dry friction (play of 0.1 and 0.4 mrad, weights of 1) are its nuisances. Otherwise it has a
-lag of its own and random errors as large as any gear's. e are the errors of the provisional geometry, as large as its
+either flank, elasticity and dry friction (two narrow play operators, weights of 1) are its nuisances. Otherwise it has
+a lag of its own and random errors as large as any gear's. e are the errors of the provisional geometry, as large as its
 fit says. The remaining noise is the markers' and each joint's random reading error, by its lever arm.
 """
 

@@ -15,7 +15,7 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed, play
 from calibration.recording.clock import Clock
 
-HALF_WIDTHS = (1e-4, 4e-4)  # [rad, m]
+_WIDTHS = (1 / 80, 1 / 20)  # half widths of the play operators, of the datasheet's tolerance of backlash
 _CUTOFF = 6.0  # [Hz] of the readings, for their rates
 _STRIDE = 2  # motion-capture samples
 _ENOUGH = 100  # samples
@@ -30,7 +30,7 @@ class Samples:
         t: (n,) [s].
         q: (n, n_measured) readings [rad, m].
         v: (n, n_measured) their rates [rad/s, m/s].
-        lost: (n, n_measured, n_widths) what play operators of half widths `HALF_WIDTHS` add to a reading [rad, m].
+        lost: (n, n_measured, n_widths) what narrow play operators add to a reading [rad, m].
         T: (n, 4, 4) measured T_B_H.
         covariance: (n, 6, 6) of its local twist [m, rad].
     """
@@ -54,7 +54,10 @@ def read_samples(trial: MeasuredTrial, clock: Clock, calm: bool) -> Samples:
     rates = np.gradient(slow.x, 1.0 / RATE, axis=0)
     q = interpolate_columns(s, trial.t_robot, trial.q_motor, np.nan)
     v = interpolate_columns(s, slow.t, rates, np.nan)
-    gaps = (play(slow.x, np.full(q.shape[1], w)) - slow.x for w in HALF_WIDTHS)
+    gaps = (
+        play(slow.x, np.full(q.shape[1], w)) - slow.x
+        for w in np.multiply(_WIDTHS, trial.description.tolerances.joint_play)
+    )
     lost = np.stack([interpolate_columns(s, slow.t, gap, np.nan) for gap in gaps], axis=2)
     wanted = np.interp(s, slow.t, (_is_calm(slow, rates) | (not calm)).astype(float), 0.0, 0.0) == 1.0
     rows = np.flatnonzero(wanted & np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2)))[::_STRIDE]

@@ -21,6 +21,7 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.numerics.time_delay import coarse_lag, fit_lag
 from calibration.recording.clock import Clock, shared_clock
+from calibration.recording.schema import Tolerances
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.clock_fit import TrialLag, allowance, fit_clock
@@ -77,10 +78,10 @@ def _estimated_robot_clock(
     lab: Laboratory, trials: Sequence[Trial]
 ) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
     chain, description = lab.chain, lab.description
-    robot, verdicts = _clock("robot", robot_motions(description, chain, trials), 1)
+    robot, verdicts = _clock("robot", robot_motions(description, chain, trials), 1, description.tolerances)
     try:
         model = provisional(chain, description, trials, robot)
-        robot, verdicts = _concluded("robot", refined(model, description, trials, robot))
+        robot, verdicts = _concluded("robot", refined(model, description, trials, robot), description.tolerances)
     except NotEnoughData as error:
         warning = Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}")
         return robot, None, (*verdicts, warning)
@@ -99,12 +100,14 @@ def _plate_clock(
     motions = list(plate_motions(parts, description, trials, robot, model))
     Q = plate_axes([m.pair for m in motions])
     try:
-        return _clock("plate", [replace(m, pair=m.pair.turned(Q)) for m in motions], 2)
+        return _clock("plate", [replace(m, pair=m.pair.turned(Q)) for m in motions], 2, description.tolerances)
     except NotEnoughData as error:
         return None, (Verdict("clocks", "missing", f"no plate clock: {error}"),)
 
 
-def _clock(instrument: str, motions: Iterable[Motion], passes: int) -> tuple[Clock, tuple[Verdict, ...]]:
+def _clock(
+    instrument: str, motions: Iterable[Motion], passes: int, known: Tolerances
+) -> tuple[Clock, tuple[Verdict, ...]]:
     """The clock from lags of all motions; every pass after the first knows the drift within a trial."""
     kept, drift, lags = list(motions), 0.0, []
     starts = {m.trial_id: coarse_lag(m.pair.y, m.pair.x) for m in kept}
@@ -112,12 +115,12 @@ def _clock(instrument: str, motions: Iterable[Motion], passes: int) -> tuple[Clo
         lags = _lags(kept, starts, drift)
         starts = {t.trial_id: t.lag.value for t in lags}
         drift = fit_clock(instrument, lags)[0].drift
-    return _concluded(instrument, lags)
+    return _concluded(instrument, lags, known)
 
 
-def _concluded(instrument: str, lags: list[TrialLag]) -> tuple[Clock, tuple[Verdict, ...]]:
+def _concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tuple[Clock, tuple[Verdict, ...]]:
     """The clock of these lags, and what is to be said of it."""
-    late, common = allowance(instrument, lags)
+    late, common = allowance(instrument, lags, known)
     clock, outliers = fit_clock(instrument, lags, common)
     clock = replace(clock, offset=clock.offset - late)
     message = (

@@ -13,6 +13,7 @@ from calibration.stages.clocks.clock_fit import TrialLag, allowance
 from calibration.stages.clocks.pose_refinement import provisional, refined_lags
 from tests.doubles import geared_robot, rigid_robot
 
+KNOWN = rigid_robot.described().tolerances.model_copy(update={"joint_delay": 8e-5, "joint_delay_spread": 0.5})
 CLOCK = Clock("robot", 3.9, 40e-6, np.zeros((2, 2)), 20.0, 1e-4)
 
 
@@ -23,20 +24,22 @@ def lag(wound: float, sigma: float = 1e-4, unseen: float = 0.0) -> TrialLag:
 @pytest.mark.parametrize(("wound", "unseen"), [(0.0, 0.0), (4e-4, 0.0), (2e-4, 1e-4)])
 def test_mean_and_spread_are_those_of_the_formula(wound, unseen):
     rng, n = np.random.default_rng(0), 400_000
-    late = 5e-5 * np.exp(0.6 * rng.normal(size=n)) + rng.uniform(0.0, 0.2, n) * wound
+    late = 8e-5 * np.exp(0.5 * rng.normal(size=n)) + rng.uniform(0.0, 0.2, n) * wound
     late += rng.normal(1.0, 1.0, n) * unseen
-    np.testing.assert_allclose(allowance("robot", [lag(wound, unseen=unseen)]), (late.mean(), late.std()), rtol=0.01)
+    np.testing.assert_allclose(
+        allowance("robot", [lag(wound, unseen=unseen)], KNOWN), (late.mean(), late.std()), rtol=0.01
+    )
 
 
 def test_trials_count_by_what_they_tell_of_the_clock_and_a_plate_is_not_geared():
     both = [lag(4e-4, 1e-4), lag(0.0, 2e-4)]
-    np.testing.assert_allclose(allowance("robot", both), allowance("robot", [lag(3.2e-4)]))
-    assert allowance("plate", both) == (0.0, 3e-4)
+    np.testing.assert_allclose(allowance("robot", both, KNOWN), allowance("robot", [lag(3.2e-4)], KNOWN))
+    assert allowance("plate", both, KNOWN) == (0.0, 3e-4)
 
 
 def test_play_that_is_early_widens_and_does_not_shift():
-    early, none = allowance("robot", [lag(-4e-4)]), allowance("robot", [lag(0.0)])
-    assert early[0] == none[0] and early[1] == allowance("robot", [lag(4e-4)])[1] > none[1]
+    early, none = allowance("robot", [lag(-4e-4)], KNOWN), allowance("robot", [lag(0.0)], KNOWN)
+    assert early[0] == none[0] and early[1] == allowance("robot", [lag(4e-4)], KNOWN)[1] > none[1]
 
 
 def test_friction_that_winds_the_gears_is_found_and_not_where_there_is_none():
