@@ -15,7 +15,7 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed, play
 from calibration.recording.clock import Clock
 
-_WIDTHS = (1 / 80, 1 / 20)  # half widths of the play operators, of the datasheet's tolerance of backlash
+_WIDTHS = (1.0, 4.0)  # half widths of the play operators, of the datasheet's windup by dry friction
 _CUTOFF = 6.0  # [Hz] of the readings, for their rates
 _STRIDE = 2  # motion-capture samples
 _ENOUGH = 100  # samples
@@ -56,7 +56,7 @@ def read_samples(trial: MeasuredTrial, clock: Clock, calm: bool) -> Samples:
     v = interpolate_columns(s, slow.t, rates, np.nan)
     gaps = (
         play(slow.x, np.full(q.shape[1], w)) - slow.x
-        for w in np.multiply(_WIDTHS, trial.description.tolerances.joint_play)
+        for w in np.multiply(_WIDTHS, trial.description.tolerances.joint_windup)
     )
     lost = np.stack([interpolate_columns(s, slow.t, gap, np.nan) for gap in gaps], axis=2)
     wanted = np.interp(s, slow.t, (_is_calm(slow, rates) | (not calm)).astype(float), 0.0, 0.0) == 1.0
