@@ -198,6 +198,7 @@ dataset = app.command(epilog=_example("dataset swing20 -n 10 --out runs/swing20"
 design = app.command(epilog=_example("design short -n 30 --out postures.yaml"))(command_design.design)
 study = app.command(epilog=_example("study coverage short -n 20 --out runs/coverage"))(command_study.study)
 process = app.command(epilog=_example("process lab.yaml --out runs/lab"))(command_process.process)
+base = app.command(epilog=_example("base log.csv --map log.yaml --fit 28 --out runs/base"))(command_process.base)
 look = app.command(epilog=_example("look runs/short/dataset --out runs/look"))(quicklook.look)
 picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"))(video.picture)
 reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"))(command_reality.reality)

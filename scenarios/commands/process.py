@@ -1,4 +1,4 @@
-"""The command `process`."""
+"""The commands `process` and `base`: what recordings say, of the whole robot or of its base alone."""
 
 from pathlib import Path
 from typing import Annotated
@@ -31,3 +31,46 @@ def process(
     if not found.estimate.calibrated:
         typer.echo("The estimate must not be used; the refused verdicts say why.", err=True)
         raise typer.Exit(FAILED)
+
+
+def base(  # noqa: PLR0913  an option each
+    sources: Annotated[list[Path], typer.Argument(metavar="DATASET|FILE...", help="A dataset folder, or log files.")],
+    out: Out,
+    mapping: Annotated[Path | None, typer.Option("--map", metavar="YAML", help="Of the log files.")] = None,
+    fit: Annotated[
+        float | None, typer.Option(min=0.0, metavar="S", help="Fit to the first S seconds, predict the rest.")
+    ] = None,
+    steady: Annotated[
+        float | None, typer.Option(min=0.0, metavar="S", help="Leave out steady cycles in turn, from S seconds on.")
+    ] = None,
+    cycle: Annotated[float, typer.Option(min=0.5, metavar="S", help="How long a cycle is.")] = 5.0,
+) -> None:
+    """Fit the base's motion to base markers and plate alone, predict the rest of the log, and score it."""
+    from scenarios.commands import console
+    from scenarios.files.errors import ScenarioError
+    from scenarios.steps.base_motion import Cycles, base_motion
+
+    if mapping is None and not (len(sources) == 1 and sources[0].is_dir()):
+        raise ScenarioError("base: name a dataset folder, or log files with their mapping (--map)")
+    found = base_motion(sources, mapping, out, fit, None if steady is None else Cycles(steady, cycle))
+    for note in found.notes:
+        typer.echo(note)
+    typer.echo(
+        "Forms: "
+        + ", ".join(f"{a} {form}" for a, form in zip("x y z roll pitch yaw".split(), found.base.forms, strict=True))
+    )
+    rows = [
+        {
+            "part": name,
+            "s": f"{s.seconds:.1f}",
+            "hand [mm]": f"{1e3 * s.hand:.2f}",
+            "base that stays": f"{1e3 * s.still:.2f}",
+            "about its mean": f"{1e3 * s.about_mean:.2f}",
+            "yaw R2": f"{s.yaw_r2:.2f}",
+            "yaw R2, mean off": f"{s.yaw_r2_about_mean:.2f}",
+            "in 95 % band": f"{s.covered.mean():.0%}",
+        }
+        for name, s in found.scores.items()
+    ]
+    console.show(console.records(rows))
+    typer.echo(f"Base motion: {out}")
