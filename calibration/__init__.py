@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from calibration.pipeline import calibrate
     from calibration.prediction.compensator import Compensator
     from calibration.prediction.predict import predictions
-    from calibration.recording.dataset import Dataset, load
+    from calibration.prediction.recordings import load
+    from calibration.recording.dataset import Dataset
     from calibration.stages.geometry.from_arrays import fit_geometry
 
 __all__ = [
@@ -42,7 +43,8 @@ _MODULES = {
     "pipeline": ("calibrate",),
     "prediction.compensator": ("Compensator",),
     "prediction.predict": ("predictions",),
-    "recording.dataset": ("Dataset", "load"),
+    "prediction.recordings": ("load",),
+    "recording.dataset": ("Dataset",),
     "stages.geometry.from_arrays": ("fit_geometry",),
 }
 

@@ -108,6 +108,16 @@ def read_submission(path: Path | str) -> Submission:
     return Submission(path, found)
 
 
+def write_submission(path: Path | str, trials: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
+    """Write predictions as netCDF: for each trial t (n,) [s, mocap clock] and T_lab_hand (n, 4, 4), NaN where none."""
+    with netcdf.created(Path(path)) as file:
+        for trial, (t, T) in trials.items():
+            group = file.createGroup(trial)
+            netcdf.add_dimensions(group, {"t": len(t), "row": 4, "column": 4})
+            netcdf.write_variable(group, "t", t, ("t",), "f8", {"units": "s", "clock": "mocap"})
+            netcdf.write_variable(group, "T", T, ("t", "row", "column"), "f8", {"units": "m", "frame": "lab"})
+
+
 def _read_csv(path: Path) -> Iterator[tuple[str, SubmittedTrial]]:
     try:
         with path.open(encoding="utf-8", newline="") as file:

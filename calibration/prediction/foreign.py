@@ -9,22 +9,19 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
-from functools import reduce
 
 import numpy as np
 
-from calibration.errors import CalibrationError, InputError, NotEnoughData
+from calibration.errors import CalibrationError, InputError
 from calibration.estimate.estimate import Estimate
 from calibration.inference.parameters import Model, Parameter
-from calibration.mocap.labels import relabelled_trials
-from calibration.mocap.postures import Postures, mean_postures, static_postures
+from calibration.mocap.postures import Postures
+from calibration.prediction.recordings import clocks_of, static
 from calibration.recording.dataset import Dataset
 from calibration.recording.schema import Description
 from calibration.robot.chain import Chain, chain_of
 from calibration.robot.hand import HandModel
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.clocks.stage import synchronise
-from calibration.stages.frames.base_rests import MOVES
 from calibration.stages.geometry.hand_residual import NoiseModel
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.parameters import (
@@ -97,16 +94,8 @@ def registered(estimate: Estimate, dataset: Dataset) -> Estimate:
         NotEnoughData: No calibration posture shows base and hand.
     """
     lab = Laboratory(dataset.urdf, dataset.description)
-    chain = _chain(estimate, dataset)
-    trials = tuple(t for entry, t in relabelled_trials(dataset, "calibration") if entry.kind not in MOVES)
-    clocks = synchronise(lab, trials)[0] if trials else ()
-    robot = next((c for c in clocks if c.instrument == "robot"), None)
-    found = [mean_postures(lab.description, m) for _, m in dataset.means("calibration")]
-    if robot is not None and any(len(t.dwell_start) for t in trials):
-        found.append(static_postures(lab.description, trials, robot))
-    if not found:
-        raise NotEnoughData("no static calibration posture to register the marker frames with")
-    postures = reduce(Postures.joined, found)
+    chain, clocks = _chain(estimate, dataset), clocks_of(dataset)
+    postures = static(dataset, "calibration", clocks)
     models = []
     for model in estimate.models:
         hand = hand_of(model, chain, lab.nominal_frames)

@@ -7,10 +7,11 @@ import numpy as np
 from calibration.errors import NotCalibrated
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.rows import LADDER, PARTS
-from calibration.mocap.labels import relabelled_trial, relabelled_trials
+from calibration.mocap.labels import relabelled_trial
 from calibration.prediction.foreign import places_hand
 from calibration.prediction.predicted_trial import PredictedTrial, Prediction
 from calibration.prediction.predictor import Predictor
+from calibration.prediction.recordings import clocks_of
 from calibration.recording.dataset import Dataset
 from calibration.recording.schema import Role
 from calibration.robot.chain import chain_of
@@ -18,7 +19,6 @@ from calibration.robot.hand import nominal_hand
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.bundle.robot import BundledRobot
-from calibration.stages.clocks.stage import synchronise
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import JointModels, input_model
 
@@ -49,11 +49,8 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     )
     models |= {model.name: estimated[model.name] for model in own}
     robot = estimate.clock("robot")
-    trials = () if robot is not None else tuple(trial for _, trial in relabelled_trials(dataset, "calibration"))
-    if trials:
-        robot = next(
-            (c for c in synchronise(Laboratory(dataset.urdf, description), trials)[0] if c.instrument == "robot"), None
-        )
+    if robot is None:
+        robot = next((c for c in clocks_of(dataset) if c.instrument == "robot"), None)
     joints = None
     corrected = next((models[row.name] for row in LADDER if row.joints and row.name in models), None)
     if corrected is not None and estimate.joint_models:
