@@ -14,6 +14,7 @@ Exchanges of labels that keep a body's shape: told by markers that jump, set rig
 
     d(P) = rms |p_k[a] - p_k-1[P(a)]|, labels a          angle(R_P) > w dt,  x_P(a) ~ R_P x_a + c
 
+A hidden marker is taken where the body's pose puts it, so that frames in which others are hidden are compared alike.
 Between two frames dt apart the identity moves markers by more than half the cluster's shortest edge, and an order P by
 less than a third of it: the labels were exchanged by P, unless the body itself turned as P turns the drawing, which no
 robot's does faster than w. From there on they stay so until the next jump. Right are the labels that most frames have;
@@ -34,7 +35,8 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import rotation_vector
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.dataset import Dataset
-from calibration.recording.schema import Body, Role, TrialEntry
+from calibration.recording.holes import without_holes
+from calibration.recording.schema import Body, Description, Role, TrialEntry
 from calibration.recording.trial import Trial
 
 _LIMIT = 0.1  # of the shortest edge [-]
@@ -80,19 +82,23 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
 
 
 def relabelled_trial(dataset: Dataset, entry: TrialEntry) -> MeasuredTrial:
-    """Read one continuous trial, exchanged marker labels corrected.
+    """Read one continuous trial, exchanged marker labels corrected, lost samples left out.
 
     Raises:
         InputError: As `Dataset.read`.
     """
     description = dataset.description
-    return MeasuredTrial.of(description, with_right_labels(description.bodies, dataset.read(entry))[0])
+    return _relabelled(description, dataset.read(entry))
 
 
 def relabelled_trials(dataset: Dataset, role: Role, *kinds: str) -> Iterator[tuple[TrialEntry, MeasuredTrial]]:
-    """Read the continuous trials of a role one after the other, exchanged marker labels corrected."""
+    """Read the continuous trials of a role one after the other, as `relabelled_trial`."""
     for entry, trial in dataset.trials(role, *kinds):
-        yield entry, MeasuredTrial.of(dataset.description, with_right_labels(dataset.description.bodies, trial)[0])
+        yield entry, _relabelled(dataset.description, trial)
+
+
+def _relabelled(description: Description, trial: Trial) -> MeasuredTrial:
+    return MeasuredTrial.of(description, with_right_labels(description.bodies, without_holes(trial))[0])
 
 
 def _of_one_shape(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -190,7 +196,8 @@ def without_jumps(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
     rows = np.flatnonzero(np.isfinite(p).all(axis=2).sum(axis=1) >= 3)
     if len(xyz) > MOST or len(rows) < 2:
         return p
-    before, after = p[rows[:-1]], p[rows[1:]]
+    whole = _completed(xyz, p[rows])
+    before, after = whole[:-1], whole[1:]
     jumped = np.flatnonzero(_distance(after, before) > _JUMP * shortest_edge(xyz))
     exchanged = _exchanges(xyz, np.diff(t[rows])[jumped], before[jumped], after[jumped])
     if (exchanged == np.arange(len(xyz))).all():
@@ -209,6 +216,12 @@ def without_jumps(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
     for state, start, stop in zip(states, starts[:-1], starts[1:], strict=True):
         out[start:stop, np.argsort(right)[state]] = p[start:stop]
     return out
+
+
+def _completed(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Markers (n, m, 3) with the hidden ones where the body's pose puts them; hidden where it has none."""
+    T = body_poses(xyz, p).T
+    return np.where(np.isfinite(p), p, np.einsum("nij,mj->nmi", T[:, :3, :3], xyz) + T[:, None, :3, 3])
 
 
 def shortest_edge(xyz: np.ndarray) -> float:

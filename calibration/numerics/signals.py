@@ -39,7 +39,7 @@ class Signal:
 
 
 def even(t: np.ndarray, x: np.ndarray) -> Signal:
-    """Samples x (n, c) at t (n,) [s] on an even grid, cubic; rows with NaN are left out.
+    """Samples x (n, c) at t (n,) [s] on an even grid, cubic, linear across holes; rows with NaN are left out.
 
     Raises:
         NotEnoughData: Fewer than one second of samples.
@@ -50,7 +50,10 @@ def even(t: np.ndarray, x: np.ndarray) -> Signal:
         raise NotEnoughData("less than one second of samples; record the motion with a second of rest on both sides")
     grid = t[0] + np.arange(int((t[-1] - t[0]) * RATE) + 1) / RATE
     right = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
-    return Signal(grid, CubicSpline(t, x)(grid), np.diff(t)[right - 1] <= GAP)
+    found, valid = CubicSpline(t, x)(grid), np.diff(t)[right - 1] <= GAP
+    if not valid.all():
+        found[~valid] = interpolate_columns(grid[~valid], t, x)
+    return Signal(grid, found, valid)
 
 
 def low_passed(signal: Signal, cutoff: float) -> Signal:

@@ -92,7 +92,7 @@ def link_zeros(trials: Iterable[Trial], robot: Clock) -> np.ndarray:
     means = [row for trial in trials for row in dwell_differences(trial, robot)]
     if not means:
         raise NotEnoughData("no static calibration posture with readings: the zero between the encoders is not known")
-    return np.mean(means, axis=0)
+    return _known_means(np.array(means))
 
 
 def dwell_differences(trial: Trial, robot: Clock) -> Iterator[np.ndarray]:
@@ -101,7 +101,13 @@ def dwell_differences(trial: Trial, robot: Clock) -> Iterator[np.ndarray]:
     for start, stop in dwell_windows(trial):
         rows = (t >= start) & (t <= stop)
         if rows.any():
-            yield (trial.q_motor - trial.q_link)[rows].mean(axis=0)
+            yield _known_means((trial.q_motor - trial.q_link)[rows])
+
+
+def _known_means(x: np.ndarray) -> np.ndarray:
+    """Means (k,) of the finite rows of each column of x (n, k); NaN without one."""
+    known = np.isfinite(x)
+    return np.where(known, x, 0.0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
 
 
 def aligned_link_readings(trial: Trial, zero: np.ndarray) -> np.ndarray:

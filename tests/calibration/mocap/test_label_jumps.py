@@ -76,3 +76,18 @@ def test_a_body_that_turns_is_left_alone_though_it_was_hidden_meanwhile():
     jolted = seen(SQUARE)
     jolted[200:] += [0.3, 0.0, 0.0]  # moved as a whole: another matter than labels
     assert without_jumps(SQUARE, T, jolted) is jolted
+
+
+@pytest.mark.parametrize("xyz", [SQUARE, SQUARE * [[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.3, 1.0, 1.0], [1.0, 1.0, 1.0]]])
+def test_hidden_markers_are_not_exchanged_ones(xyz):
+    """One marker found again while another is lost, at random or for a while: every frame stays as it was recorded."""
+    p, rng = seen(xyz), np.random.default_rng(1)
+    handed_over = p.copy()
+    handed_over[100:120, 0], handed_over[120:140, 1] = np.nan, np.nan
+    at_random = np.where(rng.random(p.shape[:2])[..., None] < 0.2, np.nan, p)
+    blocks = p.copy()
+    for k in range(4):
+        for start in rng.integers(0, 350, 3):
+            blocks[start : start + 50, k] = np.nan
+    for hidden in (handed_over, at_random, blocks):
+        np.testing.assert_array_equal(without_jumps(xyz, T, hidden), hidden)
