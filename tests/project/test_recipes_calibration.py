@@ -1,14 +1,11 @@
 """The recipes of CONTRIBUTING.md that add to the calibration are carried out, each in a copy of the package."""
 
-import re
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.doubles.recipes import copied, recipe, run_script
+
 BLOCK = """
 import numpy as np
 import mjcf
@@ -63,27 +60,10 @@ assert np.trace(both.covariance) < np.trace(alone.covariance)
 """
 
 
-def recipe(name: str) -> str:
-    """The fenced block that follows the recipe's mark."""
-    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    (block,) = re.findall(rf"<!-- recipe: {name} -->\n```\w+\n(.*?)```", text, flags=re.DOTALL)
-    return block
-
-
 @pytest.fixture
 def stage(tmp_path) -> Path:
     """The geometric stage in a copy of the calibration."""
-    shutil.copytree(ROOT / "calibration", tmp_path / "calibration", ignore=shutil.ignore_patterns("__pycache__"))
-    return tmp_path / "calibration/stages/geometry"
-
-
-def run(stage: Path, script: str) -> None:
-    """Run a script with the copy, everything else from here."""
-    path = f"{stage.parents[2]}:{ROOT}"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=stage, env={"PYTHONPATH": path}, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
+    return copied(tmp_path, "calibration") / "calibration/stages/geometry"
 
 
 def test_a_parameter_block_is_a_file_and_its_name(stage):
@@ -93,9 +73,9 @@ def test_a_parameter_block_is_a_file_and_its_name(stage):
     assert text.count("FULL: tuple[type[ParameterBlock], ...] = AT_REST") == 1
     named = text.replace("...] = AT_REST", "...] = (*AT_REST, Eccentricity)")
     listed.write_text(named.replace("\nFULL:", f"\n{mine}\nFULL:"), encoding="utf-8")
-    run(stage, BLOCK)
+    run_script(stage.parents[2], BLOCK)
 
 
 def test_a_residual_is_a_file_and_an_instance(stage):
     (stage / "hand_height.py").write_text(recipe("residual"), encoding="utf-8")
-    run(stage, RESIDUAL)
+    run_script(stage.parents[2], RESIDUAL)

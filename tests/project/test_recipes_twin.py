@@ -1,10 +1,6 @@
 """The recipes of CONTRIBUTING.md that add to the twin are carried out, each in a copy of the packages."""
 
 import json
-import re
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import netCDF4
@@ -13,11 +9,11 @@ import pytest
 
 from scenarios import load
 from scenarios.files.errors import ScenarioError
+from tests.doubles.recipes import copied, recipe, run_script
 from twin.errors import TwinError
 from twin.motions import JOINTS, RATE, schedule, trajectory
 from twin.motions.csv_trajectory import InvalidTrajectory, read_trajectory
 
-ROOT = Path(__file__).parents[2]
 POSE = [0.12, 1.5, 0.1, -1.55, 0.6, 0.1, 0.1, 0.1]
 SHORT = ["twin.campaign.only=[xyz]", "twin.campaign.validation_swing=2.0", "twin.campaign.rest=1.0"]
 RECORD = """
@@ -29,33 +25,15 @@ record(load("humanoids2024", sys.argv[2:]).twin, 0, Path(sys.argv[1]))
 """
 
 
-def recipe(name: str) -> str:
-    """The fenced block that follows the recipe's mark."""
-    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    (block,) = re.findall(rf"<!-- recipe: {name} -->\n```\w+\n(.*?)```", text, flags=re.DOTALL)
-    return block
-
-
 @pytest.fixture
 def tree(tmp_path):
     """A copy of the packages."""
-    for package in ("calibration", "mjcf", "scenarios", "twin"):
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
-    return tmp_path
-
-
-def ran(tree: Path, script: str, *arguments: str) -> None:
-    """Run a script with the packages of a copy."""
-    command = [sys.executable, "-c", script, *arguments]
-    done = subprocess.run(
-        command, cwd=tree, env={"PYTHONPATH": str(tree), "MPLBACKEND": "agg"}, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
+    return copied(tmp_path, "calibration", "mjcf", "scenarios", "twin")
 
 
 def recorded(tree: Path, *overrides: str) -> dict[str, float]:
     """Parameters of the truth of a short campaign with the packages of a copy."""
-    ran(tree, RECORD, str(tree / "out"), *SHORT, *overrides)
+    run_script(tree, RECORD, str(tree / "out"), *SHORT, *overrides)
     truth = json.loads((tree / "out/truth/truth.json").read_text(encoding="utf-8"))
     return {p["name"]: p["value"] for p in truth["parameters"]}
 
@@ -107,7 +85,7 @@ def test_a_motion_is_an_entry(tree):
 
 
 def test_ten_lines_of_python_change_a_defect_simulate_and_plot(tree):
-    ran(
+    run_script(
         tree,
         recipe("python")
         + "one, other = (line.get_ydata() for line in plt.gca().lines)\nassert 1e-4 < abs(one - other).max() < 0.1\n",
