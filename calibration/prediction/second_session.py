@@ -97,16 +97,16 @@ def reregistered_compensator(
     return replace(robot, hand=hand, covariance=_covariance(robot, hand, q, frame_weights(description)))
 
 
-def _covariance(robot: Compensator, hand: HandModel, q: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(p, p) of frames and all that stays, postures weighed by `weight` (6,)."""
+def _covariance(robot: Compensator, hand: HandModel, q: np.ndarray, W: np.ndarray) -> np.ndarray:
+    """(p, p) of frames and all that stays, errors of postures weighed by W (6, 6)."""
     n, p = len(q), len(robot.names)
     found = hand.poses_and_derivatives(q, names=robot.names)
     frames = np.isin(robot.names, hand.block(Frames).names)
-    J = (weight[:, None] * found.J).reshape(6 * n, p)
+    J = (W @ found.J).reshape(6 * n, p)
     L = np.linalg.pinv(J[:, frames])
     A = np.eye(p)[:, ~frames]
     A[frames] = -L @ J[:, ~frames]
-    each = (L.reshape(-1, n, 6) * weight).transpose(1, 0, 2)
+    each = (L.reshape(-1, n, 6) @ W).transpose(1, 0, 2)
     covariance = A @ robot.covariance[np.ix_(~frames, ~frames)] @ A.T
     random = (each @ robot.spread.random_errors(found.J_joint) @ each.transpose(0, 2, 1)).sum(axis=0)
     covariance[np.ix_(frames, frames)] += random

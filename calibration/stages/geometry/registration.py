@@ -1,9 +1,10 @@
 """Stage `registration`: nominal geometry, the two marker bodies placed where the data say.
 
-    minimise  sum_i |log6(T_measured_i^-1 T_base_B^-1 T_base_tool(q_i) T_tool_H)|^2 / tolerance^2      12 parameters
+    minimise  sum_i mean_m |p_m + phi_i x c_m|^2 / tolerance^2                                      12 parameters
+              (p_m, phi_i) = log6(T_measured_i^-1 T_base_B^-1 T_base_tool(q_i) T_tool_H),   c_m markers in H
 
-The honest baseline: what is left after it is geometry, zeros, play and the base. Those errors are millimetres where the
-markers' noise is a tenth of one, so position and rotation weigh as the datasheet's tolerance of a marker body does, and
+The honest baseline, plain least squares of the hand's markers: what is left after it is geometry, zeros, backlash and
+the base. Those errors are millimetres where the markers' noise is a tenth of one, so all markers weigh alike, and
 postures passed through in swings count beside the static ones: a baseline must not hang on where the statics lie.
 A posture much farther from the others' fit than they are, `_OUTLIER` times their median squared distance, is excluded
 and named: a robot's own errors are much alike over its workspace. The start minimises distances, not their squares.
@@ -22,7 +23,7 @@ from calibration.inference.map_estimate import Fit
 from calibration.inference.parameters import Model, ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.numerics.alignment import registration_start
-from calibration.numerics.lie import inverse
+from calibration.numerics.lie import inverse, skew
 from calibration.numerics.robust_covariance import block_covariance
 from calibration.recording.schema import Description
 from calibration.robot.blocks import Frames
@@ -38,6 +39,7 @@ STAGE = "registration"
 _OUTLIER = 16.0  # squared distance over the median one [-]; 2 to 6 is the farthest of clean recordings
 _NEAR = 1e-2  # squared distance, in tolerances, that is never an outlier [-]
 _ROUNDS = 6
+_TRIANGLE = 3  # markers that determine a pose
 _STEPS = 20
 _STILL = 1e-10  # [m, rad]
 
@@ -48,7 +50,7 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
     told = 6 + postures.components  # a point does not show how the hand is turned: that stays as drawn
     drawn = np.where(np.arange(12) < told, parameters.tolerance, tol.body_rotation)
     parameters = replace(parameters, tolerance=drawn)
-    W = np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)[: postures.components])
+    W = frame_weights(description)[: postures.components, : postures.components]
     found, kept = _without_outliers(nominal_hand(chain, parameters.nominal), parameters, postures, W)
     model = model_of(STAGE, chain, parameters, found)
     if not found.converged:
@@ -90,7 +92,7 @@ def _without_outliers(
     """The fit of the postures that agree, each residual times W (d, d), and which (n,) they are."""
 
     def distance(theta: np.ndarray) -> np.ndarray:
-        return np.asarray(((linearised(hand, theta, postures, parameters.names).r @ W) ** 2).sum(axis=1))
+        return np.asarray(((linearised(hand, theta, postures, parameters.names).r @ W.T) ** 2).sum(axis=1))
 
     def near(distance: np.ndarray) -> np.ndarray:
         return distance <= max(_OUTLIER * float(np.median(distance)), _NEAR)
@@ -107,9 +109,15 @@ def _without_outliers(
 
 
 def frame_weights(description: Description) -> np.ndarray:
-    """(6,) weights of a pose's errors: in tolerances of a marker body [1/m, 1/rad]."""
-    tol = description.tolerances
-    return 1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3)
+    """W (6, 6) [1/m, 1/rad]: |W x| is the rms distance that a local twist x moves the hand's markers, in tolerances.
+
+    Where fewer than three markers are known, |W x| are its components in tolerances of a marker body.
+    """
+    tol, markers = description.tolerances, np.array([m.xyz for m in description.hand_body.markers])
+    if len(markers) < _TRIANGLE:
+        return np.diag(1.0 / np.repeat([tol.body_translation, tol.body_rotation], 3))
+    moves = np.concatenate([np.tile(np.eye(3), (len(markers), 1, 1)), -skew(markers)], axis=2).reshape(-1, 6)
+    return np.asarray(np.linalg.qr(moves, mode="r") / (tol.body_translation * np.sqrt(len(markers))))
 
 
 def fit_frames(model: HandModel, q: np.ndarray, T_measured: np.ndarray, description: Description) -> HandModel:
@@ -118,18 +126,18 @@ def fit_frames(model: HandModel, q: np.ndarray, T_measured: np.ndarray, descript
     Raises:
         NotEnoughData: Fewer than two postures, or they turn the hand about one direction only.
     """
-    weight = frame_weights(description)
+    W = frame_weights(description)
     if len(q) < 2:
         raise NotEnoughData(f"{len(q)} registration postures of the confirmation session show base and hand; make more")
     for _ in range(_STEPS):
         found = model.poses_and_derivatives(q, names=model.block(Frames).names)
         r = np.array([pin.log6(pin.SE3(E)).vector for E in inverse(T_measured) @ found.T])
-        J = (weight[:, None] * found.J).reshape(-1, 12)
+        J = (W @ found.J).reshape(-1, 12)
         if np.linalg.matrix_rank(J, rtol=1e-6) < 12:
             raise NotEnoughData(
                 f"the {len(q)} registration postures of the confirmation session turn the hand about one direction only"
             )
-        step = np.linalg.lstsq(J, -(weight * r).ravel(), rcond=None)[0]
+        step = np.linalg.lstsq(J, -(r @ W.T).ravel(), rcond=None)[0]
         frames = model.block(Frames)
         model = model.with_theta(frames.values + step, frames.names)
         if np.abs(step).max() < _STILL:
