@@ -61,7 +61,8 @@ def calibrate(
         progress: Called with stage and share done.
         options: What is chosen; None: the defaults.
         plan_next: Whether to search for the experiments that would reduce the uncertainty most.
-        cross_validate: Whether to report the hand's error at calibration postures left out in turn.
+        cross_validate: Whether to report the hand's error at calibration postures left out in turn, and to deliver the
+            row in which it is smallest.
 
     Raises:
         NoSuchElement: A stage of that name does not exist.
@@ -102,8 +103,7 @@ def calibrate(
     estimate = _concluded(context)
     if cross_validate and estimate.calibrated and context.data.postures is not None:
         tell("cross-validation", 0.97)
-        found = cross_validated(lab.chain, lab.description, context.data.postures, estimate.models, _refitted(estimate))
-        estimate = replace(estimate, verdicts=(*estimate.verdicts, *found))
+        estimate = _cross_validated(estimate, context.data)
     tell("done", 1.0)
     return estimate
 
@@ -180,6 +180,14 @@ def _concluded(context: Context) -> Estimate:
     main = next((name for name in rows if name in names), names[-1] if names else "")
     usable = bool(names) and not context.data.rejected
     return replace(estimate, main=main, status="calibrated" if usable else "not_calibrated")
+
+
+def _cross_validated(estimate: Estimate, data: StageInput) -> Estimate:
+    """With the errors at postures left out; its main row the best by those, where it can be fitted to postures."""
+    row, lab = _refitted(estimate), data.lab
+    found = cross_validated(lab.chain, lab.description, data.static, estimate.models, row)
+    main = estimate.main if found.best in ("", row) else found.best
+    return replace(estimate, verdicts=(*estimate.verdicts, *found.verdicts), main=main)
 
 
 def _bundled(estimate: Estimate) -> bool:

@@ -36,7 +36,7 @@ from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.robot.parameter_block import joint_lengths
-from calibration.stages.geometry.guards import APART, distinct, fewest
+from calibration.stages.geometry.guards import APART, distinct, recommended
 from calibration.stages.geometry.hand_residual import NoiseModel, hand_problem
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
@@ -134,8 +134,8 @@ def _known(
 
 def _short(chain: Chain, postures: Postures) -> int:
     """How many distinct postures a geometry still lacks."""
-    enough = fewest(chain, postures.covariance.shape[1])
-    return enough - distinct(postures.q[:, chain.columns], APART * joint_lengths(chain), enough)
+    enough = recommended(chain, postures.covariance.shape[1])
+    return enough - distinct(postures.q[:, chain.columns], APART * joint_lengths(chain))
 
 
 def _as_measured(description: Description, postures: Postures) -> Description:

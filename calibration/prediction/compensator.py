@@ -20,7 +20,7 @@ import numpy as np
 from calibration.errors import InputError, NotCalibrated, NotEnoughData, ShapeError
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.files import load_estimate
-from calibration.estimate.rows import row_of
+from calibration.estimate.rows import LADDER, row_of
 from calibration.inference.parameters import Model
 from calibration.numerics.lie import from_vector
 from calibration.prediction.base_pose import LoadedBase, loaded_base
@@ -102,7 +102,8 @@ class Compensator:
         hand = hand_of(model, chain, np.zeros(12))
         play = model.reading_sigma if len(model.reading_sigma) else np.zeros(len(chain.joints))
         joints = None
-        if estimate.joint_models and laboratory is not None:
+        corrected = any(row.joints and row.geometry == estimate.main for row in LADDER)
+        if corrected and estimate.joint_models and laboratory is not None:
             inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
         found = cls(hand, *_covariance(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)

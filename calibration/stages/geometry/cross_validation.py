@@ -3,8 +3,10 @@
     e_i = |p_B_H(q_i, theta_without_fold(i)) - p_i|       [m]
     rmse = sqrt(mean e_i^2),   interval: the middle 95 % of its values over bootstrap samples of the postures
 
-Folds are random fifths of the postures. Marker bodies whose shape or place was taken from these very postures are not
-made again without them; tests/data's postures show what that leaves out. An interval over postures says nothing of
+Folds are random fifths of the distinct postures; repeated ones are left out together. The row of the smallest error is
+delivered: few postures leave a geometry to its priors, which may be worse than none. Marker bodies whose shape or place
+was taken from these very postures are not made again without them; tests/data's postures show what that leaves out.
+An interval over postures says nothing of
 another session.
 """
 
@@ -18,9 +20,11 @@ from calibration.mocap.postures import Postures
 from calibration.recording import Description
 from calibration.robot.chain import Chain
 from calibration.robot.nominal_frames import nominal_frames
+from calibration.robot.parameter_block import joint_lengths
 from calibration.stages.geometry.gear_deflection import calibrate_gears
-from calibration.stages.geometry.guards import fewest
+from calibration.stages.geometry.guards import APART, distinct, fewest, groups
 from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.geometry.registration import STAGE as BASELINE
 from calibration.stages.geometry.registration import register
 from calibration.stages.geometry.stage import STAGE, calibrate_geometry
 from calibration.verdict import Verdict
@@ -59,16 +63,30 @@ class LeftOut:
         return float(low), float(high)
 
 
+@dataclass(frozen=True)
+class CrossValidation:
+    """What postures left out say of the rows fitted to postures.
+
+    Attributes:
+        verdicts: The error of each row, and parameters far from nominal.
+        best: The row of the smallest error; empty where none is to be had.
+    """
+
+    verdicts: tuple[Verdict, ...] = ()
+    best: str = ""
+
+
 def left_out_errors(
     chain: Chain, description: Description, postures: Postures, names: tuple[str, ...]
 ) -> tuple[LeftOut, ...]:
     """Of `registration`, `model_2` and `full`, those of `names`; rows that could be fitted in no fold are absent."""
-    parts = np.array_split(np.random.default_rng(0).permutation(len(postures)), FOLDS)
-    found = []
+    of = groups(postures.q[:, chain.columns], APART * joint_lengths(chain))
+    parts = np.array_split(np.random.default_rng(0).permutation(of.max() + 1), FOLDS)
+    folds, found = [np.flatnonzero(np.isin(of, part)) for part in parts], []
     for name in names:
         whole = _errors(name, chain, description, postures, postures)
         error = np.full(len(postures), np.nan)
-        for part in parts:
+        for part in folds:
             kept = np.setdiff1d(np.arange(len(postures)), part)
             error[part] = _errors(name, chain, description, postures.rows(kept), postures.rows(part))
         if np.isfinite(error).any():
@@ -78,8 +96,8 @@ def left_out_errors(
 
 def cross_validated(
     chain: Chain, description: Description, postures: Postures, models: tuple[Model, ...], main: str
-) -> tuple[Verdict, ...]:
-    """The error of the main row beside the registration's, and parameters far from nominal, as findings.
+) -> CrossValidation:
+    """The main row beside those below it at postures left out.
 
     Args:
         chain: Nominal.
@@ -89,26 +107,39 @@ def cross_validated(
         main: The row that stands for the estimate.
     """
     row = main if main in _FITS else "model_2"
-    if row not in {m.name for m in models}:
-        return ()
-    needed = fewest(chain, postures.components)
-    if len(postures) * (FOLDS - 1) < needed * FOLDS:
-        what = f"{len(postures)} postures are too few to leave a fifth out: {needed} have to remain"
-        return (Verdict(STAGE, "warning", f"no cross-validated error: {what}; record more"),)
-    rows = {f.model: f for f in left_out_errors(chain, description, postures, ("registration", row))}
-    if row not in rows:
-        return (
-            Verdict(STAGE, "warning", f"no cross-validated error: no fold without a fifth could be fitted for {row}"),
-        )
-    best = rows[row]
-    low, high = best.interval
-    beside = f", registration {1e3 * rows['registration'].rmse:.2f} mm" if "registration" in rows else ""
-    n = int(np.isfinite(best.error).sum())
-    message = (
-        f"{row}: hand error at left-out postures {1e3 * best.rmse:.2f} mm rms (95 % interval {1e3 * low:.2f} to "
-        f"{1e3 * high:.2f}){beside}; residual {1e3 * best.residual:.2f} mm; {n} postures, {FOLDS} folds"
+    fitted = {m.name: m for m in models if m.name in _FITS}
+    if row not in fitted:
+        return CrossValidation()
+    names = [name for name in _FITS if name in fitted][: list(_FITS).index(row) + 1]
+    n = distinct(postures.q[:, chain.columns], APART * joint_lengths(chain))
+    enough = n * (FOLDS - 1) >= fewest(postures.components) * FOLDS
+    found = left_out_errors(chain, description, postures, tuple(names)) if enough else ()
+    best = min(found, key=lambda f: f.rmse, default=None)
+    if best is None or row not in {f.model for f in found}:
+        message = f"no cross-validated error of {row}: {n} distinct postures are too few to leave a fifth out"
+        return CrossValidation((_not_better(message, BASELINE),), BASELINE)
+    message = _errors_in_words(row, found)
+    if best.model != row:
+        return CrossValidation((_not_better(message, best.model),), best.model)
+    return CrossValidation((Verdict(STAGE, "ok", message), *_worth_looking_at(fitted[row])), row)
+
+
+def _errors_in_words(row: str, found: tuple[LeftOut, ...]) -> str:
+    mine = next(f for f in found if f.model == row)
+    low, high = mine.interval
+    beside = "".join(
+        f", {f.model} {1e3 * f.rmse:.2f} mm (residual {1e3 * f.residual:.2f})" for f in found if f is not mine
     )
-    return (Verdict(STAGE, "ok", message), *_worth_looking_at(next(m for m in models if m.name == row)))
+    return (
+        f"{row}: hand error at left-out postures {1e3 * mine.rmse:.2f} mm rms (95 % interval {1e3 * low:.2f} to "
+        f"{1e3 * high:.2f}, residual {1e3 * mine.residual:.2f}){beside}; {np.isfinite(mine.error).sum()} postures, "
+        f"{FOLDS} folds"
+    )
+
+
+def _not_better(message: str, delivered: str) -> Verdict:
+    action = f"{delivered} is delivered; record more postures, spread over all joints"
+    return Verdict(STAGE, "warning", f"{message}: not better than {delivered} at postures left out, so {action}")
 
 
 def _errors(name: str, chain: Chain, description: Description, fitted: Postures, predicted: Postures) -> np.ndarray:
@@ -145,4 +176,4 @@ def _rms(error: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(error**2)))
 
 
-_FITS = {"registration": register, "model_2": calibrate_geometry, "full": calibrate_gears}
+_FITS = {BASELINE: register, "model_2": calibrate_geometry, "full": calibrate_gears}

@@ -83,7 +83,7 @@ def fit_gears(
     found = fit_robustly(hand, parameters, postures, errors)
     some = spread(len(found.fit.at.r), postures.components, _SPREAD)
     known = identifiability(found.fit.rows_white(some), parameters)
-    rejected = tuple(unusable_fit(hand, parameters, found, known, len(postures)))
+    rejected = tuple(unusable_fit(hand, parameters, found, known, postures))
     if not rejected and _evidence_for_backlash(found, hand, more, postures) > -_STRONG:
         again = fit_robustly(hand, more, postures, errors)
         if again.fit.converged:

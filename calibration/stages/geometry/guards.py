@@ -1,6 +1,5 @@
 """Why a geometric calibration from arrays must not be used; each finding once, with what was found and what to do."""
 
-import sys
 from collections.abc import Iterator
 
 import numpy as np
@@ -29,30 +28,48 @@ _HAND = (("position [m]", 1e-2), ("rotation [rad]", 5e-2))  # largest plausible 
 CONDITION = {6: 2e4, 3: 1e6}  # scaled, of poses and of points; 200 to 900 for poses all over the workspace [-]
 _OFFSET = 0.5  # largest plausible zero of a reading [rad, a tenth of it in m]
 _TOLERANCES = 10.0  # largest plausible deviation from nominal, and play, in datasheet tolerances [-]
+_LEVER = 0.1  # [m] from its axis at which a joint's random error shows in full in a point of the hand
 _CHI2 = 3.0  # largest plausible squared whitened residual per degree of freedom [-]
 
 
-def distinct(q: np.ndarray, apart: np.ndarray, enough: int = sys.maxsize) -> int:
-    """Number of postures q (n, k) that differ from all earlier counted ones by `apart` (k,), counted up to `enough`."""
-    kept: list[np.ndarray] = []
-    for row in q:
-        if len(kept) == enough:
-            break
-        if all((np.abs(row - other) > apart).any() for other in kept):
-            kept.append(row)
-    return len(kept)
+def groups(q: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Number (n,) of the distinct posture each of q (n, k) repeats: the first within `apart` (k,) in every joint."""
+    first: list[np.ndarray] = []
+    found = np.empty(len(q), dtype=int)
+    for i, row in enumerate(q):
+        near = (k for k, other in enumerate(first) if not (np.abs(row - other) > apart).any())
+        found[i] = next(near, len(first))
+        if found[i] == len(first):
+            first.append(row)
+    return found
 
 
-def fewest(chain: Chain, components: int) -> int:
-    """Distinct postures a geometry needs, twice as many equations as it has combinations."""
+def distinct(q: np.ndarray, apart: np.ndarray) -> int:
+    """Number of postures q (n, k) that differ from all earlier counted ones by `apart` (k,)."""
+    return len(set(groups(q, apart)))
+
+
+def recommended(chain: Chain, components: int) -> int:
+    """Distinct postures with twice as many equations as a geometry has combinations; with fewer, priors decide most."""
     return int(np.ceil(2 * (6 + 4 * len(chain.joints)) / components))
+
+
+def fewest(components: int) -> int:
+    """Distinct postures with twice as many equations as the two frames have unknowns."""
+    return 2 * (6 + components) // components
+
+
+def few(chain: Chain, postures: Postures) -> bool:
+    """Whether priors decide most of a geometry: what the postures do not excite stays near nominal."""
+    needed = recommended(chain, postures.components)
+    return distinct(postures.q[:, chain.columns], APART * joint_lengths(chain)) < needed
 
 
 def unusable_data(chain: Chain, q: np.ndarray, start: Start, components: int) -> Iterator[str]:
     """What is wrong with readings q (n, n_measured) and a start made from them, `components` measured a posture."""
     yield from implausible_readings(chain, q)
-    needed = fewest(chain, components)
-    n = distinct(q[:, chain.columns], APART * joint_lengths(chain), needed)
+    needed = fewest(components)
+    n = distinct(q[:, chain.columns], APART * joint_lengths(chain))
     if n < needed:
         yield f"{n} distinct postures among {len(q)}; at least {needed} are needed, spread over all joints"
         return
@@ -65,17 +82,14 @@ def unusable_data(chain: Chain, q: np.ndarray, start: Start, components: int) ->
 
 
 def unusable_fit(
-    hand: HandModel, parameters: ParameterSet, found: RobustFit, known: Identifiability, n: int
+    hand: HandModel, parameters: ParameterSet, found: RobustFit, known: Identifiability, postures: Postures
 ) -> Iterator[str]:
     """Why the values cannot be true."""
-    fit = found.fit
+    fit, n = found.fit, len(postures)
     if not fit.converged:
         yield "the fit did not converge; check joint order, units, tool frame"
-    if not known.clear or known.condition > _CONDITION_OF_COMPLIANCES:
-        yield (
-            f"the postures do not excite the model (rank {known.rank}, gap {known.gap:.0f}, condition "
-            f"{known.condition:.1e}); spread them over all joints' ranges"
-        )
+    if not few(hand.nominal, postures):
+        yield from too_little(known, _CONDITION_OF_COMPLIANCES)
     yield from _implausible_values(hand, parameters, fit)
     if fit.widths.prior.max(initial=0.0) > _FACTOR**2:
         times = np.sqrt(fit.widths.prior.max())
@@ -92,8 +106,9 @@ def _implausible_values(hand: HandModel, parameters: ParameterSet, fit: Fit) -> 
     for name, offset, length in zip(zeros, fit.theta[parameters.indices(zeros)], lengths, strict=True):
         if abs(offset) > _OFFSET * length:
             yield f"{name} = {offset:.3g} exceeds the plausible {_OFFSET * length:.2g}; readings of another joint?"
-    for joint, s, length in zip(joints, fit.noise_sigma(reading_names(hand.nominal)), lengths, strict=True):
-        if s > _READING * length:
+    reading = fit.noise_sigma(reading_names(hand.nominal))
+    for joint, s, length, seen in zip(joints, reading, lengths, _seen(fit, len(joints)), strict=True):
+        if s * seen > _READING * length:
             yield f"readings of {joint} scatter by {s:.2g}; units, order of the joints, tool frame?"
     for (what, limit), s in zip(_HAND, fit.noise_sigma(HAND_NAMES), strict=False):
         if s > limit:
@@ -123,10 +138,19 @@ def implausible(parameters: ParameterSet, found: Fit, play: np.ndarray, hand: Ha
     for i in np.flatnonzero(off > limit):
         name, unit = parameters.names[i], parameters.units[i]
         yield f"{name} = {found.theta[i]:.3g} {unit} exceeds {limit[i]:.2g}, the plausible limit"
-    reading = found.noise_sigma(reading_names(hand.nominal))
-    for name, s, limit_s in zip(hand.nominal.joints, reading, _TOLERANCES * play, strict=True):
-        if s > limit_s:
+    reading, joints = found.noise_sigma(reading_names(hand.nominal)), hand.nominal.joints
+    for name, s, limit_s, seen in zip(joints, reading, _TOLERANCES * play, _seen(found, len(joints)), strict=True):
+        if s * seen > limit_s:
             yield f"readings of {name} scatter by {s:.2g}, datasheet play is {limit_s / _TOLERANCES:.2g}; units, order?"
-    chi2 = float((found.r_white**2).sum()) / max(1, found.r_white.size - 36)
+    fitted = float(np.trace(found.covariance @ found.J_white.T @ found.J_white))  # as many residuals theta takes
+    chi2 = float((found.r_white**2).sum()) / max(1.0, found.r_white.size - fitted)
     if chi2 > _CHI2:
         yield f"residuals are {np.sqrt(chi2):.1f} times what noise and play explain"
+
+
+def _seen(found: Fit, k: int) -> np.ndarray:
+    """Share (k,) of a joint's random error that a point of the hand shows: one on its axis does not move with it."""
+    if found.at.r.shape[1] > 3:
+        return np.ones(k)
+    lever = np.sqrt((found.at.B[:, :, :k] ** 2).sum(axis=1).mean(axis=0))
+    return np.asarray(np.minimum(1.0, lever / _LEVER))

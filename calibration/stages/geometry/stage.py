@@ -26,7 +26,9 @@ from calibration.stages.geometry.guards import (
     APART,
     CONDITION,
     MANY_ODD,
+    few,
     implausible,
+    recommended,
     spans,
     too_little,
     unusable_data,
@@ -50,11 +52,12 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     oriented = postures.components == 6
     frames = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
     refused = [*unusable_data(chain, postures.q, frames, postures.components)]
-    refused = refused or [
-        *too_little(known, CONDITION[postures.components]),
-        *implausible(parameters, found, start, hand),
-    ]
+    unclear, scarce = list(too_little(known, CONDITION[postures.components])), few(chain, postures)
+    refused = refused or [*([] if scarce else unclear), *implausible(parameters, found, start, hand)]
     verdicts = [Verdict(STAGE, "refused", message) for message in refused]
+    if scarce and not refused:
+        message = f"fewer than the {recommended(chain, postures.components)} distinct postures recommended"
+        verdicts.append(Verdict(STAGE, "warning", f"{message}; what they do not show stays near nominal"))
     verdicts += left_out(postures, robust)
     still = [name for name, span in zip(chain.joints, spans(chain, postures), strict=True) if span < APART]
     if still:

@@ -120,5 +120,7 @@ def headline_model(results: Results, steps: Sequence[Step]) -> str:
     """The model the report is about: the one that is delivered, else the last estimated one of the ladder."""
     main = results.evaluation.main.model if results.evaluation.main else ""
     main = main or (results.estimate.main if results.estimate else "")
+    if main in {s.model for s in steps}:
+        return main
     known = [s.model for s in steps if s.model not in (NOMINAL, BASELINE, FLOOR)]
-    return main if main in known else (known[-1] if known else steps[-1].model)
+    return known[-1] if known else steps[-1].model

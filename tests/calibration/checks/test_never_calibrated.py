@@ -49,7 +49,7 @@ SPOILT = {
         lambda m: replace(m, q_motor=np.hstack([m.q_motor[:, :1], np.degrees(m.q_motor[:, 1:])])),
         "degrees",
     ),
-    "5 postures": (lambda m: rows(m, np.arange(5)), "5 distinct postures"),
+    "3 postures": (lambda m: rows(m, np.arange(3)), "3 distinct postures"),
     "3 postures 12 times": (thrice, "3 distinct postures"),
     "broken orientations": (turned, "scatter|contradict|explain|belief"),
     "mirrored frame": (lambda m: replace(m, marker_position=m.marker_position * [1.0, -1.0, 1.0]), "mirror"),

@@ -115,7 +115,7 @@ def test_wrong_units_mirrors_orders_and_frames_are_refused(good, m):
 @pytest.mark.parametrize("m", [4, 1])
 def test_too_little_is_refused(good, m):
     q, p = good[0], good[1][:, :m]
-    assert "5 distinct postures" in reasons(q[:5], p[:5])
+    assert "3 distinct postures" in reasons(q[:3], p[:3])
     shaken = np.random.default_rng(4).normal(size=(36, 8 + 3 * m)) * 1e-4
     again = np.repeat(p[:3], 12, axis=0) + shaken[:, 8:].reshape(36, m, 3)
     assert "3 distinct postures among 36" in reasons(np.repeat(q[:3], 12, axis=0) + shaken[:, :8], again)

@@ -193,9 +193,9 @@ def test_thirty_good_postures_are_not_refused(chain):
     assert refusals(chain, postures) == ""
 
 
-def test_five_postures_are_refused(chain):
-    postures = with_play(rigid_robot.defects(1), rigid_robot.near_postures(np.random.default_rng(1), 5))
-    assert "5 distinct postures" in refusals(chain, postures)
+def test_three_postures_are_refused(chain):
+    postures = with_play(rigid_robot.defects(1), rigid_robot.near_postures(np.random.default_rng(1), 3))
+    assert "3 distinct postures" in refusals(chain, postures)
 
 
 def test_three_postures_twelve_times_are_refused(chain):

@@ -1,0 +1,90 @@
+"""Few postures: no fixed least number, wider intervals, and never a geometry that postures left out speak against."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration.robot.chain import chain_of
+from calibration.stages.geometry.cross_validation import cross_validated, left_out_errors
+from calibration.stages.geometry.gear_deflection import calibrate_gears
+from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.geometry.registration import register
+from calibration.stages.geometry.stage import calibrate_geometry
+from tests.doubles import rigid_robot
+
+LAB = rigid_robot.described()
+CHAIN = chain_of(mjcf.urdf(), LAB)
+FITS = {"registration": register, "model_2": calibrate_geometry, "full": calibrate_gears}
+GAPS = np.array([0.0, 1.0, 1.0, 1.5, 1.5, 3.0, 12.0, 10.0]) * 1e-3
+
+
+def robot(seed, n, size=1.0, seen=6):
+    """n postures of a robot and 100 others; `size`: of its errors, over a TIAGo's; seen: components of the hand."""
+    rng = np.random.default_rng([seed, n])
+    truth = replace(rigid_robot.defects(seed, size), offset=size * rng.normal(size=8) * np.r_[3e-3, np.full(7, 3e-2)])
+    q = rigid_robot.near_postures(rng, n + 100)
+    found = rigid_robot.postures(truth, q + size * rng.uniform(-1.0, 1.0, q.shape) * GAPS, sigma=2e-4, seed=seed)
+    found = replace(found, q=q + truth.offset, covariance=found.covariance[:, :seen, :seen])
+    return found.rows(np.arange(n)), found.rows(np.arange(n, n + 100))
+
+
+def models(postures):
+    return tuple(fit(CHAIN, LAB, postures)[0] for fit in FITS.values())
+
+
+def rms(model, postures):
+    T = hand_of(model, CHAIN, np.zeros(12)).poses(postures.q)
+    return float(np.sqrt(((T - postures.T_base_hand)[:, :3, 3] ** 2).sum(axis=1).mean()))
+
+
+def delivered(postures, fitted):
+    best = cross_validated(CHAIN, LAB, postures, fitted, "full")
+    return next(m for m in fitted if m.name == best.best), best.verdicts
+
+
+@pytest.mark.parametrize("n, seen", [(8, 6), (12, 3), (20, 3)])
+def test_a_few_postures_calibrate_and_say_that_they_are_few(n, seen):
+    some, others = robot(1, n, seen=seen)
+    model, said = calibrate_geometry(CHAIN, LAB, some)
+    assert [v.verdict for v in said if "recommended" in v.message] == ["warning"]
+    assert not [v for v in said if v.verdict == "refused"]
+    fitted = models(some)
+    best, _ = delivered(some, fitted)
+    assert best.name != "registration" and rms(best, others) < 0.5 * rms(fitted[0], others)
+
+
+def test_fewer_postures_have_wider_intervals():
+    sigma = [
+        np.median([p.sigma for p in calibrate_geometry(CHAIN, LAB, robot(1, n)[0])[0].parameters]) for n in (6, 12, 40)
+    ]
+    assert sigma[0] > sigma[1] > sigma[2]
+
+
+def test_where_postures_left_out_speak_against_the_geometry_registration_is_delivered():
+    some, others = robot(1, 8, size=0.01)
+    fitted = models(some)
+    best, said = delivered(some, fitted)
+    assert best.name == "registration" and said[0].verdict == "warning" and "is delivered" in said[0].message
+    assert rms(best, others) < rms(fitted[1], others)
+
+
+def test_repeated_postures_are_left_out_together():
+    some, _ = robot(1, 10)
+    (once,) = left_out_errors(CHAIN, LAB, some, ("model_2",))
+    (twice,) = left_out_errors(CHAIN, LAB, some.joined(some), ("model_2",))
+    assert twice.rmse > 0.7 * once.rmse
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [12, 20, 40])
+@pytest.mark.parametrize("size", [1.0, 0.1, 0.02])
+def test_what_is_delivered_is_never_worse_than_registration_in_the_median_of_fifty_robots(n, size):
+    ratio = []
+    for seed in range(50):
+        some, others = robot(seed, n, size)
+        fitted = models(some)
+        ratio.append(rms(delivered(some, fitted)[0], others) / rms(fitted[0], others))
+    print(f"{n} postures, errors x {size}: median {np.median(ratio):.3f}, 95 % {np.quantile(ratio, 0.95):.3f}")
+    assert np.median(ratio) <= 1.03
