@@ -95,12 +95,11 @@ def test_enough_postures_ask_for_no_more(chain):
     assert record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, False) == (None, ())
 
 
-@pytest.mark.parametrize("n, widest", [(2, 2.5), (3, 2.5)])
-def test_a_refused_fit_ends_with_postures_too(chain, n, widest):
+@pytest.mark.parametrize("n, widest", [(4, 2.5), (8, 1.5)])
+def test_a_fit_that_must_not_be_used_ends_with_postures_too(chain, n, widest):
     """Their sigmas are those of the recorded errors; at the datasheet's play, which is not there, up to nine times."""
     postures = recorded(rigid_robot.near_postures(np.random.default_rng(0), n), 1)
-    model, said = calibrate_geometry(chain, DESCRIBED, postures)
-    assert any(v.verdict == "refused" for v in said)
+    model, _ = calibrate_geometry(chain, DESCRIBED, postures)
     remedy, told = record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, True)
     assert f"{13 - n} distinct postures are missing" in told[0].message
     assert len(remedy.postures) == max(N, 13 - n) and remedy.sigma[0].after < 0.6 * remedy.sigma[0].before
