@@ -23,6 +23,7 @@ from scenarios.commands import process as command_process
 from scenarios.commands import reality as command_reality
 from scenarios.commands import show as command_show
 from scenarios.commands import study as command_study
+from scenarios.commands import view as command_view
 from scenarios.commands.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
 from scenarios.files.errors import ScenarioError
 
@@ -201,6 +202,7 @@ process = app.command(epilog=_example("process lab.yaml --out runs/lab"))(comman
 base = app.command(epilog=_example("base log.csv --map log.yaml --fit 28 --out runs/base"))(command_process.base)
 look = app.command(epilog=_example("look runs/short/dataset --out runs/look"))(quicklook.look)
 picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"))(video.picture)
+view = app.command(epilog=_example("view runs/short --trial xyz --magnify 50"))(command_view.view)
 reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"))(command_reality.reality)
 show = app.command(epilog=_example("show humanoids2024 gap"))(command_show.show)
 check = app.command(epilog=_example("check runs/short --max model_2.mm=2.5"))(command_check.check)
