@@ -14,13 +14,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import calibration
+from calibration import robot as nominal_robot
 from calibration.mocap import poses_of, relabelled_trial
 from calibration.numerics.lie import compose, exp6, from_vector, inverse, log6
 from calibration.numerics.signals import interpolate_columns
 from calibration.numerics.wrench import centre_of_pressure
 from calibration.prediction import LADDER, NOMINAL
 from calibration.recording import Clock, Dataset, Trial, netcdf
-from calibration.robot import Chain, chain_of, nominal_frames
+from calibration.robot import Chain, chain_of
 from scenarios.files.errors import ScenarioError
 
 METRES_PER_NEWTON = 0.7e-3
@@ -70,7 +71,7 @@ def moments(run: Path, dataset: Dataset, trial_id: str | None, links: tuple[str,
     trial, predictions = _read(run, dataset, trial_id)
     shown = np.searchsorted(trial.t_mocap, np.arange(trial.t_mocap[0], trial.t_mocap[-1], 1.0 / _RATE))
     t, chain = trial.t_mocap[shown], chain_of(dataset.urdf, dataset.description)
-    T_base_B, T_tool_H = (from_vector(v) for v in np.split(nominal_frames(chain, dataset.description), 2))
+    T_base_B, T_tool_H = (from_vector(v) for v in np.split(nominal_robot.nominal_frames(chain, dataset.description), 2))
     base = _filled(poses_of(dataset.description.base_body, trial).T[shown]) @ inverse(T_base_B)
     hand = _filled(poses_of(dataset.description.hand_body, trial).T[shown])
     robot, plate = (_clock(estimate, name) for name in ("robot", "plate"))
