@@ -93,8 +93,8 @@ def evaluate(
         remarks += estimate.verdicts
     registering = registration_trials(dataset) if role == "validation" else ()
     confirmed: list[TrialErrors] = []
-    if registering:
-        later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
+    later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
+    if registering and later:
         again = reregistered(predict, dataset)
         confirmed = [error for one in _each(again, dataset, later, report) for error in one.errors]
     errors = [error for one in scored for error in one.errors]

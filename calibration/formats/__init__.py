@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from calibration.formats.exporter import export_trials
     from calibration.formats.importer import import_files, refuse_foreign
+    from calibration.formats.later import of_later_session
     from calibration.formats.mapping.mapping import Mapping, MappingFile
     from calibration.formats.mapping.short_form import written_out
     from calibration.formats.readers import reader_of
@@ -22,6 +23,7 @@ __all__ = [
     "draft",
     "export_trials",
     "import_files",
+    "of_later_session",
     "reader_of",
     "refuse_foreign",
     "session_of",
@@ -31,6 +33,7 @@ __all__ = [
 _MODULES = {
     "exporter": ("export_trials",),
     "importer": ("import_files", "refuse_foreign"),
+    "later": ("of_later_session",),
     "mapping.mapping": ("Mapping", "MappingFile"),
     "mapping.short_form": ("written_out",),
     "readers": ("reader_of",),

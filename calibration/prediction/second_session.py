@@ -29,12 +29,11 @@ from calibration.prediction.compensator import Compensator
 from calibration.prediction.predictor import Predictor
 from calibration.recording.dataset import Dataset
 from calibration.recording.schema import Description, TrialEntry
+from calibration.recording.set_apart import REGISTRATION
 from calibration.recording.trial import Trial
 from calibration.robot.blocks import Frames
 from calibration.robot.hand import HandModel
 from calibration.stages.geometry.registration import fit_frames, frame_weights
-
-REGISTRATION = "registration"  # motion of the postures a session is registered with
 
 
 def registration_trials(dataset: Dataset) -> tuple[TrialEntry, ...]:

@@ -6,7 +6,7 @@ The standard deviations are those of the means. What a dwell looked like within 
 and motion of the base are not identifiable from such a file.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,11 @@ class PostureMeans:
         check_shapes(self.id, vars(self), {name: dims for name, (dims, *_) in _LAYOUT.items()}, sizes)
         if len(self.marker_body) != len(self.marker):
             raise ShapeError(f"{self.id}: marker_body", (len(self.marker_body),), (len(self.marker),))
+
+    def rows(self, some: slice) -> "PostureMeans":
+        """Some of the postures."""
+        per_posture = {name: getattr(self, name)[some] for name in _LAYOUT}
+        return replace(self, **per_posture)
 
     def __len__(self) -> int:
         return len(self.q_motor)

@@ -19,6 +19,7 @@ from scenarios.commands import check as command_check
 from scenarios.commands import dataset as command_dataset
 from scenarios.commands import design as command_design
 from scenarios.commands import import_export, quicklook, video
+from scenarios.commands import predict as command_predict
 from scenarios.commands import process as command_process
 from scenarios.commands import reality as command_reality
 from scenarios.commands import show as command_show
@@ -200,6 +201,9 @@ design = app.command(epilog=_example("design short -n 30 --out postures.yaml"))(
 study = app.command(epilog=_example("study coverage short -n 20 --out runs/coverage"))(command_study.study)
 process = app.command(epilog=_example("process lab.yaml --out runs/lab"))(command_process.process)
 base = app.command(epilog=_example("base log.csv --map log.yaml --fit 28 --out runs/base"))(command_process.base)
+predict = app.command(epilog=_example("predict runs/lab/estimate day2/*.csv --map lab.yaml --out runs/day2"))(
+    command_predict.predict
+)
 look = app.command(epilog=_example("look runs/short/dataset --out runs/look"))(quicklook.look)
 picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"))(video.picture)
 view = app.command(epilog=_example("view runs/short --trial xyz --magnify 50"))(command_view.view)

@@ -11,6 +11,7 @@ from scenarios.steps import drawing_file
 
 if TYPE_CHECKING:
     from calibration.formats import Mapping
+    from calibration.recording import Description
 
 PACKAGED = "tiago"
 """What a mapping calls the nominal robot that comes with this program."""
@@ -20,7 +21,12 @@ MAPPING = "mapping.yaml"
 
 
 def import_files(
-    kind: str | None, files: Sequence[Path], mapping: Path, out: Path, add_to: Path | None = None
+    kind: str | None,
+    files: Sequence[Path],
+    mapping: Path,
+    out: Path,
+    add_to: Path | None = None,
+    later: "Description | None" = None,
 ) -> tuple[str, ...]:
     """Write the dataset folder `out` from laboratory files; return what was recognised in them.
 
@@ -30,12 +36,13 @@ def import_files(
         mapping: The mapping file.
         out: The dataset folder; an earlier dataset there is replaced.
         add_to: A dataset imported before whose trials gain these files' channels.
+        later: Laboratory of an estimate whose later session this is: its marker bodies, trials for validation.
 
     Raises:
         ScenarioError: The mapping is malformed, or `out` must not be overwritten.
         InputError: A file is not what the mapping says; every finding of every file.
     """
-    from calibration.formats import MappingFile, reader_of, refuse_foreign
+    from calibration.formats import MappingFile, of_later_session, reader_of, refuse_foreign
     from calibration.formats import import_files as write
     from calibration.recording import load
 
@@ -44,6 +51,7 @@ def import_files(
     files = files or files_of(described.files, mapping)
     refuse_foreign(kind, files)
     source = MappingFile(mapping, described, _urdf(described, mapping))
+    source = source if later is None else of_later_session(source, files, later)
     before = None if add_to is None else load(add_to)
     with output_folder.replacing(out, output_folder.DATASET) as new:
         return write(files, reader_of(kind, source), source, new, before)

@@ -1,0 +1,107 @@
+"""An estimate in a session recorded later: clocks of that day, marker bodies registered again where that is asked.
+
+    frames = argmin sum_i |w log6((Q_i^-1 T_i)^-1 T_B_H(q_i))|^2
+
+T_i (4, 4) the hand's marker body in the base's at a posture, q_i the positions the row's geometry is evaluated at, Q_i
+the column's bending. Placements, zeros, gears and base stay as they were calibrated: what was homed or changed since is
+part of the error. Covariances of the frames: `second_session`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from calibration.errors import NotEnoughData
+from calibration.estimate.estimate import Estimate
+from calibration.estimate.rows import row_of
+from calibration.inference.parameters import Model
+from calibration.mocap.cluster_pose import poses_of, poses_of_means
+from calibration.mocap.labels import relabelled_trial, relabelled_trials
+from calibration.mocap.postures import dwell_windows
+from calibration.numerics.lie import inverse, mean
+from calibration.prediction.compensator import Compensator
+from calibration.prediction.predict import predictor
+from calibration.prediction.predictor import Predictor
+from calibration.prediction.second_session import registration_trials, reregistered_compensator
+from calibration.recording.dataset import Dataset
+from calibration.recording.schema import TrialEntry
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.clocks.stage import synchronise
+
+_ROLES = ("validation", "confirmation")
+
+
+def on_another_day(estimate: Estimate, dataset: Dataset) -> Estimate:
+    """The estimate for a session recorded later, its marker bodies registered where it has postures for that.
+
+    Clocks are found from base and hand markers; where those do not show them, none is known: poses can be predicted on
+    the robot's clock, and not compared.
+
+    Raises:
+        NotEnoughData: The postures turn the hand about one direction only, or one marker shows no pose.
+    """
+    trials = tuple(trial for role in _ROLES for _, trial in relabelled_trials(dataset, role))
+    try:
+        clocks = synchronise(Laboratory(dataset.urdf, dataset.description), trials)[0] if trials else ()
+    except NotEnoughData:
+        clocks = ()
+    today = replace(estimate, clocks=clocks, laboratory=dataset.description.alone)
+    postures = registration_trials(dataset)
+    if not postures:
+        return today
+    if dataset.description.hand_body.is_point or dataset.description.base_body.is_point:
+        raise NotEnoughData("one or two markers on a body show no pose to register it with; put three on it")
+    predict, models = predictor(today, dataset), []
+    for model in today.models:
+        fits = model.name in predict.models and row_of(model.name).registered
+        models.append(_registered(today, model, predict, dataset, postures) if fits else model)
+    return replace(today, models=tuple(models))
+
+
+def _registered(
+    estimate: Estimate, model: Model, predict: Predictor, dataset: Dataset, entries: tuple[TrialEntry, ...]
+) -> Model:
+    """The model with both marker frames fitted to the postures of these trials."""
+    robot = Compensator.of(replace(estimate, main=model.name))
+    seen = [pair for entry in entries for pair in _postures(robot, model.name, predict, dataset, entry)]
+    if len(seen) < 2:
+        raise NotEnoughData(f"{len(seen)} registration postures show base and hand; set more apart")
+    q, T = (np.array(x) for x in zip(*seen, strict=True))
+    again = reregistered_compensator(robot, q, T, dataset.description)
+    values = dict(zip(again.hand.names, again.hand.theta, strict=True))
+    sigma = dict(zip(again.names, np.sqrt(np.diag(again.covariance)), strict=True))
+    names, covariance = [p.name for p in model.parameters], model.covariance.copy()
+    known = [name for name in again.names if name in names]
+    mine, theirs = [names.index(n) for n in known], [again.names.index(n) for n in known]
+    covariance[np.ix_(mine, mine)] = again.covariance[np.ix_(theirs, theirs)]
+    parameters = tuple(
+        replace(p, value=float(values[p.name]), sigma=float(sigma[p.name])) if p.name in known else p
+        for p in model.parameters
+    )
+    return replace(model, parameters=parameters, covariance=covariance, combinations=())
+
+
+def _postures(
+    robot: Compensator, name: str, predict: Predictor, dataset: Dataset, entry: TrialEntry
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Positions (n_joints,) and T_B_H (4, 4), the bending taken off, of each posture that shows both bodies."""
+    base, hand = dataset.description.base_body, dataset.description.hand_body
+    if dataset.has_means(entry):
+        means = dataset.read_means(entry)
+        q, T = means.q_motor, inverse(poses_of_means(base, means).T) @ poses_of_means(hand, means).T
+        groups = [np.array([k]) for k in range(len(means))]
+        if robot.arm is not None:
+            positions = robot.arm.at_rest(q)
+            q, T = positions.q, inverse(robot.arm.bends(robot.hand, positions)) @ T
+    else:
+        trial = relabelled_trial(dataset, entry)
+        q, T = predict.positions(name, "motor", trial), inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
+        groups = [np.flatnonzero((trial.t_mocap >= a) & (trial.t_mocap <= b)) for a, b in dwell_windows(trial)]
+        if robot.arm is not None and predict.bundled is not None and predict.robot is not None:
+            bent = predict.bundled.hand_in_base(trial, predict.robot)
+            T = robot.hand.poses(q) @ inverse(bent) @ T
+    known = np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
+    for rows in (g[known[g]] for g in groups):
+        if len(rows):
+            yield q[rows].mean(axis=0), mean(T[rows])
