@@ -1,6 +1,7 @@
 """Predictions: every row of the ladder, the base's pose, the compensator."""
 
-from calibration.estimate.rows import BASELINE, LADDER, NOMINAL, LadderRow
+from calibration.estimate.rows import BASELINE, LADDER, NOMINAL
+from calibration.prediction.another_day import on_another_day
 from calibration.prediction.compensator import Compensator
 from calibration.prediction.predict import predict
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction, read_predicted
@@ -13,10 +14,10 @@ __all__ = [
     "BaseMotion",
     "Compensator",
     "JointSamples",
-    "LadderRow",
     "PredictedTrial",
     "Prediction",
     "Session",
+    "on_another_day",
     "predict",
     "read_predicted",
 ]

@@ -9,6 +9,7 @@ part of the error. Covariances of the frames: `second_session`.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -24,23 +25,27 @@ from calibration.prediction.compensator import Compensator
 from calibration.prediction.predict import predictor
 from calibration.prediction.predictor import Predictor
 from calibration.prediction.second_session import registration_trials, reregistered_compensator
-from calibration.recording.dataset import Dataset
-from calibration.recording.schema import TrialEntry
+from calibration.recording.dataset import Dataset, load
+from calibration.recording.schema import Role, TrialEntry
+from calibration.recording.set_apart import set_apart
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.stage import synchronise
 
-_ROLES = ("validation", "confirmation")
+_ROLES: tuple[Role, ...] = ("validation", "confirmation")
 
 
-def on_another_day(estimate: Estimate, dataset: Dataset) -> Estimate:
-    """The estimate for a session recorded later, its marker bodies registered where it has postures for that.
+def on_another_day(estimate: Estimate, folder: Path, register: int = 0) -> Estimate:
+    """The estimate for the dataset folder of a session recorded later.
+
+    Its marker bodies are registered with the first `register` static postures, which become trials of their own there.
 
     Clocks are found from base and hand markers; where those do not show them, none is known: poses can be predicted on
     the robot's clock, and not compared.
 
     Raises:
-        NotEnoughData: The postures turn the hand about one direction only, or one marker shows no pose.
+        NotEnoughData: There are not as many and one more, the postures turn the hand about one direction only, or one marker shows no pose.
     """
+    dataset = set_apart(folder, register) if register else load(folder)
     trials = tuple(trial for role in _ROLES for _, trial in relabelled_trials(dataset, role))
     try:
         clocks = synchronise(Laboratory(dataset.urdf, dataset.description), trials)[0] if trials else ()

@@ -63,8 +63,7 @@ def predict(  # noqa: PLR0913  an option each
     """
     from calibration import load, load_estimate, save_estimate
     from calibration.errors import NotCalibrated
-    from calibration.prediction.another_day import on_another_day
-    from calibration.recording.set_apart import set_apart
+    from calibration.prediction import on_another_day
 
     known = load_estimate(estimate)
     if not known.calibrated:
@@ -75,9 +74,7 @@ def predict(  # noqa: PLR0913  an option each
         dataset = new / "dataset"
         progress("import", "", 0.0)
         notes = import_files(None, files, mapping, dataset, later=known.laboratory)
-        if register:
-            set_apart(dataset, register)
-        today = on_another_day(known, load(dataset))
+        today = on_another_day(known, dataset, register)
         save_estimate(today, new / "estimate")
         _write(new / PREDICTED, today, load(dataset))
         scored = _sees_hand(load(dataset))
@@ -96,7 +93,7 @@ def _write(path: Path, estimate: "Estimate", dataset: "Dataset") -> None:
             table.writerow(row)
 
 
-def _rows(estimate: "Estimate", dataset: "Dataset") -> Iterator[list[object]]:
+def _rows(estimate: "Estimate", dataset: "Dataset") -> Iterator[list[str]]:
     import numpy as np
     from scipy.spatial.transform import Rotation
 
