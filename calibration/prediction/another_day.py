@@ -43,7 +43,7 @@ def on_another_day(estimate: Estimate, folder: Path, register: int = 0) -> Estim
     the robot's clock, and not compared.
 
     Raises:
-        NotEnoughData: There are not as many and one more, the postures turn the hand about one direction only, or one marker
+        NotEnoughData: There are not as many and one more, they turn the hand about one direction only, or one marker
             shows no pose.
     """
     dataset = set_apart(folder, register) if register else load(folder)
