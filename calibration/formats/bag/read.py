@@ -13,6 +13,7 @@ import numpy as np
 
 from calibration.errors import InputError
 from calibration.formats.bag.messages import JOINT_STATE, PREFIX, STATISTICS_NAMES, SUFFIXES, typestore
+from calibration.formats.bag.poses import read_poses
 from calibration.formats.mapping.channels import Joints, Reader, Recorded
 from calibration.formats.mapping.layouts import BagLayout
 from calibration.numerics.signals import interpolate_columns
@@ -32,10 +33,15 @@ def read_bag(files: Sequence[Path], layout: BagLayout) -> Recorded:
         raise InputError(files[1], f"one bag a trial; {files[0]} has the same name")
     path = files[0]
     messages = _messages(path, layout.topics)
-    joints = _states(path, layout, messages) if layout.source == "joint_states" else _values(path, layout, messages)
-    if layout.wrist is not None:
+    joints = None
+    if layout.joints:
+        joints = _states(path, layout, messages) if layout.source == "joint_states" else _values(path, layout, messages)
+    if joints is not None and layout.wrist is not None:
         joints = replace(joints, wrist_wrench=_wrist(path, layout.wrist, layout, messages, joints.t))
-    return Recorded(str(path), joints=joints)
+    if not layout.poses:
+        return Recorded(str(path), joints=joints)
+    markers, notes = read_poses(path, layout.poses, messages)
+    return Recorded(str(path), markers, joints, together=("robot",) if joints is not None else (), notes=notes)
 
 
 def bag_reader(layout: BagLayout) -> Reader:

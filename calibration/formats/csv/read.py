@@ -16,7 +16,7 @@ from calibration.errors import InputError
 from calibration.formats.mapping.channels import Joints, Markers, Means, Plates, Reader, Recorded
 from calibration.formats.mapping.layouts import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels, PoseChannels
 from calibration.formats.mapping.plate_convention import checked_against_cop, to_action
-from calibration.formats.mapping.poses import AXES, marker_names, marker_sigma, rotations, shape_of, wrong_numbers
+from calibration.formats.mapping.poses import AXES, marker_names, marker_sigma, markers_at
 from calibration.recording.schema import Plate, Setup
 
 _UNITS = ANGLES | LENGTHS
@@ -143,13 +143,11 @@ def _std(table: CsvTable) -> np.ndarray:
 
 def _pose_markers(text: CsvText, name: str, channels: PoseChannels) -> np.ndarray:
     """Positions (n, 6, 3) [m] of the markers that stand for a pose."""
-    p = text.numbers(channels.position, LENGTHS[channels.position_unit], gaps=True)
-    factor = 1.0 if channels.order.startswith("quat") else ANGLES[channels.angle_unit]
-    numbers = text.numbers(channels.rotation, factor, gaps=True)
-    wrong = list(wrong_numbers(p, numbers, channels))
-    if wrong:
-        raise InputError(text.path, "; ".join(f"pose of {name}: {message}" for message in wrong))
-    return np.einsum("nij,mj->nmi", rotations(numbers, channels.order), shape_of(channels)) + p[:, None]
+    p, numbers = (text.numbers(columns, gaps=True) for columns in (channels.position, channels.rotation))
+    try:
+        return markers_at(p, numbers, channels)
+    except ValueError as error:
+        raise InputError(text.path, f"pose of {name}: {error}") from error
 
 
 def _positions(text: CsvText, table: CsvTable) -> np.ndarray:

@@ -80,26 +80,34 @@ class WristChannels(Declaration):
 Order = Literal["quat_xyzw", "quat_wxyz", "rotation_vector", "euler_xyz", "euler_zyx", "euler_XYZ", "euler_ZYX"]
 
 
-class PoseChannels(Declaration):
-    """Columns of the 6D pose of a rigid body.
+class PoseNumbers(Declaration):
+    """How the 6D pose of a rigid body is written.
 
     Attributes:
-        position: x, y, z of its origin.
-        rotation: Four numbers of a quaternion, three of a rotation vector or of Euler angles.
-        order: Which; Euler axes of the lab in small letters, of the body in capitals, the first rotation first.
+        order: Of its rotation; Euler axes of the lab in small letters, of the body in capitals, the first one first.
         position_unit: m or mm.
         angle_unit: rad or deg, of all but quaternions.
         sigma_position: Standard deviation per axis [m].
         sigma_rotation: Standard deviation per axis [rad].
     """
 
-    position: Columns
-    rotation: tuple[str, ...]
     order: Order
     position_unit: Literal["m", "mm"] = "m"
     angle_unit: Literal["rad", "deg"] = "rad"
     sigma_position: Positive
     sigma_rotation: Positive
+
+
+class PoseChannels(PoseNumbers):
+    """Columns of the 6D pose of a rigid body.
+
+    Attributes:
+        position: x, y, z of its origin.
+        rotation: Four numbers of a quaternion, three of a rotation vector or of Euler angles.
+    """
+
+    position: Columns
+    rotation: tuple[str, ...]
 
     @model_validator(mode="after")
     def _has_as_many_columns(self) -> "PoseChannels":
@@ -107,6 +115,22 @@ class PoseChannels(Declaration):
         if len(self.rotation) != wanted:
             raise ValueError(f"`rotation` names {len(self.rotation)} columns, {self.order} has {wanted}")
         return self
+
+
+class PoseTopic(PoseNumbers):
+    """Topic of the 6D pose of a rigid body: PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped or TF.
+
+    Attributes:
+        topic: Its name.
+        frame: The body's frame (child_frame_id) on a topic of several, such as /tf.
+        parent: The frame the pose is in (frame_id); all bodies' is one.
+        order: ROS has quaternions x, y, z, w.
+    """
+
+    topic: str
+    frame: str | None = None
+    parent: str | None = None
+    order: Order = "quat_xyzw"
 
 
 class CsvTime(Declaration):
@@ -205,10 +229,11 @@ class BagLayout(Declaration):
         values: Introspection topic of the values.
         wrist: WrenchStamped topic of the wrist's force-torque sensor.
         wrist_convention: Whose wrench that is: `action` of the hand on the sensor, or the sensor's `reaction`.
+        poses: Topic of the pose of each rigid body, stamped on the clock of the readings.
     """
 
-    source: Literal["joint_states", "introspection"]
-    joints: dict[str, str]
+    source: Literal["joint_states", "introspection"] = "joint_states"
+    joints: dict[str, str] = {}
     motor: str = "/joint_states"
     link: str | None = None
     command: str | None = None
@@ -216,6 +241,13 @@ class BagLayout(Declaration):
     values: str = "/introspection_data/values"
     wrist: str | None = None
     wrist_convention: Literal["action", "reaction"] | None = None
+    poses: dict[str, PoseTopic] = {}
+
+    @model_validator(mode="after")
+    def _says_something(self) -> "BagLayout":
+        if not self.joints and not self.poses:
+            raise ValueError("name `joints`, `poses`, or both")
+        return self
 
     @model_validator(mode="after")
     def _wrist_says_whose(self) -> "BagLayout":
@@ -228,4 +260,5 @@ class BagLayout(Declaration):
         """The topics that are read."""
         readings = (self.motor, self.link, self.command)
         read = (self.names, self.values) if self.source == "introspection" else readings
-        return tuple(topic for topic in (*read, self.wrist) if topic is not None)
+        poses = (pose.topic for pose in self.poses.values())
+        return tuple(topic for topic in (*(read if self.joints else ()), self.wrist, *poses) if topic is not None)

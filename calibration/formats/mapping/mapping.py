@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from calibration.errors import InputError
-from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable, PoseChannels
+from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable, PoseChannels, PoseTopic
 from calibration.formats.mapping.poses import marker_names as pose_markers
 from calibration.formats.mapping.poses import shape_of
 from calibration.recording.schema import (
@@ -46,7 +46,8 @@ class MappedBody(Declaration):
         link: The link it is fixed on.
         markers: Drawn markers, with their coordinates in the link's frame [m].
         placement: Of drawn markers, where their coordinates are not in the link's frame; see `schema.Body`.
-        pose: Columns of its 6D pose, those of the table (`pose: true` in the file): six markers stand for it.
+        pose: Columns or topic of its 6D pose, those of the table or bag (`pose: true` in the file): six markers stand
+            for it.
         undrawn: Names of markers whose coordinates nobody measured: their shape is the mean over calibration trials.
         standing: Places an undrawn body on the base by where the base stands at rest.
         fitted: Places an undrawn body, or the frame of the marker positions, by the nominal robot's fit to the
@@ -57,7 +58,7 @@ class MappedBody(Declaration):
     link: str
     markers: tuple[Marker, ...] = ()
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    pose: PoseChannels | None = None
+    pose: PoseChannels | PoseTopic | None = None
     undrawn: tuple[str, ...] = ()
     standing: Standing | None = None
     fitted: bool = False

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calibration.errors import NotEnoughData
-from calibration.formats.mapping.layouts import PoseChannels
+from calibration.formats.mapping.layouts import ANGLES, LENGTHS, PoseNumbers
 from calibration.numerics.alignment import hand_eye
 from calibration.numerics.lie import compose, inverse, rotation_vector
 
@@ -35,12 +35,12 @@ def marker_names(body: str) -> tuple[str, ...]:
     return tuple(f"{body}.{axis}" for axis in AXES)
 
 
-def shape_of(channels: PoseChannels) -> np.ndarray:
+def shape_of(channels: PoseNumbers) -> np.ndarray:
     """The six markers (6, 3) [m, frame of the pose]."""
     return _DIRECTIONS * (np.sqrt(6.0) * channels.sigma_position / (2.0 * channels.sigma_rotation))
 
 
-def marker_sigma(channels: PoseChannels) -> float:
+def marker_sigma(channels: PoseNumbers) -> float:
     """Noise s of each [m]."""
     return float(np.sqrt(6.0) * channels.sigma_position)
 
@@ -71,7 +71,7 @@ def _numbers(R: np.ndarray, order: str) -> np.ndarray:
     return np.asarray(rotation.as_euler(order.removeprefix("euler_")))
 
 
-def wrong_numbers(position: np.ndarray, numbers: np.ndarray, channels: PoseChannels) -> Iterator[str]:
+def wrong_numbers(position: np.ndarray, numbers: np.ndarray, channels: PoseNumbers) -> Iterator[str]:
     """What cannot be true of positions (n, 3) [m] and rotation numbers (n, 3 or 4), each finding once."""
     seen = np.abs(position[np.isfinite(position)])
     if len(seen) and float(np.median(seen)) > _FAR:
@@ -85,6 +85,19 @@ def wrong_numbers(position: np.ndarray, numbers: np.ndarray, channels: PoseChann
             yield f"quaternions are {off:.2g} off length 1: other columns, or Euler angles; see order"
     elif float(np.abs(good).max()) > _TURNS:
         yield f"angles reach {float(np.abs(good).max()):.0f} rad: in degrees? map angle_unit: deg"
+
+
+def markers_at(position: np.ndarray, numbers: np.ndarray, channels: PoseNumbers) -> np.ndarray:
+    """Positions (n, 6, 3) [m] of the markers that stand for a pose, from its numbers as they are in the file.
+
+    Raises:
+        ValueError: They cannot be positions (n, 3) and rotations (n, 3 or 4) in these units; every finding.
+    """
+    p = LENGTHS[channels.position_unit] * position
+    x = numbers * (1.0 if channels.order.startswith("quat") else ANGLES[channels.angle_unit])
+    if wrong := "; ".join(wrong_numbers(p, x, channels)):
+        raise ValueError(wrong)
+    return np.asarray(np.einsum("nij,mj->nmi", rotations(x, channels.order), shape_of(channels)) + p[:, None])
 
 
 def other_convention(A: np.ndarray, B: np.ndarray, order: str) -> str | None:

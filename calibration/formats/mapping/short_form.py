@@ -45,7 +45,7 @@ def written_out(values: dict[str, Any]) -> dict[str, Any]:
         found["trials"] = _trials(found)
     for role in _ROLES:
         found.pop(role, None)
-    found["bodies"] = _posed(found.get("bodies"), found.get("csv"))
+    found["bodies"] = _posed(found.get("bodies"), found)
     markers = _marker_names(found["bodies"])
     if isinstance(found.get("csv"), list):
         linked = linked if isinstance(short, dict) else names
@@ -84,13 +84,15 @@ def _trials(values: dict[str, Any]) -> list[dict[str, Any]]:
     return trials + [{"id": name, "role": role} for name, role in role_of.items()]
 
 
-def _posed(bodies: Any, tables: Any) -> Any:
-    """Bodies with `pose: true` with the columns of their pose."""
-    if not isinstance(bodies, list) or not isinstance(tables, list):
+def _posed(bodies: Any, values: dict[str, Any]) -> Any:
+    """Bodies with `pose: true` with the columns or the topic of their pose."""
+    csv, bag = values.get("csv"), values.get("bag")
+    tables = [*(csv if isinstance(csv, list) else ()), bag]
+    if not isinstance(bodies, list):
         return bodies
     poses = {name: p for t in tables if isinstance(t, dict) for name, p in (t.get("poses") or {}).items()}
     return [
-        b | {"pose": poses.get(b.get("name"), "named in no table's `poses`")}
+        b | {"pose": poses.get(b.get("name"), "named in no table's or bag's `poses`")}
         if isinstance(b, dict) and b.get("pose") is True
         else b
         for b in bodies

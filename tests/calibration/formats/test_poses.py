@@ -118,4 +118,4 @@ def test_a_pose_in_another_convention_is_refused_and_named(lab, capsys, said):
 def test_a_body_whose_pose_is_in_no_table_is_named(lab, capsys):
     wrong = json.loads(json.dumps(mapping("quat_xyzw")).replace('"poses": {"hand"', '"poses": {"wrist"'))
     file = write_csv(lab.folder / "postures.csv", columns("quat_xyzw"))
-    assert "named in no table's `poses`" in lab.refused(capsys, wrong, file)
+    assert "named in no table's or bag's `poses`" in lab.refused(capsys, wrong, file)
