@@ -60,7 +60,7 @@ def _of_trial(
     seen = [m for m in hand.markers if m.name in means.marker]
     p = means.marker_position[:, [means.marker.index(m.name) for m in seen]]
     p = p @ np.swapaxes(T_B_lab[:, :3, :3], 1, 2) + T_B_lab[:, None, :3, 3]
-    predicted = robot.points(np.array([m.xyz for m in seen]), robot.at_rest(means.q_motor), Session())
+    predicted = robot.points(np.array([m.xyz for m in seen]), means.q_motor, Session())
     error, radius = 1e3 * np.linalg.norm(predicted.positions - p, axis=2), 1e3 * predicted.radius_95
     columns = [(m.name, [k]) for k, m in enumerate(seen)] + [(ALL, list(range(len(seen))))]
     rows = [_row(entry.id, model, name, error[:, k], radius[:, k]) for name, k in columns]

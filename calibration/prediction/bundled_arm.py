@@ -113,6 +113,10 @@ class BundledArm:
         """Q (n, 4, 4) in the base's marker body."""
         return moved(hand, self.bending, positions.q, positions.moment)
 
+    def poses(self, hand: HandModel, positions: ArmPositions) -> np.ndarray:
+        """T_B_H (n, 4, 4), the column bent."""
+        return np.asarray(self.bends(hand, positions) @ hand.poses(positions.q))
+
     def variance(self, hand: HandModel, positions: ArmPositions, reading_sigma: np.ndarray) -> np.ndarray:
         """(n, m) of the chain's joints: random error of the reading where there is no drive train."""
         known = {q.name: q.sigma for train in self.trains.trains for q in train.parameters if np.isfinite(q.sigma)}

@@ -22,7 +22,7 @@ from calibration.estimate.estimate import Estimate
 from calibration.estimate.files import load_estimate
 from calibration.estimate.rows import LADDER, row_of
 from calibration.inference.parameters import Model
-from calibration.numerics.lie import from_vector
+from calibration.numerics.lie import from_vector, inverse
 from calibration.prediction.base_pose import LoadedBase, loaded_base
 from calibration.prediction.bundled_arm import ArmPositions, BundledArm
 from calibration.prediction.hand_pose import HandPose, RobotState
@@ -30,7 +30,7 @@ from calibration.prediction.slipping_base import Motion, SlippingBase
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand import HandModel
-from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
+from calibration.robot.hand_uncertainty import Predicted, Session, Spread, points_of
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
 from calibration.stages.bundle.robot import BundledRobot
@@ -159,19 +159,18 @@ class Compensator:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
         return _in_lab(found, base, moved, T_lab_base_start, variance)
 
-    def at_rest(self, q_motor: np.ndarray) -> np.ndarray:
-        """Positions (n, n_joints) [rad, m] the geometry is evaluated at, of readings at rest, each for itself."""
-        return q_motor if self.arm is None else self.arm.at_rest(q_motor).q
-
     def points(self, markers: np.ndarray, q_motor: np.ndarray, session: Session | None = None) -> Predicted:
         """Markers (m, 3) [m] of the hand's body, as the base's marker body sees them, with their band.
 
         Args:
             markers: As `bodies` of dataset.json has them.
-            q_motor: (n, n_joints) readings at rest [rad, m]; with drive trains `at_rest` of them.
+            q_motor: (n, n_joints) readings at rest [rad, m], each for itself.
             session: Another day: base and marker body are not quite where they were; `Session()` for what is usual.
         """
-        return predicted_points(self.hand, self.spread, np.asarray(markers, dtype=float), q_motor, session)
+        q = np.asarray(q_motor, dtype=float)
+        found = self._hand(np.zeros(len(q)), q, None) if self.arm is None else self._on_links(self.arm.at_rest(q))
+        T = inverse(from_vector(self.hand.base)) @ found.T
+        return points_of(T, found.covariance, np.asarray(markers, dtype=float), session)
 
     def step(
         self,

@@ -27,6 +27,7 @@ from calibration.mocap.cluster_pose import poses_of, poses_of_means
 from calibration.mocap.postures import dwell_windows, readings_at
 from calibration.numerics.lie import from_vector, mean
 from calibration.prediction.base_pose import BaseInTrial
+from calibration.prediction.bundled_arm import BundledArm
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction
 from calibration.recording.clock import Clock
 from calibration.recording.posture_means import PostureMeans
@@ -92,13 +93,21 @@ class Predictor:
     def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
         """Predictions of posture means, one a posture in `t`: the base measured or its markers' own frame, motor side.
 
-        A model of the joints' hysteresis needs the motion before a posture, which means do not show.
+        A model of the joints' hysteresis needs the motion before a posture, which means do not show; drive trains are
+        taken to be at rest.
         """
         T_lab_B = poses_of_means(self.description.base_body, means).T
         for row, hand, encoder in self._rows():
             if encoder == "motor" and row.means:
-                T = T_lab_B @ hand.poses(means.q_motor)
+                T = T_lab_B @ self._at_rest(row, hand, means.q_motor)
                 yield Prediction(row.name, "measured", "motor", entry.id, entry.kind, np.arange(float(len(means))), T)
+
+    def _at_rest(self, row: LadderRow, hand: HandModel, q: np.ndarray) -> np.ndarray:
+        """T_B_H (n, 4, 4) at motor readings (n, n_joints), each at rest for itself."""
+        if self.side(row, "motor") != "bundled" or self.bundled is None:
+            return hand.poses(q)
+        arm = BundledArm(self.bundled.trains, self.bundled.bending)
+        return arm.poses(hand, arm.at_rest(q))
 
     def _rows(self) -> Iterator[tuple[LadderRow, HandModel, Encoder]]:
         ours = [row for row in LADDER if row.name in self.models]

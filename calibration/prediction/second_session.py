@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.estimate.rows import row_of
+from calibration.estimate.rows import BASELINE, row_of
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.labels import relabelled_trial
 from calibration.mocap.postures import dwell_windows
@@ -49,14 +49,17 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
     """
     trials = [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)]
     models = dict(predict.models)
+    bundled = predict.bundled
     for name in (n for n in models if row_of(n).registered):
         models[name] = fit_frames(models[name], *_postures(predict, name, trials), predict.description)
-    return replace(predict, models=models)
+        if bundled is not None and row_of(name).bundle:
+            bundled = replace(bundled, hand=models[name])
+    return replace(predict, models=models, bundled=bundled)
 
 
-def registration_postures(predict: Predictor, name: str, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Mean positions (n, n_joints) a row's geometry is evaluated at, and measured T_B_H (n, 4, 4), a dwell each."""
-    return _postures(predict, name, [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)])
+def registration_postures(predict: Predictor, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Mean motor readings (n, n_joints) and measured T_B_H (n, 4, 4), a dwell each."""
+    return _postures(predict, BASELINE, [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)])
 
 
 def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:
@@ -66,11 +69,15 @@ def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[n
 
 
 def _dwells(predict: Predictor, name: str, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
-    """Mean positions (n, n_joints) and measured T_B_H (n, 4, 4) of the dwells that show both bodies."""
+    """Mean positions (n, n_joints) and measured T_B_H (n, 4, 4), unbent, of the dwells that show both bodies."""
     base, hand = predict.description.base_body, predict.description.hand_body
     q = predict.positions(name, "motor", trial)
     T = inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
     known = np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
+    bundled = predict.bundled
+    if bundled is not None and predict.robot is not None and predict.side(row_of(name), "motor") == "bundled":
+        bends = bundled.hand_in_base(trial, predict.robot)[known] @ inverse(bundled.hand.poses(q[known]))
+        T[known] = inverse(bends) @ T[known]
     inside = [known & (trial.t_mocap >= a) & (trial.t_mocap <= b) for a, b in dwell_windows(trial)]
     seen = [k for k in inside if k.any()]
     if not seen:
@@ -85,19 +92,24 @@ def reregistered_compensator(
 
     Args:
         robot: As calibrated on another day.
-        q: (n, n_joints) readings at rest [rad, m].
+        q: (n, n_joints) motor readings at rest [rad, m].
         T_measured: (n, 4, 4) T_B_H, the hand's marker body in the base's.
         description: Of the laboratory.
 
     Raises:
         NotEnoughData: They turn the hand about one direction only.
     """
+    variance = np.broadcast_to(robot.reading_sigma**2, (len(q), len(robot.reading_sigma)))
+    if robot.arm is not None and len(q):
+        positions = robot.arm.at_rest(q)
+        T_measured = inverse(robot.arm.bends(robot.hand, positions)) @ T_measured
+        q, variance = positions.q, robot.arm.variance(robot.hand, positions, robot.reading_sigma)
     hand = fit_frames(robot.hand, q, T_measured, description)
-    return replace(robot, hand=hand, covariance=_covariance(robot, hand, q, frame_weights(description)))
+    return replace(robot, hand=hand, covariance=_covariance(robot, hand, q, variance, frame_weights(description)))
 
 
-def _covariance(robot: Compensator, hand: HandModel, q: np.ndarray, W: np.ndarray) -> np.ndarray:
-    """(p, p) of frames and all that stays, errors of postures weighed by W (6, 6)."""
+def _covariance(robot: Compensator, hand: HandModel, q: np.ndarray, variance: np.ndarray, W: np.ndarray) -> np.ndarray:
+    """(p, p) of frames and all that stays; positions q of variance (n, k), errors of postures weighed by W (6, 6)."""
     n, p = len(q), len(robot.names)
     found = hand.poses_and_derivatives(q, names=robot.names)
     frames = np.isin(robot.names, hand.block(Frames).names)
@@ -107,6 +119,8 @@ def _covariance(robot: Compensator, hand: HandModel, q: np.ndarray, W: np.ndarra
     A[frames] = -L @ J[:, ~frames]
     each = (L.reshape(-1, n, 6) @ W).transpose(1, 0, 2)
     covariance = A @ robot.covariance[np.ix_(~frames, ~frames)] @ A.T
-    random = (each @ robot.spread.random_errors(found.J_joint) @ each.transpose(0, 2, 1)).sum(axis=0)
+    errors = (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
+    errors += np.diag(robot.spread.hand_variances)
+    random = (each @ errors @ each.transpose(0, 2, 1)).sum(axis=0)
     covariance[np.ix_(frames, frames)] += random
     return np.asarray(covariance)

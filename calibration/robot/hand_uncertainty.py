@@ -93,11 +93,16 @@ def predicted_points(
     """Markers (m, 3) [m] of the hand's body at readings q (n, n_measured), in another session where one is given."""
     found = hand.poses_and_derivatives(np.asarray(q, dtype=float), names=spread.names)
     S = found.J @ spread.theta @ np.swapaxes(found.J, 1, 2) + spread.random_errors(found.J_joint)
+    return points_of(found.T, S, markers, session)
+
+
+def points_of(T: np.ndarray, S: np.ndarray, markers: np.ndarray, session: Session | None = None) -> Predicted:
+    """Markers (m, 3) [m] of poses T_B_H (n, 4, 4) whose local twists have covariance S (n, 6, 6)."""
     if session is not None:
         eye = np.broadcast_to(np.eye(6), S.shape)
-        both = np.concatenate([adjoint(inverse(found.T)), eye], axis=2)
+        both = np.concatenate([adjoint(inverse(T)), eye], axis=2)
         S = S + (both * session.variances) @ np.swapaxes(both, 1, 2)
-    R = found.T[:, None, :3, :3]
+    R = T[:, None, :3, :3]
     G = np.concatenate([np.broadcast_to(R, (len(S), len(markers), 3, 3)), -R @ skew(markers)], axis=3)
-    positions = np.einsum("nij,mj->nmi", found.T[:, :3, :3], markers) + found.T[:, None, :3, 3]
+    positions = np.einsum("nij,mj->nmi", T[:, :3, :3], markers) + T[:, None, :3, 3]
     return Predicted(positions, G @ S[:, None] @ np.swapaxes(G, 2, 3))

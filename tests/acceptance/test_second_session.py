@@ -55,7 +55,7 @@ def shares(tmp_path_factory) -> np.ndarray:
         estimate = calibrate(dataset)
         predict, robot = predictor(estimate, dataset), Compensator.of(estimate)
         assert estimate.main == "full"
-        again = reregistered_compensator(robot, *registration_postures(predict, "full", dataset), dataset.description)
+        again = reregistered_compensator(robot, *registration_postures(predict, dataset), dataset.description)
         pairs = ((again, None), (again, Session()), (robot, Session()), (robot, REMOUNTED))
         found.append([inside(r, dataset, predict.robot, session) for r, session in pairs])
     print((100.0 * np.array(found)).round().astype(int))
