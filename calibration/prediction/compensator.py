@@ -12,7 +12,9 @@ The geometry is that of the estimate's main model, as in calibrated.urdf. Where 
 link angles and sigma theirs, the column bends, and the base sticks and slips (`bundled_arm`, `slipping_base`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -151,7 +153,8 @@ class Compensator:
             if self.slipping is None:
                 moved = there.moved(t, w)
             else:
-                moved, variance = self.slipping.moved(there, t, q, w)
+                moved, spread = self.slipping.moved(there, t, q, w)
+                variance = partial(np.asarray, spread)
         known = velocity is not None or _continuous(t)
         if self.arm is not None:
             found = self._on_links(self.arm.along(t, q, velocity) if known else self.arm.at_rest(q))
@@ -205,7 +208,7 @@ class Compensator:
             state = there.stepped(t, w, before.base)
         else:
             state = self.slipping.stepped(there, t, w, motion, before.base)
-            variance = self.slipping.variance(state)
+            variance = partial(self.slipping.variance, state)
         found = _in_lab(in_base, base, state.moved, T_lab_base_start, variance)
         return replace(found, state=RobotState(arm, state))
 
@@ -213,7 +216,16 @@ class Compensator:
         """The base at its pose, None without a suspension or a laboratory."""
         if self.suspension is None or self.laboratory is None:
             return None
-        return loaded_base(self.suspension, self.laboratory, T_lab_base)
+        key = b"" if T_lab_base is None else np.asarray(T_lab_base, dtype=float).tobytes()
+        if key not in self._bases:
+            self._bases.clear()
+            self._bases[key] = loaded_base(self.suspension, self.laboratory, T_lab_base)
+        return self._bases[key]
+
+    @cached_property
+    def _bases(self) -> dict[bytes, LoadedBase]:
+        """The base where it stood last."""
+        return {}
 
     def _hand(self, t: np.ndarray, q: np.ndarray, velocity: np.ndarray | None) -> HandPose:
         """In the base frame, by readings less the joint models."""
@@ -222,24 +234,26 @@ class Compensator:
             corrected = correct(self.joints, t, q, velocity)
             q, columns = corrected.q, self.hand.chain.columns
             variance = np.where(corrected.modelled[columns], corrected.variance[:, columns], variance)
-        return self._at(q, variance)
+        return HandPose(self.hand.in_base_frame(q), lambda: self._covariance(q, variance))
 
     def _on_links(self, positions: ArmPositions) -> HandPose:
         """In the base frame, by link angles and with the column bent."""
         if self.arm is None:
             raise NotEnoughData("this estimate has no drive trains")
-        variance = self.arm.variance(self.hand, positions, self.reading_sigma)
-        found = self._at(positions.q, variance, self.arm.bends(self.hand, positions))
-        return replace(found, covariance=found.covariance + self.arm.column_covariance(self.hand, positions, found.T))
+        arm, T = self.arm, from_vector(self.hand.base) @ self.arm.poses(self.hand, positions)
 
-    def _at(self, q: np.ndarray, variance: np.ndarray, bends: np.ndarray | None = None) -> HandPose:
-        """In the base frame at positions q of variance (n, k), moved in the base's marker body by `bends` (n, 4, 4)."""
+        def covariance() -> np.ndarray:
+            variance = arm.variance(self.hand, positions, self.reading_sigma)
+            return self._covariance(positions.q, variance) + arm.column_covariance(self.hand, positions, T)
+
+        return HandPose(T, covariance)
+
+    def _covariance(self, q: np.ndarray, variance: np.ndarray) -> np.ndarray:
+        """(n, 6, 6) by parameters and by positions q of variance (n, k)."""
         found = self.hand.poses_and_derivatives(q, names=self.names)
-        T_base_hand = from_vector(self.hand.base) @ (found.T if bends is None else bends @ found.T)
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
-        covariance += np.diag(self.spread.hand_variances)
-        return HandPose(T_base_hand, covariance)
+        return np.asarray(covariance + np.diag(self.spread.hand_variances))
 
 
 def _needed(base: LoadedBase | None) -> LoadedBase:
@@ -253,14 +267,17 @@ def _in_lab(
     base: LoadedBase | None,
     moved: np.ndarray | None,
     T_lab_base: np.ndarray | None,
-    variance: np.ndarray | None = None,
+    variance: Callable[[], np.ndarray] | None = None,
 ) -> HandPose:
     """A pose in the base frame from where the base is, which may have moved (n, 4, 4), of variance (6,) or (n, 6)."""
-    covariance = in_base.covariance
-    if base is not None and variance is not None:
-        covariance = covariance + base.carried(variance, in_base.T)
-    elif base is not None and (moved is not None or T_lab_base is not None):
-        covariance = covariance + base.covariance(in_base.T, moved is not None)
+
+    def covariance() -> np.ndarray:
+        if base is not None and variance is not None:
+            return in_base.covariance + base.carried(variance(), in_base.T)
+        if base is not None and (moved is not None or T_lab_base is not None):
+            return in_base.covariance + base.covariance(in_base.T, moved is not None)
+        return in_base.covariance
+
     T = in_base.T if T_lab_base is None else np.asarray(T_lab_base, dtype=float) @ in_base.T
     return HandPose(T if moved is None else moved @ T, covariance)
 

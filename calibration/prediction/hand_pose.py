@@ -1,6 +1,8 @@
 """What `Compensator` returns: poses of the hand with their covariance, and the state after a sample."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,10 +29,15 @@ class HandPose:
 
     Attributes:
         T: (n, 4, 4) in the lab, or in the base frame at rest where the base's pose was not given.
-        covariance: (n, 6, 6) of the local twist [m, rad], for a base frame located by its own markers.
+        uncertainty: Computes `covariance`, which costs more than the pose.
         state: For the next step; None of a recording.
     """
 
     T: np.ndarray
-    covariance: np.ndarray
+    uncertainty: Callable[[], np.ndarray]
     state: RobotState | None = None
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(n, 6, 6) of the local twist [m, rad], for a base frame located by its own markers; when first asked for."""
+        return self.uncertainty()

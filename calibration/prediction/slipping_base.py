@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase
-from calibration.robot.floating_base import configurations, root_wrenches
+from calibration.robot.floating_base import configurations
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, planar_forcing, wrenches_along
 from calibration.stages.stick_slip.model import StickSlip
@@ -84,15 +84,21 @@ class SlippingBase:
 
     def _driven(self, T_lab_0: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Wrench (6,) of inverse dynamics on the floor, and inertia (6, 6), both in frame 0."""
+        model, (order, T_0_root, dual, action, data) = self.lab.floating, self._root
+        root = (pin.SE3(T_lab_0) * T_0_root).homogeneous[None]
+        q = configurations(model, root, motion.q[None, order])[0]
+        v, a = (np.concatenate([np.zeros(6), x[order]]) for x in (motion.v, motion.a))
+        w = -dual @ pin.rnea(model, data, q, v, a)[:6]
+        M = pin.crba(model, data, q)[:6, :6]
+        return w, dual @ (np.triu(M) + np.triu(M, 1).T) @ action
+
+    @cached_property
+    def _root(self) -> tuple[list[int], pin.SE3, np.ndarray, np.ndarray, pin.Data]:
+        """Order of the joints, T_0_root, how it acts on wrenches and back on twists, scratch of the dynamics."""
         model, description = self.lab.floating, self.lab.description
         order = [description.joint_names.index(name) for name in list(model.names)[2:]]
-        T_0_root = root_in_base(model, description)
-        root = (pin.SE3(T_lab_0) * T_0_root).homogeneous[None]
-        q = configurations(model, root, motion.q[None, order])
-        v, a = (np.concatenate([np.zeros(6), x[order]])[None] for x in (motion.v, motion.a))
-        w = -T_0_root.dualAction @ root_wrenches(model, q, v, a)[0]
-        M = pin.crba(model, model.createData(), q[0])[:6, :6]
-        return w, T_0_root.dualAction @ (np.triu(M) + np.triu(M, 1).T) @ T_0_root.inverse().action
+        T = root_in_base(model, description)
+        return order, T, T.dualAction, T.inverse().action, model.createData()
 
     @cached_property
     def _stream(self) -> SlipStream:

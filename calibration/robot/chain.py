@@ -88,6 +88,11 @@ class Chain:
         out[1:, :, :6], out[1:, :, 6] = jexp6(self.xi), self.drawn.twists
         return out
 
+    @cached_property
+    def _ways(self) -> dict[str, tuple[Path, list[int]]]:
+        """Paths from the base to frames that were asked for, and the columns of their joints."""
+        return {}
+
     def with_placements(self, xi: np.ndarray) -> "Chain":
         """The chain with placement twists `xi` (k, 6) [m, rad] instead of those it has."""
         if xi.shape != self.xi.shape:
@@ -99,10 +104,13 @@ class Chain:
         self._check(q)
         if frame is None:
             return self.path.placed(q[:, self.columns]).T
-        end = self._frame(frame)
-        names = [self.model.names[i] for i in self.model.supports[self.model.frames[end].parentJoint] if i != 0]
-        path = path_of(self.model, self._frame(self.base_frame), end)
-        return path.placed(q[:, [self.measured.index(name) for name in names]]).T
+        if frame not in self._ways:
+            end = self._frame(frame)
+            names = [self.model.names[i] for i in self.model.supports[self.model.frames[end].parentJoint] if i != 0]
+            path = path_of(self.model, self._frame(self.base_frame), end)
+            self._ways[frame] = path, [self.measured.index(name) for name in names]
+        path, columns = self._ways[frame]
+        return path.placed(q[:, columns]).T
 
     def poses_and_derivatives(self, q: np.ndarray) -> ChainPoses:
         """Poses of the tool frame with d(pose)/d(xi) and d(pose)/dq, at q (n, n_measured) [rad, m]."""

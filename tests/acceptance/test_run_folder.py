@@ -227,6 +227,16 @@ def test_without_velocities_readings_are_taken_to_be_at_rest(estimate, compensat
     np.testing.assert_allclose(one.T[0], found.T[3], atol=1e-9)
 
 
+def test_markers_are_where_the_pose_at_rest_has_them(compensator, swing):
+    t, q, *_ = swing
+    X = np.array([[0.1, 0.0, 0.05], [-0.05, 0.1, 0.1]])
+    found, pose = compensator.points(X, q[::200]), compensator.predict(t[::200], q[::200])
+    T = inverse(from_vector(compensator.hand.base)) @ pose.T
+    places = np.einsum("nij,mj->nmi", T[:, :3, :3], X) + T[:, None, :3, 3]
+    np.testing.assert_allclose(found.positions, places, atol=1e-12)
+    assert (found.radius_95 > 0.0).all()
+
+
 def test_a_step_is_the_prediction_of_its_sample(estimate, compensator, swing):
     t, q, w, start, *_ = swing
     v, whole = velocities(t, q), compensator.predict(t, q, T_lab_base_start=start)
