@@ -15,8 +15,9 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.estimate.estimate import Estimate
+from calibration.evaluation.budget import Causes, budget, causes
 from calibration.evaluation.joint_regimes import TrialResiduals, residuals, validation_qualities
-from calibration.evaluation.ladder import TrialErrors, ladder, scored_errors
+from calibration.evaluation.ladder import TrialErrors, ladder, trial_errors
 from calibration.evaluation.marker_errors import point_rows
 from calibration.evaluation.pose_errors import PoseErrors, pose_errors
 from calibration.evaluation.results import STAGE, Evaluation
@@ -32,7 +33,7 @@ from calibration.prediction.second_session import registration_trials, reregiste
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body, Role, TrialEntry
-from calibration.recording.trial import REST
+from calibration.recording.trial import REST, Trial
 from calibration.stages.frames.base_rests import MOVES
 from calibration.stages.suspension.checks import moved_by
 from calibration.verdict import Verdict
@@ -53,6 +54,7 @@ class _Scored:
         base_moved: How far the base moved for good; empty where it did not.
         residuals: Of the joint models, None without them.
         means: The recording, where it holds posture means.
+        causes: Of the delivered row's error, of a trial that moves.
     """
 
     entry: TrialEntry
@@ -61,6 +63,7 @@ class _Scored:
     base_moved: str = ""
     residuals: TrialResiduals | None = None
     means: PostureMeans | None = None
+    causes: Causes | None = None
 
 
 def evaluate(
@@ -109,6 +112,7 @@ def evaluate(
         points=point_rows(estimate, dataset.description, means),
         predicted=tuple(one.predicted for one in scored),
         main=estimate.main if submitted is None else submitted.name,
+        budget=budget([one.causes for one in scored if one.causes is not None]),
     )
 
 
@@ -130,16 +134,22 @@ def _of_trial(predict: Predictor, dataset: Dataset, entry: TrialEntry, submitted
     T_measured, predicted = poses_of(dataset.description.hand_body, trial).T, predict(entry, trial)
     own = None if submitted is None else submitted.row(entry, trial.t_mocap, T_measured)
     predicted = predicted if own is None else replace(predicted, rows=(*predicted.rows, own))
-    errors = []
-    for p in predicted.rows:
-        e = pose_errors(p.T_lab_hand, T_measured)
-        scored = scored_errors(p.t, e, predicted.dwells, p.kind == "static")
-        errors.append(TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, e, scored))
+    errors = [trial_errors(p, T_measured, predicted.dwells) for p in predicted.rows]
     moved = "" if entry.kind in MOVES else _moved(predicted)
     left = None
     if predict.joints is not None and predict.robot is not None and predicted.corrected is not None:
         left = residuals(predict.joints, trial, predicted.corrected, predict.robot)
-    return _Scored(entry, predicted, tuple(errors), moved, left)
+    return _Scored(entry, predicted, tuple(errors), moved, left, causes=_causes(predict, predicted, trial))
+
+
+def _causes(predict: Predictor, predicted: PredictedTrial, trial: Trial) -> Causes | None:
+    """Causes of the delivered row's error after the first second; None of a trial that does not move."""
+    parts, t, description = predicted.delivered, predicted.t, predict.description
+    if parts is None:
+        return None
+    hand = poses_of(description.hand_body, trial)
+    noise = description.sigmas.marker**2 * hand.covariance[:, :3, :3].trace(axis1=1, axis2=2) / 3.0
+    return causes(parts, t, hand.T, predicted.T_lab_B, parts.q_link, noise)
 
 
 def _of_means(predict: Predictor, dataset: Dataset, entry: TrialEntry, submitted: Submission | None) -> _Scored:

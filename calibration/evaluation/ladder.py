@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from calibration.evaluation.pose_errors import PoseErrors, RowMetrics, dwell_means, row_metrics, turned
+from calibration.evaluation.pose_errors import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics, turned
+from calibration.prediction.predicted_trial import Prediction
 from calibration.prediction.predictor import REFERENCE
 
 Trials = Literal["dynamic", "static", "all"]
@@ -62,6 +63,13 @@ def scored_errors(t: np.ndarray, errors: PoseErrors, dwells: np.ndarray, static:
         return dwell_means(t, errors, dwells)
     after = t > t[0] + REFERENCE
     return PoseErrors(errors.position[after], errors.rotation[after])
+
+
+def trial_errors(p: Prediction, T_reference: np.ndarray, dwells: np.ndarray) -> TrialErrors:
+    """Errors of a prediction against reference poses (n, 4, 4); dwells (k, 2) [s] of a static trial."""
+    e = pose_errors(p.T_lab_hand, T_reference)
+    scored = scored_errors(p.t, e, dwells, p.kind == "static")
+    return TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, e, scored)
 
 
 def ladder(traces: list[TrialErrors], against: str) -> Iterator[Row]:

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from calibration.errors import NotEnoughData
+from calibration.evaluation.budget import Budget
 from calibration.evaluation.comparison import Comparison, comparisons
 from calibration.evaluation.ladder import Row, TrialErrors, Trials, trial_entry
 from calibration.evaluation.main_row import Headline, headline
@@ -38,6 +39,7 @@ class Evaluation:
         points: Single markers of trials that hold posture means.
         predicted: The predictions that were scored, trial by trial.
         main: The model that is delivered; empty where there is none.
+        budget: What its error on moving trials consists of; None where it was not taken apart.
     """
 
     rows: tuple[Row, ...]
@@ -48,6 +50,7 @@ class Evaluation:
     points: tuple[PointRow, ...] = ()
     predicted: tuple[PredictedTrial, ...] = ()
     main: str = ""
+    budget: Budget | None = None
 
     @property
     def headline(self) -> Headline | None:
@@ -75,6 +78,7 @@ class Evaluation:
         content = {
             "schema": 1,
             **({} if self.headline is None else self.headline.entry()),
+            "budget": None if self.budget is None else self.budget.entry(),
             "rows": [r.entry() for r in self.rows],
             "confirmation": [r.entry() | {"role": "confirmation"} for r in self.confirmation],
             "points": [asdict(p) for p in self.points],

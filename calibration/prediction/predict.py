@@ -61,7 +61,9 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
         row = next(row for row in LADDER if row.bundle)
         bundled = BundledRobot.of(models[row.name], estimate.bundle, dataset.urdf, description)
     plate = estimate.clock("plate")
-    return Predictor(models, dataset.urdf, description, robot, plate, estimate.suspension, joints, bundled)
+    return Predictor(
+        models, dataset.urdf, description, robot, plate, estimate.suspension, joints, bundled, estimate.main
+    )
 
 
 def predict(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[PredictedTrial]:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calibration.estimate.rows import Base, Encoder
+from calibration.prediction.delivered import Delivered
 from calibration.recording import netcdf
 from calibration.stages.joints.correction import Corrected
 from calibration.stages.suspension.model import Source
@@ -96,6 +97,7 @@ class PredictedTrial:
         T_lab_B: (n, 4, 4) the base's marker body as measured; empty where the trial was read from a file.
         dwells: (k, 2) start and stop of the dwells of a static trial [s].
         corrected: Motor readings less the joint models, None without them.
+        delivered: What the row that is delivered is made of, of a trial that moves; None where it was not predicted.
     """
 
     trial_id: str
@@ -107,6 +109,7 @@ class PredictedTrial:
     T_lab_B: np.ndarray = field(default_factory=lambda: np.zeros((0, 4, 4)))
     dwells: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     corrected: Corrected | None = None
+    delivered: Delivered | None = None
 
     def save(self, folder: Path) -> None:
         """Write <trial>.nc into a folder that is there."""

@@ -22,12 +22,13 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.estimate.rows import LADDER, NOMINAL, Base, Encoder, LadderRow, row_of
+from calibration.estimate.rows import LADDER, NOMINAL, SOURCES, Base, Encoder, LadderRow, row_of
 from calibration.mocap.cluster_pose import poses_of, poses_of_means
 from calibration.mocap.postures import dwell_windows, readings_at
-from calibration.numerics.lie import from_vector, mean
+from calibration.numerics.lie import from_vector, inverse, mean
 from calibration.prediction.base_pose import BaseInTrial
 from calibration.prediction.bundled_arm import BundledArm
+from calibration.prediction.delivered import Delivered
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction
 from calibration.recording.clock import Clock
 from calibration.recording.posture_means import PostureMeans
@@ -59,6 +60,7 @@ class Predictor:
         suspension: None where there is none.
         joints: None where there is none.
         bundled: Robot of the row with drive trains and a stick-slip base; None where there is none.
+        main: Row that is delivered; empty where there is none.
     """
 
     models: dict[str, HandModel]
@@ -69,6 +71,7 @@ class Predictor:
     suspension: Suspension | None = None
     joints: JointModels | None = None
     bundled: BundledRobot | None = None
+    main: str = ""
 
     def __call__(self, entry: TrialEntry, trial: Trial) -> PredictedTrial:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
@@ -85,9 +88,11 @@ class Predictor:
         if poses.loaded is not None and NOMINAL in self.models:
             found = [(source, poses.displaced(source, NOMINAL)) for source, _ in poses.loaded.suspension.held_out]
             motion = _motion(T_lab_B, found)
-        samples = tuple(self._samples(trial)) if entry.kind != "static" else ()
+        moves = entry.kind != "static"
+        samples, delivered = (tuple(self._samples(trial)), poses.delivered()) if moves else ((), None)
+        dwells = dwell_windows(trial)
         return PredictedTrial(
-            entry.id, entry.kind, trial.t_mocap, rows, motion, samples, T_lab_B, dwell_windows(trial), corrected
+            entry.id, entry.kind, trial.t_mocap, rows, motion, samples, T_lab_B, dwells, corrected, delivered
         )
 
     def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
@@ -214,6 +219,27 @@ class TrialPoses:
             return T
         found = self.displaced(source, row.name)
         return None if found is None else found[0].poses(found[1])
+
+    def delivered(self) -> Delivered | None:
+        """Parts of the row that is delivered; None where it has no prediction of this trial."""
+        p, row = self.predictor, row_of(self.predictor.main)
+        bases = (self.base(row, source) for source in SOURCES if source in row.bases and row.name in p.models)
+        T_lab_B = next((T for T in bases if T is not None), None)
+        if T_lab_B is None:
+            return None
+        side, hand = p.side(row, "motor"), p.models[row.name].carrying(self.entry.payload)
+        T_B_H, columns = self.in_base(row, "motor"), hand.chain.columns
+        q, motor = (p.readings(s, self.trial, self.corrected) for s in (side, "motor"))
+        link = readings_at(self.trial, p.robot, self.trial.t_mocap, self.trial.q_link) if p.robot else motor
+        known = np.isfinite(q).all(axis=1) & np.isfinite(motor).all(axis=1)
+        J, rigid, bare = (np.full((len(q), *shape), np.nan) for shape in ((3, len(columns)), (4, 4), (4, 4)))
+        rigid[known], bare[known] = hand.poses(q[known]), hand.poses(motor[known])
+        R = T_lab_B[known, :3, :3] @ T_B_H[known, :3, :3]
+        J[known] = R @ hand.joint_jacobians(q[known])[:, :3]
+        off = [("base", self.still @ T_B_H)]
+        if side == "bundled":
+            off += [("drive trains", T_lab_B @ (T_B_H @ inverse(rigid)) @ bare), ("bending", T_lab_B @ rigid)]
+        return Delivered(hand.chain.joints, T_lab_B, T_B_H, q[:, columns], link[:, columns], J, tuple(off))
 
     def displaced(self, source: Source, model: str) -> tuple[Rest, np.ndarray] | None:
         """Rest and displacement (n, 6) of the base by its suspension; None where the source was not recorded."""

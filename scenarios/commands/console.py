@@ -106,7 +106,7 @@ def show_rows(rows: "Sequence[Row]", most: int = 5) -> None:
 
 
 def summary(run: Path) -> list[str]:
-    """Return the end of a run in six lines: verdict, rows, worst finding, next step, report."""
+    """Return the end of a run in seven lines: verdict, rows, budget, worst finding, next step, report."""
     from scenarios.report.results.formatting import cell
     from scenarios.report.results.headline import headline
     from scenarios.report.results.ladder import best_of_each
@@ -124,6 +124,7 @@ def summary(run: Path) -> list[str]:
         f"{found.badge.capitalize()}. {found.sentence}",
         f"RMSE per component [mm]: {', '.join(mm)}",
         f"RMSE of orientation [deg]: {', '.join(deg)}",
+        *([budget.sentence] if (budget := view.results.evaluation.budget) else []),
         f"Worst finding: {worst[0]}{more}",
         f"Next: {following[0]}",
         f"Report: {run / 'report.html'}",

@@ -13,7 +13,7 @@ import numpy as np
 
 import calibration.evaluation
 from calibration import Estimate, Evaluation
-from calibration.evaluation import Row, TrialErrors, headline, scored_errors
+from calibration.evaluation import Budget, Row, TrialErrors, headline, trial_errors
 from calibration.inference import Model
 from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
@@ -35,6 +35,7 @@ class Score(ParameterScore):
         base: The base's roll and pitch by source of the wrench.
         models: Every model by itself, the main one first.
         main: Model that is delivered; empty where there is none.
+        budget: What its error consists of; None where it was not taken apart.
     """
 
     rows: tuple[Row, ...]
@@ -42,6 +43,7 @@ class Score(ParameterScore):
     base: tuple[BaseScore, ...] = ()
     models: tuple[ModelScore, ...] = ()
     main: str = ""
+    budget: Budget | None = None
 
     def content(self) -> dict[str, object]:
         """As in score.json."""
@@ -51,6 +53,7 @@ class Score(ParameterScore):
             "models": {name: score.coverage() for name, score in self.models},
             "every_model": {"coverage_95": covered / n if n else None, "n_covered": covered, "n_judged": n},
             **self._headline(dict(zip(self.rows, rows, strict=True))),
+            "budget": None if self.budget is None else self.budget.entry(),
             "rows": rows,
             "base": [asdict(b) for b in self.base],
         }
@@ -75,7 +78,25 @@ def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path)
     rows = tuple(calibration.evaluation.ladder(list(_errors(pairs, _derived(truth_folder)["T_base_base"])), "truth"))
     main = {f.name: getattr(models[0][1], f.name) for f in fields(ParameterScore)} | {"parameters": parameters}
     skill = tuple(_skill(row, rows) for row in rows)
-    return Score(**main, rows=rows, skill=skill, base=base_scores(pairs), models=models, main=evaluation.main)
+    return Score(
+        **main,
+        rows=rows,
+        skill=skill,
+        base=base_scores(pairs),
+        models=models,
+        main=evaluation.main,
+        budget=_budget(pairs, truth_folder),
+    )
+
+
+def _budget(pairs: Iterable[tuple[PredictedTrial, TruthTrial]], truth_folder: Path) -> Budget | None:
+    """The delivered row's error taken apart by the true base and joint angles; nothing of it is noise."""
+    T_base_body, found = _derived(truth_folder)["T_base_base"], []
+    for trial, true in pairs:
+        names = trial.delivered.joints if trial.delivered else ()
+        q = true.q_link_true[:, [true.joint.index(name) for name in names]]
+        found.append((trial, true.hand_pose, true.base_pose @ T_base_body, q))
+    return Budget.against(found)
 
 
 def _read_parameters(path: Path, estimated: Collection[str]) -> tuple[Parameter, ...]:
@@ -96,9 +117,7 @@ def _errors(pairs: Iterable[tuple[PredictedTrial, TruthTrial]], T_base_body: np.
     floors = []
     for trial, true in pairs:
         for p in (*trial.rows, _floor(trial, true, T_base_body)):
-            errors = calibration.evaluation.pose_errors(p.T_lab_hand, true.hand_pose)
-            scored = scored_errors(p.t, errors, trial.dwells, p.kind == "static")
-            found = TrialErrors(p.model, p.base, p.encoder, p.trial_id, p.kind, p.t, errors, scored)
+            found = trial_errors(p, true.hand_pose, trial.dwells)
             if p.model == FLOOR:
                 floors.append(found)
             else:

@@ -74,9 +74,12 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
         badge = "calibrated" if estimate.calibrated and not useless else "not calibrated"
     model = headline_model(results, steps)
     best = predictive(steps, model) or oracle_base(steps, model)
-    shares = _shares(steps, best) if best else ()
+    budget = results.evaluation.budget
+    shares = tuple(Share(s.cause, s.size_mm) for s in budget.shares if s.size_mm > 0.0) if budget else ()
+    shares = shares or (_shares(steps, best) if best else ())
+    gains = tuple(NextStep(s.remedy, s.gain_mm) for s in budget.next_steps) if budget else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
-    ranked = (*refused, *_next_steps(steps, best, found))[:_STEPS]
+    ranked = (*refused, *_next_steps(steps, best, found, gains))[:_STEPS]
     return Headline(badge, _sentence(steps, best), shares, ranked, found)
 
 
@@ -118,9 +121,11 @@ def _shares(steps: Sequence[Step], best: Step) -> tuple[Share, ...]:
     return tuple(sorted((share for share in found if share.size > 0.0), key=lambda share: -share.size))
 
 
-def _next_steps(steps: Sequence[Step], best: Step | None, notices: Sequence[Notice]) -> tuple[NextStep, ...]:
-    """Rows of the same robot that do better, each by its gain; then what the stages ask to record."""
-    found = list(_gains(steps, best)) if best else []
+def _next_steps(
+    steps: Sequence[Step], best: Step | None, notices: Sequence[Notice], gains: Sequence[NextStep]
+) -> tuple[NextStep, ...]:
+    """The budget's, else rows of the same robot that do better, by gain; then what the stages ask to record."""
+    found = list(gains or (_gains(steps, best) if best else ()))
     found.sort(key=lambda step: -(step.gain or 0.0))
     asked = [NextStep(f"{n.stage}: {n.message}", None) for n in notices if "record_next" in n.message]
     return (*found, *asked)

@@ -112,12 +112,31 @@ class TrialErrors(Entry):
     orientation_rmse_deg: float | None
 
 
+class Cause(Entry):
+    """A cause of the error, and by how much the error falls without it [mm per component]."""
+
+    cause: str
+    size_mm: float
+    gain_mm: float
+    remedy: str = ""
+
+
+class Budget(Entry):
+    """What the error consists of; see `calibration.evaluation`."""
+
+    whole_mm: float
+    shares: tuple[Cause, ...]
+    next_steps: tuple[Cause, ...]
+    sentence: str
+
+
 class Evaluation(Entry):
     """The whole of evaluation.json."""
 
     rows: tuple[Row, ...]
     main: Row | None = None
     beside: tuple[Row, ...] = ()
+    budget: Budget | None = None
     trials: tuple[TrialErrors, ...] = ()
     regimes: tuple[Regime, ...] = ()
     protocols: tuple[Protocol, ...] = ()
