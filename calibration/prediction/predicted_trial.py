@@ -3,6 +3,7 @@
 predictions/<trial>.nc     t                                       [s, mocap clock]
                            rows/<model>/<base>/<encoder>           position [m, lab], quaternion_wxyz of the hand
                            base                                    displacement [m, rad, frame 0]: measured, by source
+                           base/slipping                           x, variance, moment [N.m], use of friction by wheel
                            joints/<joint>                          theta, velocity, discrepancy, predicted [rad, rad/s]
 """
 
@@ -18,6 +19,7 @@ from calibration.estimate.rows import Base, Encoder
 from calibration.prediction.delivered import Delivered
 from calibration.recording import netcdf
 from calibration.stages.joints.correction import Corrected
+from calibration.stages.stick_slip.poses import SlippingMotion
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import Rest
 
@@ -55,11 +57,13 @@ class BaseMotion:
         measured: (n, 6) displacement [m, rad, frame 0], NaN where the markers are not seen.
         predicted: Displacement (n, 6) by source of the wrench.
         rest: Frame 0; None where it was read from a file.
+        slipping: The base that sticks and slips, its marker body as estimated, from the plate; None without one.
     """
 
     measured: np.ndarray
     predicted: tuple[tuple[Source, np.ndarray], ...]
     rest: Rest | None = None
+    slipping: SlippingMotion | None = None
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,8 @@ class PredictedTrial:
                 group = file.createGroup("base")
                 for name, x in (("measured", self.base.measured), *self.base.predicted):
                     netcdf.write_variable(group, name, x, ("t", "twist"), "f4", {"units": "m, rad", "frame": "0"})
+                if self.base.slipping is not None:
+                    _write_slipping(group.createGroup("slipping"), self.base.slipping)
             for joint in self.joints:
                 _write_joint(file.createGroup(f"joints/{joint.joint}"), joint)
         os.replace(part, path)
@@ -136,6 +142,21 @@ def _write_row(group: netcdf.Group, T: np.ndarray) -> None:
     wxyz[known] = Rotation.from_matrix(T[known, :3, :3]).as_quat(canonical=True, scalar_first=True)
     netcdf.write_variable(group, "position", T[:, :3, 3], ("t", "axis"), "f4", {"units": "m", "frame": "lab"})
     netcdf.write_variable(group, "quaternion_wxyz", wxyz, ("t", "quaternion"), "f4", {"units": "-", "frame": "lab"})
+
+
+_SLIPPING = (
+    ("x", ("t", "twist"), "m, rad"),
+    ("variance", ("t", "twist"), "m2, rad2"),
+    ("moment", ("t",), "N.m"),
+    ("use", ("t", "wheel"), "-"),
+)
+
+
+def _write_slipping(group: netcdf.Group, motion: SlippingMotion) -> None:
+    netcdf.add_dimensions(group, {"wheel": len(motion.wheels)})
+    netcdf.write_labels(group, {"wheel": motion.wheels})
+    for name, dimensions, units in _SLIPPING:
+        netcdf.write_variable(group, name, getattr(motion, name), dimensions, "f4", {"units": units, "frame": "0"})
 
 
 _JOINT = (("t", "s"), ("theta", "rad"), ("velocity", "rad/s"), ("discrepancy", "rad"), ("predicted", "rad"))
@@ -166,7 +187,12 @@ def _read_base(file: netcdf.Group) -> BaseMotion | None:
     group = file.groups["base"]
     sources: tuple[Source, ...] = ("plate", "dynamics")
     predicted = tuple((source, netcdf.array(group, source)) for source in sources if source in group.variables)
-    return BaseMotion(netcdf.array(group, "measured"), predicted)
+    own = group.groups.get("slipping")
+    slipping = None
+    if own is not None:
+        x, variance, moment, use = (netcdf.array(own, name) for name, _, _ in _SLIPPING)
+        slipping = SlippingMotion(x, variance, moment, use, netcdf.labels(own, "wheel"))
+    return BaseMotion(netcdf.array(group, "measured"), predicted, slipping=slipping)
 
 
 def _joints(file: netcdf.Group) -> Iterator[JointSamples]:

@@ -38,6 +38,7 @@ from calibration.robot.hand import HandModel
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.joints.correction import Corrected, JointModels, correct
 from calibration.stages.joints.samples import aligned_link_readings, samples_of
+from calibration.stages.stick_slip.poses import BasePrediction
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
@@ -87,7 +88,7 @@ class Predictor:
         motion = None
         if poses.loaded is not None and NOMINAL in self.models:
             found = [(source, poses.displaced(source, NOMINAL)) for source, _ in poses.loaded.suspension.held_out]
-            motion = _motion(T_lab_B, found)
+            motion = _motion(T_lab_B, found, poses.slipped("plate"))
         moves = entry.kind != "static"
         samples, delivered = (tuple(self._samples(trial)), poses.delivered()) if moves else ((), None)
         dwells = dwell_windows(trial)
@@ -215,8 +216,8 @@ class TrialPoses:
             return self.T_lab_B if source == "measured" else self.still
         if source == "submitted":  # poses of another program, not predicted here
             return None
-        if row.bundle and (T := self._once(("slipped", source), lambda: self._slipped(source))) is not None:
-            return T
+        if row.bundle and (slipped := self.slipped(source)) is not None:
+            return slipped.T_lab_B
         found = self.displaced(source, row.name)
         return None if found is None else found[0].poses(found[1])
 
@@ -261,12 +262,16 @@ class TrialPoses:
         rest = self.loaded.rest(from_vector(hand.base))
         return rest, self.loaded.displacement(source, rest)
 
-    def _slipped(self, source: Source) -> np.ndarray | None:
+    def slipped(self, source: Source) -> BasePrediction | None:
+        """The base that sticks and slips; None where none was identified from that source."""
+        return self._once(("slipped", source), lambda: self._slipped(source))
+
+    def _slipped(self, source: Source) -> BasePrediction | None:
         bundled = self.predictor.bundled
         if self.loaded is None or bundled is None or not bundled.knows(source) or not self._recorded(source):
             return None
         sources = replace(self.loaded.wrenches, T_base_B=from_vector(bundled.hand.base))
-        return bundled.base_poses(sources, self.trial, source)
+        return bundled.base_motion(sources, self.trial, source)
 
     def _recorded(self, source: Source) -> bool:
         return source != "plate" or (self.predictor.plate is not None and len(self.trial.t_plate) > 0)
@@ -277,13 +282,15 @@ class TrialPoses:
         return self._known[key]
 
 
-def _motion(T_lab_B: np.ndarray, found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]]) -> BaseMotion | None:
+def _motion(
+    T_lab_B: np.ndarray, found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]], slipped: BasePrediction | None
+) -> BaseMotion | None:
     """The base by the sources that were recorded; None where none was."""
     there = [(source, *one) for source, one in found if one is not None]
     if not there:
         return None
-    rest = there[0][1]
-    return BaseMotion(rest.displacement(T_lab_B), tuple((source, x) for source, _, x in there), rest)
+    rest, own = there[0][1], None if slipped is None else slipped.motion
+    return BaseMotion(rest.displacement(T_lab_B), tuple((source, x) for source, _, x in there), rest, own)
 
 
 def _start(T_lab_B: np.ndarray, trial: Trial) -> np.ndarray:

@@ -20,7 +20,7 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.geometry_refit import corrected_trial, hand_poses
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip.model import StickSlip
-from calibration.stages.stick_slip.poses import slipping_base_poses
+from calibration.stages.stick_slip.poses import BasePrediction, slipping_base_poses
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source
 
@@ -81,12 +81,12 @@ class BundledRobot:
         """Whether the base's motion was identified from that source."""
         return self.stick_slip is not None and source in [d.source for d in self.stick_slip.directions]
 
-    def base_poses(self, sources: WrenchSources, trial: Trial, source: Source) -> np.ndarray:
-        """T_lab_B (n, 4, 4) from the first second of a trial and a wrench.
+    def base_motion(self, sources: WrenchSources, trial: Trial, source: Source) -> BasePrediction:
+        """The base from the first second of a trial and a wrench.
 
         Raises:
             NotEnoughData: The wrench was not recorded, or the base was not identified.
         """
         if self.stick_slip is None:
             raise NotEnoughData(f"{trial.id}: no base that slips was identified")
-        return slipping_base_poses(self.stick_slip, sources, trial, source).T_lab_B
+        return slipping_base_poses(self.stick_slip, sources, trial, source)

@@ -1,6 +1,7 @@
 """Where the base's markers are in a trial, predicted: its first second and a wrench, nothing else.
 
 T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     covariance of x: diag V(t), in frame 0
+use_i = |K_i e_i + N_i (-ry, rx)| / (mu_i N_i),  the share of its friction that wheel i needs: 1 where it slides
 """
 
 from dataclasses import dataclass
@@ -8,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.recording.trial import Trial
-from calibration.stages.stick_slip.forcing import planar_forcing, wrenches_of
+from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_forcing, wrenches_of
+from calibration.stages.stick_slip.kernel import PLATE, STATE, advance
+from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source
@@ -16,18 +19,30 @@ from calibration.stages.suspension.rest_frame import rest_of
 
 
 @dataclass(frozen=True)
-class BasePrediction:
-    """The base's marker body at `t_mocap` of a trial; outside the wrench's recording it stays.
+class SlippingMotion:
+    """The base at `t_mocap` of a trial, m wheels; outside the wrench's recording it stays.
 
     Attributes:
-        T_lab_B: (n, 4, 4).
-        variance: (n, 6) of the displacement in frame 0 [m, rad].
-        T_lab_0: (4, 4) frame 0.
+        x: (n, 6) displacement [m, rad, frame 0].
+        variance: (n, 6) of it.
+        moment: (n,) change of Mz on the floor [N.m].
+        use: (n, m) of the friction of each wheel [-].
+        wheels: Their names.
     """
 
-    T_lab_B: np.ndarray
+    x: np.ndarray
     variance: np.ndarray
-    T_lab_0: np.ndarray
+    moment: np.ndarray
+    use: np.ndarray
+    wheels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class BasePrediction:
+    """The base's marker body T_lab_B (n, 4, 4), and how it moved."""
+
+    T_lab_B: np.ndarray
+    motion: SlippingMotion
 
 
 def slipping_base_poses(model: StickSlip, sources: WrenchSources, trial: Trial, source: Source) -> BasePrediction:
@@ -39,8 +54,26 @@ def slipping_base_poses(model: StickSlip, sources: WrenchSources, trial: Trial, 
     """
     rest = rest_of(sources.lab.description, trial, sources.T_base_B)
     forcing = planar_forcing(wrenches_of(sources, trial, rest.T_lab_0), model.tilting, source)
-    x, variance = (_at(trial.t_mocap, forcing.t, columns) for columns in model.displacement(forcing))
-    return BasePrediction(rest.poses(x), variance, rest.T_lab_0)
+    moment = forcing.drive[::STEPS, PLATE + 2 if source == "plate" else 2][:, None]
+    found = (*model.displacement(forcing), moment, friction_use(model, forcing))
+    x, variance, moment, use = (_at(trial.t_mocap, forcing.t, columns) for columns in found)
+    motion = SlippingMotion(x, variance, moment[:, 0], use, model.wheels.names)
+    return BasePrediction(rest.poses(x), motion)
+
+
+def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
+    """Share (n, m) of its friction that each wheel needs, by the most likely parameters."""
+    p = model.direction(forcing.source).parameters
+    rows, settings = model.wheels.rows(p), body(p, forcing.source == "plate")
+    e, state = np.zeros((len(forcing.t), *model.wheels.position.shape)), np.zeros(STATE)
+    now = np.zeros(model.wheels.position.shape)
+    for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):
+        advance(state, now, drive, forcing.inertia[k], rows, settings, STEP)
+        e[k] = now
+    drive = forcing.drive[STEPS - 1 :: STEPS]
+    N = np.maximum(rows[:, 6] + drive[:, 3:6] @ rows[:, 7:].T, np.finfo(float).tiny)
+    force = rows[:, 2:4] * e + N[..., None] * np.stack([-drive[:, 7], drive[:, 6]], axis=1)[:, None]
+    return np.minimum(np.linalg.norm(force, axis=2) / (rows[:, 5] * N), 1.0)
 
 
 def _at(t: np.ndarray, grid: np.ndarray, columns: np.ndarray) -> np.ndarray:

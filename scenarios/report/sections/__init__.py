@@ -11,6 +11,7 @@ from scenarios.report.sections.parameters import Parameters
 from scenarios.report.sections.payload import Payload
 from scenarios.report.sections.recordings import Recordings
 from scenarios.report.sections.reproduce import Reproduce
+from scenarios.report.sections.slip import Slip
 from scenarios.report.sections.stages import Stages
 from scenarios.report.sections.verdict import Verdict
 
@@ -21,6 +22,7 @@ SECTIONS: tuple[type[Section], ...] = (
     PaperModels,
     Frames,
     BaseMotion,
+    Slip,
     Joints,
     Payload,
     Parameters,

@@ -9,6 +9,7 @@ from scenarios.plots.boxes import Sample, error_boxes
 from scenarios.plots.forest import Interval, intervals
 from scenarios.plots.histogram import z_histogram
 from scenarios.plots.hysteresis import BACK, FORTH, Flank, hysteresis, strokes
+from scenarios.plots.slipping_base import Banded, banded, friction_use, loop
 from scenarios.plots.style import ESTIMATE, MISSED, TRUTH, drawing, figure, svg
 from scenarios.plots.trace import Line, error_traces, measured_beside, thinned
 
@@ -154,3 +155,21 @@ def test_svg_is_the_same_every_time_has_its_own_ids_and_no_reference_outside():
 def test_the_frames_in_the_documents_are_those_of_the_report():
     documented, reported = ROOT / "docs/frames.svg", ROOT / "scenarios/report/frame_chain.svg"
     assert documented.read_bytes() == reported.read_bytes()
+
+
+def test_a_slipping_base_is_shown_with_band_loop_and_friction(ax):
+    t = np.linspace(0.0, 9.0, 500)
+    axis = Banded(t, np.sin(t), 0.9 * np.sin(t), np.full(500, 0.1))
+    assert banded(axis, "yaw [mrad]", ax) is ax
+    (band,) = ax.patches
+    np.testing.assert_allclose(band.get_xy()[0], [0.0, -0.196])
+    assert ax.get_ylabel() == "yaw [mrad]"
+    assert {line.get_label() for line in ax.lines} == {"measured", "predicted"}
+    ax.clear()
+    loop(5.0 * np.sin(t), axis, ax)
+    np.testing.assert_allclose([ax.lines[1].get_xdata(), ax.lines[1].get_ydata()], [5.0 * np.sin(t), 0.9 * np.sin(t)])
+    ax.clear()
+    friction_use(t, np.outer(t / 9.0, [1.0, 0.5]), ("left", "right"), ax)
+    assert names(ax) == ["left", "right"]
+    assert ax.images[0].get_array().shape == (2, 500)
+    assert ax.images[0].get_array().max() == 1.0

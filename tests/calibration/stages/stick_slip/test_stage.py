@@ -74,7 +74,7 @@ def test_without_joints_the_plate_alone_moves_the_base(recorded, suspension):
     heading = np.arctan2(found.T_lab_B[:, 1, 0], found.T_lab_B[:, 0, 0])
     error = heading - heading[:50].mean() - true
     assert (error**2).sum() < 0.1 * (true**2).sum()
-    assert found.variance.shape == (len(new.t_mocap), 6)
+    assert found.motion.variance.shape == (len(new.t_mocap), 6)
 
 
 def test_a_base_that_was_moved_is_named(recorded, suspension):
