@@ -215,4 +215,5 @@ def _plate(text: CsvText, name: str, of: dict[str, Triple]) -> PlateView:
         f"{key}: [{', '.join(t.columns)}]" for key, t in sorted(of.items(), key=lambda x: x[0] != "force")
     )
     layout = f"{columns}, axes: lab, about: {about}, force_unit: N, moment_unit: {unit}"
-    return PlateView(name, np.concatenate([force, moment], axis=1), centre, np.eye(3), size, layout)
+    wrench = np.concatenate([force, moment], axis=1)
+    return PlateView(name, wrench, centre, np.eye(3), size, layout, of["force"].columns)

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calibration.formats.survey.bodies import FoundBody
+from calibration.formats.survey.plate_signs import division, reversed_force
 from calibration.formats.survey.session import Session, sigmas_of
 from calibration.formats.survey.trials import kind_of
 from calibration.formats.survey.view import FileView, PlateView
@@ -126,6 +127,14 @@ def _trials(session: Session) -> Iterator[str]:
     for name, recorded in session.trials.items():
         kinds.setdefault(kind_of(recorded, session.bodies), []).append(name)
     yield "trials:"
+    if list(kinds) == ["swing"] and len(session.trials) == 1 and session.bodies:
+        ((name, recorded),) = session.trials.items()
+        if (parts := division(recorded, session.bodies[-1])) is not None:
+            why = f"{CHOOSE}: a log of one file, divided at a rest; role validation keeps a part aside"
+            for k, part in enumerate(([0.0, parts[0]], [parts[0], parts[1]])):
+                entry = {"id": f"{name}_{k + 1}", "file": name, "role": "calibration", "kind": "swing", "part": part}
+                yield f"  - {flow(entry)}{'' if k else f'  {why}'}"
+            return
     for kind, names in kinds.items():
         yield f"  {kind}: {flow(names)}"
     yield f"validation: []  {CHOOSE}: trials kept aside for the error: another motion, other postures"
@@ -146,12 +155,12 @@ def _layouts(session: Session) -> Iterator[str]:
         lines = [f"suffix: {session.tails[view.path.name]}", *layout]
         why = "of a posture's mean position of a marker [m]"
         lines += [f"marker_std: {sigmas_of(session)['marker']:g}  {CHOOSE}: {why}"] if static else []
-        yield from _nested(lines + list(_plate_lines(view)), view)
+        yield from _nested(lines + list(_plate_lines(session, view)), view)
     for kind, views in others.items():
         yield f"{kind}:"
         standing = max(views, key=lambda v: len(v.plates))
         shown = dict.fromkeys(line for v in views for line in v.layout)
-        yield from (f"  {line}" for line in [*shown, *_plate_lines(standing), *_unused(views[0])])
+        yield from (f"  {line}" for line in [*shown, *_plate_lines(session, standing), *_unused(views[0])])
 
 
 def _nested(lines: list[str], view: FileView) -> Iterator[str]:
@@ -159,7 +168,7 @@ def _nested(lines: list[str], view: FileView) -> Iterator[str]:
     yield from (f"    {line}" for line in [*lines[1:], *_unused(view)])
 
 
-def _plate_lines(view: FileView) -> Iterator[str]:
+def _plate_lines(session: Session, view: FileView) -> Iterator[str]:
     if view.plates:
         yield "plates:"
     for p in view.plates:
@@ -169,7 +178,9 @@ def _plate_lines(view: FileView) -> Iterator[str]:
             if view.kind == "csv"
             else f"whose wrench: {force:+.0f} N upwards"
         )
-        yield f"  {flow(p.name)}: {{{p.layout}, convention: {p.convention}}}  {CHOOSE}: {why}"
+        wrong = reversed_force(p, view.recorded.markers, session.bodies[-1]) if session.bodies else ""
+        signs, seen = (f", reversed: [{wrong}]", f"; {wrong} against the hand's motion") if wrong else ("", "")
+        yield f"  {flow(p.name)}: {{{p.layout}{signs}, convention: {p.convention}}}  {CHOOSE}: {why}{seen}"
 
 
 def _unused(view: FileView) -> Iterator[str]:

@@ -19,6 +19,7 @@ class PlateView:
         axes: (3, 3) its axes as rows [lab].
         size: Edge lengths [m]; NaN where not known.
         layout: Its line of the mapping, without the convention.
+        force: Columns of its force, where a column has a name.
     """
 
     name: str
@@ -27,6 +28,7 @@ class PlateView:
     axes: np.ndarray
     size: tuple[float, float]
     layout: str
+    force: tuple[str, ...] = ()
 
     @property
     def convention(self) -> str:
