@@ -108,6 +108,15 @@ class Estimate:
         model = next((m for m in self.models if m.name == self.main), None)
         return model is not None and any(p.name.startswith(_GEOMETRY) for p in model.parameters)
 
+    @property
+    def extent(self) -> str:
+        """How far it is calibrated: `calibrated`, only the part that was, or `not calibrated`."""
+        if not self.calibrated:
+            return "not calibrated"
+        if self.has_geometry:
+            return "calibrated"
+        return "suspension only" if self.main == "model_1" else f"{self.main or 'clocks'} only"
+
 
 def with_clocks(model: Model, clocks: Iterable[Clock]) -> Model:
     """The model with `clock.<instrument>.{offset,drift}` after its own parameters."""

@@ -151,7 +151,7 @@ def calibrate(
         options = steps.options(terms=terms, suspension=suspension)
         estimate = steps.calibrate(dataset, out, chosen, progress, options, plan_next)
     console.show(console.verdicts(estimate.verdicts))
-    typer.echo(f"\nEstimate: {out}")
+    typer.echo(f"\nStatus: {estimate.extent}\nEstimate: {out}")
     if not estimate.calibrated:
         typer.echo("The estimate must not be used; the refused verdicts say why.", err=True)
         raise typer.Exit(FAILED)
@@ -182,8 +182,8 @@ def evaluate(
 
 
 @app.command(epilog=_example("report runs/short"))
-def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
-    """Write report.html from what a run folder holds."""
+def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, or an estimate.")]) -> None:
+    """Write report.html from what a run folder or an estimate holds."""
     from scenarios import steps
     from scenarios.commands import console
 

@@ -24,10 +24,9 @@ def process(
     if found.evaluated:
         console.show(console.ladder(out))
         console.show(console.points(out))
-        typer.echo(f"\nReport: {out / 'report.html'}")
-    else:
-        typer.echo("\nNo validation trial: the error is the cross-validated one above; keep trials aside for a report.")
-    typer.echo(f"Estimate: {out / 'estimate'}")
+    elif found.estimate.has_geometry:
+        typer.echo("\nNo validation trial: the error is the cross-validated one above; keep trials aside for another.")
+    typer.echo(f"\nStatus: {found.estimate.extent}\nReport: {out / 'report.html'}\nEstimate: {out / 'estimate'}")
     if not found.estimate.calibrated:
         typer.echo("The estimate must not be used; the refused verdicts say why.", err=True)
         raise typer.Exit(FAILED)

@@ -46,6 +46,7 @@ ESTIMATE = Kind(
             "parameters.csv",
             "record_next.yaml",
         }
+        | REPORT
     ),
 )
 DATASET = Kind("dataset", "dataset.json", frozenset({"dataset.json", "nominal.urdf", "trials"}))

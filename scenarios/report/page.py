@@ -12,7 +12,7 @@ from scenarios.plots.style import svg
 from scenarios.report.results import formatting
 from scenarios.report.results.run_results import read
 from scenarios.report.results.section import Drawn, RunView, Section, run_view
-from scenarios.report.sections import SECTIONS
+from scenarios.report.sections import SECTIONS, UNEVALUATED
 
 _HERE = Path(__file__).parent
 _FILTERS = ("fixed", "significant", "count", "cell", "decimals")
@@ -51,12 +51,12 @@ def write(run_dir: Path | str) -> None:
     """Write RUN/report.html and RUN/figures/*.svg from what is saved in RUN.
 
     Raises:
-        ScenarioError: There is no evaluation, or a file cannot be read.
+        ScenarioError: There is neither evaluation nor estimate, or a file cannot be read.
         InputError: The dataset or the estimate cannot be read.
     """
     run = Path(run_dir)
     view = run_view(read(run))
-    sections = [section(view) for section in SECTIONS]
+    sections = [section(view) for section in (SECTIONS if view.steps else UNEVALUATED)]
     drawings = {name: _drawing(name, drawn) for one in sections for name, drawn in one.figures().items()}
     page = render(view, sections, {name: drawing for name, drawing in drawings.items() if drawing is not None})
     folder = run / "figures"
@@ -79,8 +79,8 @@ def render(view: RunView, sections: Iterable[Section], drawings: Mapping[str, Dr
         "results": view.results,
         "drawings": drawings,
         "seeded": "" if seed is None else f", seed {seed}",
-        "split": view.steps[0].trials,
-        "n": (view.headline or view.steps[0]).main.n,
+        "split": view.steps[0].trials if view.steps else "",
+        "n": (view.headline or view.steps[0]).main.n if view.steps else 0,
     }
     figure, table = Numbers(), Numbers()
     for _ in range(2):

@@ -1,6 +1,6 @@
 """From laboratory files or a dataset to everything that can be said of them, in one folder.
 
-mapping.yaml -> dataset/ -> estimate/ -> evaluation.json, report.html where validation trials were recorded
+mapping.yaml -> dataset/ -> estimate/, report.html; evaluation.json where validation trials were recorded
 """
 
 import shutil
@@ -26,7 +26,7 @@ class Processed:
 
     Attributes:
         estimate: What the calibration found.
-        evaluated: Whether trials were kept aside, so that there are an evaluation and a report.
+        evaluated: Whether trials were kept aside, so that there is an evaluation.
         notes: What was recognised in the files.
     """
 
@@ -58,5 +58,5 @@ def process(source: Path, out: Path, progress: Progress = silent) -> Processed:
         evaluated = estimate.calibrated and bool(load(dataset).entries("validation"))
         if evaluated:
             run_steps.evaluate(new / "estimate", dataset, new, progress=progress)
-            run_steps.report(new, progress)
+        run_steps.report(new, progress)
     return Processed(estimate, evaluated, notes)

@@ -1,4 +1,4 @@
-"""What a run folder holds, read for its report: every file but evaluation.json may be missing."""
+"""What a run folder holds, read for its report: every file but evaluation.json or an estimate may be missing."""
 
 import hashlib
 import json
@@ -64,20 +64,21 @@ def read(run: Path) -> Results:
     """Read a run folder.
 
     Raises:
-        ScenarioError: There is no evaluation, or a file cannot be read.
+        ScenarioError: There is neither evaluation nor estimate, or a file cannot be read.
         InputError: The dataset or the estimate cannot be read.
     """
-    evaluation = run / "evaluation.json"
-    if not evaluation.is_file():
+    evaluation, dataset, picture = run / "evaluation.json", run / "dataset", run / "figures" / "twin.png"
+    estimate = run if (run / "estimate.json").is_file() else run / "estimate"
+    evaluated = evaluation.is_file()
+    if not evaluated and not (estimate / "estimate.json").is_file():
         raise ScenarioError(f"{run}: holds no evaluation.json; make it with tiago-twin evaluate, see its --help")
-    estimate, dataset, picture = run / "estimate", run / "dataset", run / "figures" / "twin.png"
     loaded = calibration.load(dataset) if (dataset / "dataset.json").is_file() else None
     trials = loaded.description.trials if loaded else ()
     truth = run / "truth" / "truth.json"
     derived = _json(truth, Truth).derived if truth.is_file() else Derived()
     return Results(
-        evaluation=_json(evaluation, Evaluation),
-        traces=read_traces(run / "evaluation.nc"),
+        evaluation=_json(evaluation, Evaluation) if evaluated else Evaluation(rows=()),
+        traces=read_traces(run / "evaluation.nc") if evaluated else (),
         score=_json(run / "score.json", Score) if (run / "score.json").is_file() else None,
         estimate=calibration.load_estimate(estimate) if (estimate / "estimate.json").is_file() else None,
         scenario=read_scenario(run / "scenario.yaml"),

@@ -3,6 +3,7 @@
 from scenarios.report.results.section import Section
 from scenarios.report.sections.base_motion import BaseMotion
 from scenarios.report.sections.errors import HeldOutErrors
+from scenarios.report.sections.fitted import Fitted
 from scenarios.report.sections.frames import Frames
 from scenarios.report.sections.joints import Joints
 from scenarios.report.sections.ladder import Ladder
@@ -30,3 +31,5 @@ SECTIONS: tuple[type[Section], ...] = (
     Stages,
     Reproduce,
 )
+UNEVALUATED: tuple[type[Section], ...] = (Fitted, Parameters, Recordings, Stages)
+"""Those of a fit without held-out trials."""

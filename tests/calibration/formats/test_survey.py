@@ -1,5 +1,7 @@
 """A mapping drafted from files: what is in them, and what is left to choose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,9 +9,10 @@ import mjcf
 from calibration.errors import InputErrors
 from calibration.formats.mapping.channels import Markers, Recorded
 from calibration.formats.mapping.short_form import TYPICAL, written_out
-from calibration.formats.survey.bodies import found_bodies
+from calibration.formats.survey.bodies import FoundBody, found_bodies
 from calibration.formats.survey.csv_view import view_csv
 from calibration.formats.survey.draft import CHOOSE, draft
+from calibration.formats.survey.plate_signs import reversed_force
 from calibration.formats.survey.robot import read_urdf
 from calibration.formats.survey.session import session_of
 from calibration.formats.survey.trials import suffixes
@@ -17,6 +20,7 @@ from calibration.formats.survey.view import FileView
 from scenarios.files.errors import ScenarioError
 from scenarios.steps import import_export
 from tests.calibration.formats.test_csv import postures, series, write_csv
+from tests.doubles.real_postures import ROOT
 
 ROBOT = read_urdf(mjcf.urdf())
 
@@ -54,6 +58,26 @@ def test_a_plate_shows_its_centre_by_its_pressure(tmp_path):
     (plate,) = view_csv(write_csv(tmp_path / "log.csv", columns), ROBOT).plates
     np.testing.assert_allclose(plate.centre, 0.0, atol=1e-6)
     assert plate.convention == "action" and "moment_unit: N.m" in plate.layout
+
+
+def test_a_log_of_one_file_asks_for_one_line(tmp_path):
+    log = ROOT / "tests/data/vicon_forceplate_2023-09-20.csv"
+    text = import_export.init_mapping([log], tmp_path / "lab.yaml")
+    assert [line.split()[2] for line in text.splitlines() if "CHOOSE" in line.split("#")[0]] == ["base,"]
+    assert "reversed: [Fy]" in text and text.count("part: [") == 2
+    (tmp_path / "lab.yaml").write_text(text.replace("heading: CHOOSE", "heading: -1.614"))
+    described = import_export.read_mapping(tmp_path / "lab.yaml")
+    assert [t.part for t in described.trials] == [(0.0, 21.6), (21.6, 33.7)]
+
+
+def test_only_a_force_against_the_motion_of_the_hand_is_reversed():
+    view = view_csv(ROOT / "tests/data/vicon_forceplate_2023-09-20.csv", ROBOT)
+    (plate,), hand = view.plates, FoundBody("gripper", ("gripper1", "gripper2", "gripper3"), 1.0)
+    right = replace(plate, wrench=plate.wrench * [1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+    reaction = replace(right, wrench=-right.wrench)
+    found = [reversed_force(p, view.recorded.markers, hand) for p in (plate, right, reaction)]
+    assert found == ["Fy", "", ""]
+    assert reversed_force(plate, view.recorded.markers, replace(hand, markers=("base1", "base2", "base3"))) == ""
 
 
 def test_labels_are_grouped_by_rigid_distances():

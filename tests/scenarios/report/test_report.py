@@ -264,7 +264,6 @@ def test_the_headline_is_the_main_model_where_it_was_evaluated(whole):
 @pytest.mark.parametrize(
     ("file", "content", "said"),
     [
-        ("evaluation.json", None, "holds no evaluation.json"),
         ("evaluation.json", "{", "broken JSON"),
         ("evaluation.json", '{"rows": [{"model": 3}]}', "rows.0.model"),
         ("score.json", "{}", "rows: Field required"),
@@ -274,10 +273,17 @@ def test_the_headline_is_the_main_model_where_it_was_evaluated(whole):
 )
 def test_what_cannot_be_read_is_named(run, file, content, said):
     before = (run / "report.html").read_bytes()
-    (run / file).unlink() if content is None else (run / file).write_text(content)
+    (run / file).write_text(content)
     with pytest.raises((ScenarioError, InputError), match=re.escape(said)):
         write(run)
     assert (run / "report.html").read_bytes() == before
+
+
+def test_neither_evaluation_nor_estimate_is_named(run):
+    (run / "evaluation.json").unlink()
+    (run / "estimate" / "estimate.json").unlink()
+    with pytest.raises(ScenarioError, match=r"holds no evaluation\.json"):
+        write(run)
 
 
 def test_the_command_writes_the_report(run, plain):

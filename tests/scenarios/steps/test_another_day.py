@@ -57,6 +57,14 @@ def test_a_later_day_is_predicted_from_the_estimate_alone(days):
     assert norm == pytest.approx(1.0) and 0.0 < float(table[0]["sigma_position"]) < 1e-3
 
 
+def test_a_fit_without_a_trial_kept_aside_has_a_report(days):
+    page = (days / "lab/report.html").read_text()
+    assert "hand error at left-out postures" in page and ">calibrated<" in page
+    with pytest.raises(SystemExit) as exit:
+        main.main(["report", str(days / "lab/estimate")])
+    assert exit.value.code in (0, None) and (days / "lab/estimate/report.html").is_file()
+
+
 def test_markers_put_on_anew_are_registered_with_a_few_postures(days):
     assert predicted(days, "remounted")[0] > 2.0
     error, _, out = predicted(days, "remounted", "--register", "6")
