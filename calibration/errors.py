@@ -62,3 +62,14 @@ class NotCalibrated(CalibrationError):
     def __init__(self, reasons: Sequence[str]) -> None:
         self.reasons = tuple(reasons)
         super().__init__(f"the estimate is not calibrated and must not be used: {'; '.join(reasons) or 'no model'}")
+
+
+class NumericalFailure(CalibrationError):
+    """A computation that broke down: its stage, the quantity, and what the numbers did."""
+
+    def __init__(self, stage: str, quantity: str, why: str) -> None:
+        self.stage, self.quantity = stage, quantity
+        super().__init__(
+            f"{stage}: numerical failure, {why}, in: {quantity}; the recordings or the sigmas, tolerances and inertias "
+            "in dataset.json are out of all proportion (look at them with `tiago-twin look`)"
+        )

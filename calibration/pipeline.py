@@ -9,6 +9,7 @@ purpose, are for `base_frame` alone; all other stages use the trials in which it
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from calibration.breakdown import Breakdowns
 from calibration.checks.recordings import implausible_inputs
 from calibration.context import Context, with_postures
 from calibration.design.next_motions import drive_next, sweeps_next, swings_next
@@ -68,9 +69,21 @@ def calibrate(
         NoSuchElement: A stage of that name does not exist.
         InputError: There is no calibration trial.
         NotEnoughData: There is none from which the clocks can be estimated.
+        NumericalFailure: The numbers of a stage broke down.
     """
+    with Breakdowns("reading", progress) as tell:
+        return _calibrated(dataset, stages, tell, options, plan_next, cross_validate)
+
+
+def _calibrated(
+    dataset: Dataset,
+    stages: Sequence[str] | None,
+    tell: Progress,
+    options: Options | None,
+    plan_next: bool,
+    cross_validate: bool,
+) -> Estimate:
     wanted = _wanted(_usual(dataset) if stages is None else stages)
-    tell = progress or (lambda stage, share: None)
     lab = Laboratory(dataset.urdf, dataset.description)
     tell("reading", 0.0)
     pairs, means = tuple(relabelled_trials(dataset, "calibration")), tuple(m for _, m in dataset.means("calibration"))

@@ -38,6 +38,7 @@ from calibration.recording import netcdf
 from calibration.recording.experiment import plans_text, read_plans
 from calibration.robot.chain import Chain, chain_of_frames
 from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.untrusted import checked_urdf, findings, json_of, read_text
 
 JSON, COVARIANCES, NOMINAL = "estimate.json", "estimate.nc", "nominal.urdf"
 CALIBRATED, ZEROS, TABLE = "calibrated.urdf", "master_calibration.yaml", "parameters.csv"
@@ -78,34 +79,23 @@ def load_estimate(path: Path | str, zeros: Path | str | None = None) -> Estimate
     """
     path = Path(path)
     file = path / JSON if path.is_dir() else path
-    text = _text(file)
+    text = read_text(file, hint="an estimate is a folder with estimate.json, or a URDF")
     if file.suffix.lower() in (".urdf", ".xml"):
         parameters = () if zeros is None else zero_parameters(read_zeros(zeros))
+        checked_urdf(text, file)
         model = Model(file.stem, parameters, covariance=np.zeros((len(parameters), len(parameters))))
         return Estimate("calibrated", (), (), (model,), file.stem, text, registered=False)
     if zeros is not None:
         raise InputError(zeros, f"zeros go with a URDF; {file.name} has its own")
     try:
-        found = EstimateFile.model_validate(json.loads(text))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{file}:{error.lineno}:{error.colno}", f"broken JSON: {error.msg}") from error
+        found = EstimateFile.model_validate(json_of(text, file))
     except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc'])) or 'estimate'}: {e['msg']}" for e in error.errors()]
-        raise InputError(file, "; ".join(lines)) from error
+        raise InputError(file, findings(error, "estimate")) from error
     nominal = file.parent / NOMINAL
-    urdf = _text(nominal) if nominal.is_file() else None
+    urdf = checked_urdf(read_text(nominal), nominal) if nominal.is_file() else None
     suggested = file.parent / NEXT
     remedies = read_plans(suggested)[1] if suggested.is_file() else ()
     return replace(to_estimate(found, urdf, _read_covariances(file.parent / COVARIANCES)), remedies=remedies)
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise InputError(path, "no such file; an estimate is a folder with estimate.json, or a URDF") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(path, f"cannot be read ({error})") from error
 
 
 def _replace_text(path: Path, text: str) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.estimate.json_stage_models import (
@@ -22,7 +22,7 @@ from calibration.estimate.plain_values import plain, restored
 from calibration.inference.parameters import Combination, Model, Parameter, Status
 from calibration.options import Options
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description
+from calibration.recording.schema import Description, Name, Number, refuse_repeated
 from calibration.stages.bundle.robot import BundleParts
 from calibration.verdict import Verdict
 
@@ -38,8 +38,8 @@ class ParameterEntry(Entry):
 
     name: str
     unit: str = ""
-    nominal: float = 0.0
-    value: float
+    nominal: Number = 0.0
+    value: Number
     sigma: float | None = None
     status: Status = "estimated"
 
@@ -69,6 +69,12 @@ class ModelEntry(Entry):
     rank: int = 0
     condition: float = 0.0
     hand_error: tuple[float, ...] = ()
+
+    @field_validator("parameters")
+    @classmethod
+    def _are_named_once(cls, parameters: tuple[ParameterEntry, ...]) -> tuple[ParameterEntry, ...]:
+        refuse_repeated({"parameters": [p.name for p in parameters]})
+        return parameters
 
 
 class VerdictEntry(Entry):
@@ -104,7 +110,7 @@ class EstimateFile(Entry):
     schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
     status: Literal["calibrated", "not_calibrated"] = "calibrated"
     verdicts: tuple[VerdictEntry, ...] = ()
-    models: dict[str, ModelEntry]
+    models: dict[Name, ModelEntry]
     main: str = ""
     clocks: tuple[ClockEntry, ...] = ()
     robot: RobotEntry | None = None
@@ -117,6 +123,13 @@ class EstimateFile(Entry):
     bundle: dict[str, Any] | None = None
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore", validate_by_name=True)
+
+    @model_validator(mode="after")
+    def _is_of_one_robot(self) -> "EstimateFile":
+        n = len(self.link_zero)
+        if self.robot is not None and n not in (0, len(self.robot.joints)):
+            raise ValueError(f"link_zero has {n} values for {len(self.robot.joints)} joints")
+        return self
 
 
 def to_file(estimate: Estimate) -> EstimateFile:

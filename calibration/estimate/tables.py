@@ -18,12 +18,11 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from calibration.errors import InputError
 from calibration.inference.parameters import Model, Parameter
 from calibration.robot.hand import HandModel
+from calibration.untrusted import findings, read_text, yaml_of
 
 COLUMNS = ("name", "value", "sigma", "unit", "status", "nominal", "model")
 _HEADER = """\
@@ -85,20 +84,19 @@ def read_zeros(path: Path | str) -> tuple[Zero, ...]:
         InputError: It is not such a list.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_text(path)
         if Path(path).suffix.lower() == ".csv":
             entries = [
                 {k: v for k, v in row.items() if v not in (None, "")} for row in csv.DictReader(io.StringIO(text))
             ]
         else:
-            entries = YAML(typ="safe", pure=True).load(text)
+            entries = yaml_of(text, path)
         if isinstance(entries, dict):
             entries = [{"joint": joint, "offset": offset} for joint, offset in entries.items()]
         return TypeAdapter(tuple[Zero, ...]).validate_python(entries)
     except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
-        raise InputError(path, "; ".join(lines)) from error
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        raise InputError(path, findings(error, "file")) from error
+    except csv.Error as error:
         raise InputError(path, f"not a list of joints and offsets ({error})") from error
 
 

@@ -1,6 +1,5 @@
 """A dataset folder: dataset.json, nominal.urdf and the trials, each read on demand."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,9 @@ from calibration.errors import InputError, NoSuchElement
 from calibration.recording.posture_means import PostureMeans, holds_means, read_means
 from calibration.recording.schema import Description, Role, TrialEntry
 from calibration.recording.trial import Trial, read_trial, sha256
+from calibration.untrusted import check_file, checked_urdf, findings, read_json, read_text
+
+_MOST_BYTES = 2**30  # [B] of a trial's file
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Dataset:
             InputError: The file is damaged, changed since it was listed, names other joints, or holds means only.
         """
         trial = read_trial(self._unchanged(entry), entry.id)
-        self._check_joints(entry, trial.joint)
+        self._check_names(entry, trial)
         return trial
 
     def read_means(self, entry: TrialEntry) -> PostureMeans:
@@ -48,7 +50,7 @@ class Dataset:
             InputError: As `read`.
         """
         means = read_means(self._unchanged(entry), entry.id)
-        self._check_joints(entry, means.joint)
+        self._check_names(entry, means)
         return means
 
     def has_means(self, entry: TrialEntry) -> bool:
@@ -69,14 +71,24 @@ class Dataset:
 
     def _unchanged(self, entry: TrialEntry) -> Path:
         path = self.folder / entry.file
-        if path.is_file() and sha256(path) != entry.sha256:
+        check_file(path, _MOST_BYTES)
+        if not path.resolve().is_relative_to(self.folder.resolve()):
+            raise InputError(path, f"is a link out of the dataset, to {path.resolve()}; copy the file into it")
+        if sha256(path) != entry.sha256:
             raise InputError(path, "its sha256 is not the one in dataset.json: truncated or changed; copy it again")
         return path
 
-    def _check_joints(self, entry: TrialEntry, joints: tuple[str, ...]) -> None:
-        if joints != self.description.joint_names:
-            path = self.folder / entry.file
-            raise InputError(path, f"joints {joints}, dataset.json has {self.description.joint_names}")
+    def _check_names(self, entry: TrialEntry, trial: Trial | PostureMeans) -> None:
+        path, about = self.folder / entry.file, self.description
+        if trial.joint != about.joint_names:
+            raise InputError(path, f"joints {trial.joint}, dataset.json has {about.joint_names}")
+        owners = {m.name: b.name for b in about.bodies for m in b.markers}
+        stray = [m for m, b in zip(trial.marker, trial.marker_body, strict=True) if owners.get(m) != b]
+        if stray:
+            raise InputError(path, f"markers {stray[:5]} are on no body of dataset.json, or on another one")
+        plates = [p for p in getattr(trial, "plate", ()) if p not in {known.name for known in about.plates}]
+        if plates:
+            raise InputError(path, f"plates {plates[:5]} are not in dataset.json")
 
 
 def load(folder: Path | str) -> Dataset:
@@ -95,30 +107,17 @@ def load(folder: Path | str) -> Dataset:
     return Dataset(folder, description, _read_urdf(folder / "nominal.urdf", description))
 
 
-def _read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise InputError(path, "no such file; a dataset needs it") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(path, f"cannot be read ({error})") from error
-
-
 def _read_description(path: Path) -> Description:
-    text = _read_text(path)
     try:
-        return Description.model_validate(json.loads(text))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}:{error.lineno}:{error.colno}", f"broken JSON: {error.msg}") from error
+        return Description.model_validate(read_json(path, "a dataset needs it"))
     except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc'])) or 'dataset'}: {e['msg']}" for e in error.errors()]
-        raise InputError(path, "; ".join(lines)) from error
+        raise InputError(path, findings(error, "dataset")) from error
 
 
 def _read_urdf(path: Path, description: Description) -> str:
     import pinocchio as pin  # so that the format alone, as the twin writes it, needs no Pinocchio
 
-    text = _read_text(path)
+    text = checked_urdf(read_text(path, hint="a dataset needs it"), path)
     try:
         model = pin.buildModelFromXML(text)
     except (ValueError, RuntimeError) as error:
@@ -128,6 +127,7 @@ def _read_urdf(path: Path, description: Description) -> str:
         ("joint", description.joint_names, joints),
         ("frame", (description.base_frame, description.tool_frame, *(b.link for b in description.bodies)), frames),
         ("frame", () if description.wrist_link is None else (description.wrist_link,), frames),
+        ("frame", () if description.payload is None else (description.payload.link,), frames),
     ):
         for name in names:
             if name not in known:

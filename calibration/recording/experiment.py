@@ -22,9 +22,9 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from calibration.errors import InputError
+from calibration.untrusted import findings, read_text, yaml_of
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -112,16 +112,14 @@ def read_plans(path: Path | str) -> tuple[tuple[str, ...], tuple[ExperimentPlan,
     Raises:
         InputError: It is not such a file.
     """
+    found = yaml_of(read_text(path), path)
+    if not isinstance(found, dict):
+        raise InputError(path, "not a file of postures and motions")
     try:
-        found = YAML(typ="safe", pure=True).load(Path(path).read_text(encoding="utf-8"))
-        found = dict(found) | {"schema_version": found.get("schema")}
-        found.pop("schema", None)
-        file = TypeAdapter(_File).validate_python(found)
+        named = {"schema_version" if name == "schema" else str(name): value for name, value in found.items()}
+        file = TypeAdapter(_File).validate_python(named)
     except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
-        raise InputError(path, "; ".join(lines)) from error
-    except (OSError, UnicodeDecodeError, YAMLError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(path, f"not a file of postures and motions ({error})") from error
+        raise InputError(path, findings(error, "file")) from error
     wrong = [
         i for r in file.remedies for i, p in enumerate(r.postures) if {len(p.q), len(p.approach)} != {len(file.joints)}
     ]

@@ -5,6 +5,7 @@ Signals are packed; the same data give the same bytes. The library is not safe f
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -17,6 +18,8 @@ from calibration.errors import InputError
 Group = netCDF4.Dataset | netCDF4.Group
 _NO_UNIT = {"units": "none", "frame": "none", "clock": "none"}
 _one_at_a_time = RLock()
+_MOST_NUMBERS = 20_000_000  # of a variable: 160 MB
+_MOST_LABELS, _LONGEST_LABEL = 1000, 200
 
 
 @contextmanager
@@ -26,8 +29,11 @@ def created(path: Path) -> Iterator[netCDF4.Dataset]:
     Raises:
         OSError: It cannot be written.
     """
-    with _one_at_a_time, netCDF4.Dataset(path, "w", format="NETCDF4") as file:
-        yield file
+    try:
+        with _one_at_a_time, netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+            yield file
+    except RuntimeError as error:  # the library's only word for a full disk
+        raise OSError(f"{path}: cannot be written ({error}); is the disk full?") from error
 
 
 @contextmanager
@@ -41,8 +47,9 @@ def opened(path: Path, remedy: str = "copy or record it again") -> Iterator[netC
         with _one_at_a_time, netCDF4.Dataset(path, "r") as file:
             file.set_auto_mask(False)
             yield file
-    except (OSError, RuntimeError, KeyError) as error:
-        raise InputError(path, f"not a readable netCDF4 file ({error}); {remedy}") from error
+    except (OSError, RuntimeError, KeyError, ValueError, IndexError, AttributeError) as error:
+        why = error.args[0] if isinstance(error, KeyError) and error.args else error
+        raise InputError(path, f"not a readable netCDF4 file ({why}); {remedy}") from error
 
 
 def add_dimensions(group: Group, sizes: Mapping[str, int]) -> None:
@@ -70,14 +77,40 @@ def write_variable(
 
 
 def labels(group: Group, name: str) -> tuple[str, ...]:
-    """Names along a dimension; none where the file has no such variable."""
-    return tuple(str(value) for value in group.variables[name][...]) if name in group.variables else ()
+    """Names along a dimension; none where the file has no such variable.
+
+    Raises:
+        KeyError: They are no plain names, or too many.
+    """
+    if name not in group.variables:
+        return ()
+    variable = group.variables[name]
+    if variable.size > _MOST_LABELS:
+        raise KeyError(f"{name} has {variable.size} names")
+    found = tuple(str(value) for value in np.ravel(variable[...]))
+    if any(len(text) > _LONGEST_LABEL or not text.isprintable() for text in found):
+        raise KeyError(f"{name} has names that are too long, or unprintable")
+    return found
 
 
 def array(group: Group, name: str) -> np.ndarray:
     """The numbers of a variable, f8.
 
     Raises:
-        KeyError: There is none of that name.
+        KeyError: There is none of that name, it holds no numbers, or too many.
     """
-    return np.asarray(group.variables[name][...], dtype=float)
+    variable = group.variables[name]
+    if getattr(variable.dtype, "kind", "O") not in "iuf":
+        raise KeyError(f"{name} holds no numbers")
+    check_size(name, variable.shape)
+    return np.asarray(variable[...], dtype=float)
+
+
+def check_size(name: str, shape: tuple[int, ...]) -> None:
+    """See that an array has room, before it is asked for.
+
+    Raises:
+        KeyError: It has not.
+    """
+    if prod(shape) > _MOST_NUMBERS:
+        raise KeyError(f"{name} has {' x '.join(map(str, shape))} numbers; at most {_MOST_NUMBERS:.0e} are read")

@@ -110,4 +110,6 @@ def read_means(path: Path, trial_id: str | None = None) -> PostureMeans:
     seen = np.isfinite(means.marker_position)
     if not (means.marker_position_std[seen] > 0.0).all():
         raise InputError(path, "marker_position_std is not above 0 everywhere; give each mean its standard deviation")
+    if not np.isfinite(means.q_motor).all():
+        raise InputError(path, "q_motor is not finite everywhere; leave such postures out")
     return means

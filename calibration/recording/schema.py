@@ -3,21 +3,31 @@
 SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and tolerances only.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from calibration.errors import NotEnoughData
 
-Vector3 = tuple[float, float, float]
-Vector6 = tuple[float, float, float, float, float, float]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+Vector3 = tuple[Number, Number, Number]
+Vector6 = tuple[Number, Number, Number, Number, Number, Number]
+Positive = Annotated[float, Field(ge=1e-12, le=1e9)]
+NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}$")]
+"""Plain: letters, digits, `_`, `-`, `.`; it becomes the name of files."""
+Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{0,200}$")]
+"""One line for people."""
 Role = Literal["calibration", "validation", "confirmation"]
 Kind = Literal["static", "sweep", "swing", "spin", "drive"]
 BASE, HAND = "base", "gripper"
+_ORTHOGONAL = 1e-3  # axes of a plate may be rounded [-]
+_GRAVITY = (0.5, 30.0)  # [m/s2]
+_MOST_JOINTS, _MOST_BODIES, _MOST_MARKERS, _MOST_TRIALS = 100, 100, 1000, 10_000
 
 
 class Declaration(BaseModel):
@@ -29,7 +39,7 @@ class Declaration(BaseModel):
 def refuse_repeated(groups: Mapping[str, Sequence[str]]) -> None:
     """Raise ValueError for the first group that holds a name more than once."""
     for group, names in groups.items():
-        twice = sorted({n for n in names if names.count(n) > 1})
+        twice = sorted(n for n, count in Counter(names).items() if count > 1)
         if twice:
             raise ValueError(f"{group} named more than once: {twice}")
 
@@ -37,7 +47,7 @@ def refuse_repeated(groups: Mapping[str, Sequence[str]]) -> None:
 class Joint(Declaration):
     """A measured joint: which encoders it has and how often they are logged [Hz]."""
 
-    name: str
+    name: Name
     encoders: tuple[Literal["motor", "link"], ...]
     rate: Positive
 
@@ -45,7 +55,7 @@ class Joint(Declaration):
 class Marker(Declaration):
     """A marker and its nominal position in its body's frame [m]."""
 
-    name: str
+    name: Name
     xyz: Vector3
 
 
@@ -55,9 +65,9 @@ class Body(Declaration):
     `placement` is the translation [m] and rotation vector [rad] of T_link_body where no drawing puts the two together.
     """
 
-    name: str
-    link: str
-    markers: tuple[Marker, ...]
+    name: Name
+    link: Name
+    markers: Annotated[tuple[Marker, ...], Field(max_length=_MOST_MARKERS)]
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     @property
@@ -74,7 +84,7 @@ class Body(Declaration):
 class Wheel(Declaration):
     """A wheel: hub centre and nominal floor contact point, in the base frame [m]."""
 
-    name: str
+    name: Name
     type: Literal["drive", "caster"]
     centre: Vector3
     contact: Vector3
@@ -83,16 +93,24 @@ class Wheel(Declaration):
 class Plate(Declaration):
     """A force plate: surface centre [m, lab], its axes as columns in the lab, edge lengths [m]."""
 
-    name: str
+    name: Name
     centre: Vector3
     axes: tuple[Vector3, Vector3, Vector3]
     size: tuple[Positive, Positive]
+
+    @field_validator("axes")
+    @classmethod
+    def _are_a_rotation(cls, axes: tuple[Vector3, Vector3, Vector3]) -> tuple[Vector3, Vector3, Vector3]:
+        R = np.array(axes)
+        if np.abs(R @ R.T - np.eye(3)).max() > _ORTHOGONAL or np.linalg.det(R) < 0.0:
+            raise ValueError("axes are not of unit length, at right angles and right-handed")
+        return axes
 
 
 class Payload(Declaration):
     """A declared load: mass [kg] and centre of mass [m] in the frame of `link`, with its tolerance on the mass [kg]."""
 
-    link: str
+    link: Name
     mass: NonNegative
     com: Vector3
     tolerance: NonNegative
@@ -150,13 +168,21 @@ class TrialEntry(Declaration):
     `payload` is the mass [kg] of the declared payload in this trial, where it differs from the campaign's.
     """
 
-    id: str
+    id: Name
     role: Role
     kind: Kind
-    motion: str
-    file: str
+    motion: Text
+    file: Annotated[str, Field(max_length=200)]
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     payload: NonNegative | None = None
+
+    @field_validator("file")
+    @classmethod
+    def _is_inside(cls, file: str) -> str:
+        path = PurePosixPath(file)
+        if path.is_absolute() or not path.parts or ".." in path.parts or not file.isprintable() or "\\" in file:
+            raise ValueError("name a file inside the dataset's folder, relative to it")
+        return file
 
 
 class Setup(Declaration):
@@ -168,19 +194,27 @@ class Setup(Declaration):
     `wrist_link` is the frame of the wrist's force-torque sensor, whose axes and origin `wrist_wrench` has.
     """
 
-    robot: str
-    base_frame: str
-    tool_frame: str
-    joints: tuple[Joint, ...]
-    wheels: tuple[Wheel, ...] = ()
-    plates: tuple[Plate, ...] = ()
+    robot: Text
+    base_frame: Name
+    tool_frame: Name
+    joints: Annotated[tuple[Joint, ...], Field(max_length=_MOST_JOINTS)]
+    wheels: Annotated[tuple[Wheel, ...], Field(max_length=_MOST_BODIES)] = ()
+    plates: Annotated[tuple[Plate, ...], Field(max_length=_MOST_BODIES)] = ()
     payload: Payload | None = None
     gravity: Vector3 = (0.0, 0.0, -9.81)
-    marker_frame: str = "lab"
+    marker_frame: Name = "lab"
     mocap_clock: tuple[Literal["robot", "plate"], ...] = ()
-    wrist_link: str | None = None
+    wrist_link: Name | None = None
     sigmas: Sigmas
     tolerances: Tolerances
+
+    @field_validator("gravity")
+    @classmethod
+    def _is_on_a_planet(cls, gravity: Vector3) -> Vector3:
+        size = float(np.linalg.norm(gravity))
+        if not _GRAVITY[0] < size < _GRAVITY[1]:
+            raise ValueError(f"is {size:g} m/s2 in size; it is within {_GRAVITY[0]} to {_GRAVITY[1]} m/s2")
+        return gravity
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -192,8 +226,8 @@ class Description(Setup):
     """The whole of dataset.json."""
 
     schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
-    bodies: tuple[Body, ...]
-    trials: tuple[TrialEntry, ...]
+    bodies: Annotated[tuple[Body, ...], Field(max_length=_MOST_BODIES)]
+    trials: Annotated[tuple[TrialEntry, ...], Field(max_length=_MOST_TRIALS)]
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True, serialize_by_alias=True
@@ -206,6 +240,7 @@ class Description(Setup):
             "bodies": [b.name for b in self.bodies],
             "markers": [m.name for b in self.bodies for m in b.markers],
             "plates": [p.name for p in self.plates],
+            "wheels": [w.name for w in self.wheels],
             "trials": [t.id for t in self.trials],
         }
         refuse_repeated(groups)

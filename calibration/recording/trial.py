@@ -53,6 +53,8 @@ _LABELS = ("joint", "marker", "marker_body", "plate")
 _OPTIONAL = "wrist_wrench"  # left out of a file that would hold NaN only
 _EXACT = ("t_robot", "t_mocap", "t_plate", "dwell_start", "dwell_stop", "plate_centre")
 REST = 1.0  # [s] at the start of every trial
+_STEPS = (1e-5, 1.0)  # [s] between samples
+_LONGEST, _MOST_SAMPLES = 14_400.0, 5_000_000  # [s] of a trial; samples of a grid over it
 
 
 class Variable(NamedTuple):
@@ -183,7 +185,7 @@ def read_trial(path: Path, trial_id: str | None = None) -> Trial:
     """Read a trial written by `write_trial`, or by anybody to the same layout.
 
     Raises:
-        InputError: The file is missing, truncated, lacks a variable, or its clocks do not increase.
+        InputError: The file is missing, truncated, lacks a variable, or its clocks and dwells are not in order.
     """
     if not path.is_file():
         raise InputError(path, "no such file; restore it or remove the trial from dataset.json")
@@ -191,11 +193,12 @@ def read_trial(path: Path, trial_id: str | None = None) -> Trial:
         with netcdf.opened(path) as file:
             missing = [n for n in ("joint", "marker", "marker_body", "t_robot", "q_motor") if n not in file.variables]
             if missing:
-                raise InputError(path, f"has no variable {missing}; see the layout in calibration/recording.py")
+                raise InputError(path, f"has no variable {missing}; see the layout in calibration/recording/trial.py")
             trial = _trial_from(file, trial_id or path.stem)
     except ShapeError as error:
         raise InputError(path, str(error)) from error
     _check_clocks(path, trial)
+    _check_dwells(path, trial)
     return trial
 
 
@@ -206,19 +209,60 @@ def _trial_from(file: netCDF4.Dataset, trial_id: str) -> Trial:
         dims = _LAYOUT[name][0]
         if name in file.variables:
             found = netcdf.array(file, name)
-            return found.astype(np.int8) if name == "approach" else found
-        return np.full([n.get(d, 0) for d in dims], np.nan if "t_robot" in dims else 0.0)
+            return np.clip(np.nan_to_num(found, nan=9.0), -9, 9).astype(np.int8) if name == "approach" else found
+        shape = tuple(n.get(d, 0) for d in dims)
+        netcdf.check_size(name, shape)
+        return np.full(shape, np.nan if "t_robot" in dims else 0.0)
 
     fields: dict[str, Any] = {k: netcdf.labels(file, k) for k in _LABELS} | {k: read(k) for k in _LAYOUT}
     return Trial(id=trial_id, **fields)
 
 
 def _check_clocks(path: Path, trial: Trial) -> None:
+    """See that times increase, and that a grid over them has room."""
     for clock in _CLOCKS:
         t = getattr(trial, clock)
-        back = np.flatnonzero(~(np.diff(t) > 0))
-        if len(back):
-            raise InputError(
-                path,
-                f"{clock} does not increase at sample {back[0] + 1} ({t[back[0]]!r} then {t[back[0] + 1]!r}); sort it",
-            )
+        if len(t):
+            check_times(path, clock, t)
+
+
+def check_times(path: Path | str, clock: str, t: np.ndarray) -> None:
+    """See that times t (n,) [s] are such as an instrument writes.
+
+    Raises:
+        InputError: They do not increase, or their span and rate are not those of seconds.
+    """
+    if len(t) < 2 or not np.isfinite(t).all():
+        raise InputError(
+            path, f"{clock} has {np.isfinite(t).sum()} finite times of {len(t)}; two at least, and no gaps"
+        )
+    step = np.diff(t)
+    back = np.flatnonzero(~(step > 0.0))
+    if len(back):
+        k = back[0]
+        raise InputError(
+            path, f"{clock} does not increase at sample {k + 1} ({float(t[k])!r} then {float(t[k + 1])!r}); sort it"
+        )
+    span, usual = float(t[-1] - t[0]), float(np.median(step))
+    if not _STEPS[0] <= usual <= _STEPS[1]:
+        raise InputError(
+            path,
+            f"{clock} has a sample each {usual:.3g} s, {1.0 / usual:.3g} Hz; an instrument has "
+            f"{1.0 / _STEPS[1]:g} to {1.0 / _STEPS[0]:g} Hz: is it in milliseconds?",
+        )
+    if span > _LONGEST or span / usual > _MOST_SAMPLES:
+        raise InputError(
+            path, f"{clock} spans {span:.4g} s at {1.0 / usual:.4g} Hz; split the trial, or mend its times"
+        )
+
+
+def _check_dwells(path: Path, trial: Trial) -> None:
+    a, b = trial.dwell_start, trial.dwell_stop
+    wrong = np.flatnonzero(~(b > a) | ~np.isfinite(b) | ~(np.diff(a, prepend=-np.inf) > 0.0))
+    overlapping = np.flatnonzero(~(a[1:] >= b[:-1])) + 1
+    for k in (*wrong[:1], *overlapping[:1]):
+        raise InputError(
+            path, f"dwell {k}, {float(a[k])!r} to {float(b[k])!r} s, does not begin after the one before and then end"
+        )
+    if not np.isin(trial.approach, (-1, 0, 1)).all():
+        raise InputError(path, "approach has other values than -1, 0 and 1")

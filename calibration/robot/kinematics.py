@@ -124,5 +124,6 @@ def unit_twists(model: pin.Model) -> np.ndarray:
     data, neutral = model.createData(), pin.neutral(model)
     S = np.zeros((model.njoints, 6))
     for i in range(1, model.njoints):
-        S[i] = pin.computeJointJacobian(model, data, neutral, i)[:, model.joints[i].idx_v]
+        J = pin.computeJointJacobian(model, data, neutral, i).reshape(6, model.nv)  # a vector where there is one joint
+        S[i] = J[:, model.joints[i].idx_v]
     return S

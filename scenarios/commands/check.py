@@ -4,7 +4,6 @@ A figure is `ROW[:BASE[:ENCODER[:TRIALS]]].METRIC`, or `coverage`. The base is, 
 motion that does not measure it; encoder `motor`; trials `dynamic`. Against the truth where score.json is there.
 """
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from scenarios.commands.options import FAILED
+from scenarios.files.ending import FAILED
 from scenarios.files.errors import ScenarioError
 
 _SHORT = {
@@ -95,10 +94,9 @@ def _row(rows: Sequence[dict[str, Any]], text: str) -> dict[str, Any]:
 
 
 def _json(path: Path) -> dict[str, Any]:
-    try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}; make it with tiago-twin evaluate") from error
-    except ValueError as error:
-        raise ScenarioError(f"{path}: broken JSON: {error}") from error
+    from calibration.untrusted import read_json
+
+    content = read_json(path, "make it with tiago-twin evaluate")
+    if not isinstance(content, dict):
+        raise ScenarioError(f"{path}: holds no results; make it with tiago-twin evaluate")
     return content

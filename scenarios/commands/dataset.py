@@ -4,7 +4,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.commands.options import FAILED, Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
+from scenarios.commands.options import Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
+from scenarios.files.ending import FAILED
 from scenarios.files.errors import ScenarioError
 
 

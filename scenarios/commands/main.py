@@ -4,10 +4,8 @@ Exit code 0: done. 1: the simulation or the fit failed, or its result must not b
 """
 
 import logging
-import os
 import signal
 import sys
-import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
@@ -25,10 +23,9 @@ from scenarios.commands import reality as command_reality
 from scenarios.commands import show as command_show
 from scenarios.commands import study as command_study
 from scenarios.commands import view as command_view
-from scenarios.commands.options import FAILED, Out, Overrides, Quick, ScenarioName, Seed, overriding
-from scenarios.files.errors import ScenarioError
+from scenarios.commands.options import Out, Overrides, Quick, ScenarioName, Seed, overriding
+from scenarios.files.ending import FAILED, Ending
 
-WRONG_INPUT = 2
 TERMINATED = 128 + signal.SIGTERM
 
 
@@ -216,39 +213,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command and exit with its code; what a user can mend is one message without a traceback."""
     before = signal.signal(signal.SIGTERM, _terminate)
     try:
-        app(args=arguments, prog_name="tiago-twin")
-    except SystemExit:
-        raise
-    except ScenarioError as error:
-        _fail(error, WRONG_INPUT)
-    except OSError as error:
-        _fail(error, FAILED)
-    except _raised("CalibrationError", "TwinError") as error:
-        _fail(error, WRONG_INPUT if isinstance(error, _raised("InputError")) else FAILED)
-    except (AttributeError, ImportError, RuntimeError) as error:
-        if not _of_importing_mujoco(error):
-            raise
-        setting = os.environ.get("MUJOCO_GL", "")
-        _fail(f"MuJoCo cannot be imported ({error}) with MUJOCO_GL={setting!r}; unset it, or set it to off", FAILED)
+        with Ending():
+            app(args=arguments, prog_name="tiago-twin")
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def _raised(*names: str) -> tuple[type[Exception], ...]:
-    """Errors of the engines by their names, of those that are imported: the others raised nothing and import slowly."""
-    modules = [sys.modules[name] for name in ("calibration.errors", "twin.errors") if name in sys.modules]
-    return tuple(getattr(module, name) for module in modules for name in names if hasattr(module, name))
-
-
-def _of_importing_mujoco(error: Exception) -> bool:
-    """Whether MuJoCo was being imported: it looks for a graphics driver then, and lets pass what that raises."""
-    names = (str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__))
-    return "mujoco" not in sys.modules and any(name.partition(".")[0] == "mujoco" for name in names)
-
-
-def _fail(error: Exception | str, code: int) -> None:
-    typer.echo("\n".join([str(error), *getattr(error, "__notes__", ())]), err=True)
-    sys.exit(code)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

@@ -6,9 +6,6 @@ from typing import Annotated
 
 import typer
 
-FAILED = 1
-"""Exit code: the simulation or the fit failed, or its result must not be used."""
-
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")]
 Seed = Annotated[int | None, typer.Option(min=0, metavar="N", help="Random seed; the scenario's unless given.")]

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.commands.options import FAILED, Out
+from scenarios.commands.options import Out
+from scenarios.files.ending import FAILED
 
 
 def process(

@@ -45,8 +45,8 @@ def reality(  # noqa: PLR0913  an option each
         _show_swings(one)
     for each in replays:
         _show_replay(each)
-    with output_folder.updating(out.parent, [out.name]) as new:
-        (new / out.name).write_text(json.dumps(as_json(swung, replays), indent=1) + "\n", encoding="utf-8")
+    with output_folder.one_file(out) as new:
+        new.write_text(json.dumps(as_json(swung, replays), indent=1) + "\n", encoding="utf-8")
     typer.echo(f"Comparison: {out}")
 
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from scenarios.commands.options import FAILED, Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
+from scenarios.commands.options import Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
+from scenarios.files.ending import FAILED
 from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from calibration.untrusted import read_json
 from scenarios.datasets import datasheet
 from scenarios.datasets.index import Row, write_index, write_whole
 from scenarios.datasets.run_one import PARTIAL, perform
@@ -134,7 +135,9 @@ def _check_place(plan: Plan) -> None:
     path = plan.folder / "collection.json"
     if not path.is_file():
         return
-    there = json.loads(path.read_text(encoding="utf-8"))
+    there = read_json(path)
+    if not isinstance(there, dict) or not {"digest", "name", "versions", "n"} <= there.keys():
+        raise ScenarioError(f"{path}: is no collection's; name another --out, or move it away")
     if there["digest"] != plan.digest:
         raise ScenarioError(
             f"{plan.folder}: holds a collection of another scenario, seed, kind or version ({there['name']}, "

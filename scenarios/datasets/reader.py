@@ -1,11 +1,11 @@
 """Read a collection lazily: nothing is opened before it is asked for."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from calibration.untrusted import read_json
 from scenarios.datasets.index import Row, read_index
 from scenarios.datasets.run_spec import run_name
 from scenarios.files.errors import ScenarioError
@@ -91,5 +91,5 @@ def open_collection(folder: Path | str) -> Collection:
     for name in ("collection.json", "index.csv"):
         if not (folder / name).is_file():
             raise ScenarioError(f"{folder / name}: no such file; give the command `dataset` that makes it once more")
-    json.loads((folder / "collection.json").read_text(encoding="utf-8"))
+    read_json(folder / "collection.json")
     return Collection(folder, read_index(folder / "index.csv"))

@@ -1,11 +1,18 @@
-"""Output that is there whole or not at all: written beside its place, and moved in when it is complete.
+"""Output that is there whole or not at all: written in a work folder of its file system, and moved in when complete.
 
-A folder is replaced only when it is empty or one of ours: it holds its marker and nothing this program does not
-write, so that no file of the user's is ever lost. Whatever interrupts the work, exceptions and Ctrl-C included,
-the new files are removed and the old ones stay.
+    OUT/.tiago-twin.HEX.partial/{new, old, moving.json}       beside OUT, as .OUT.HEX.partial, where there is no OUT yet
+
+Entries are moved in one by one, results last, so that a folder between two states lacks the file by which it is read.
+`moving.json` lists them before the first is moved: what a killed command left is completed by the next one, or removed
+where it was not complete. A work folder is locked while its process lives, so that a second command is told. What a
+user put into a folder stays; only folders of this program are replaced; links are moved, never followed.
 """
 
+import fcntl
+import glob
+import json
 import os
+import re
 import shutil
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -50,45 +57,76 @@ ESTIMATE = Kind(
     ),
 )
 DATASET = Kind("dataset", "dataset.json", frozenset({"dataset.json", "nominal.urdf", "trials"}))
+SIMULATED = Kind("simulated", "scenario.yaml", frozenset({"scenario.yaml", "dataset", "truth", "figures"}))
+
+_INSIDE, _JOURNAL = ".tiago-twin", "moving.json"
+_READ_BY = (
+    "scenario.yaml", "dataset.json", "estimate.json", "evaluation.json", "score.json", "report.html",
+)  # fmt: skip
+_WRITTEN = RUN.entries | ESTIMATE.entries | DATASET.entries | {"truth.json", "twin.png"}
 
 
 @contextmanager
 def replacing(out: Path | str, kind: Kind) -> Iterator[Path]:
-    """Yield an empty folder which takes the place of `out` when the block ends well.
+    """Yield an empty folder whose content takes the place of what `out` held when the block ends well.
 
     Raises:
-        ScenarioError: `out` is something that must not be overwritten, or cannot be written.
+        ScenarioError: `out` is something that must not be overwritten, cannot be written, or another command writes it.
     """
     out = Path(out).resolve()
     check_replaceable(out, kind)
-    with _beside(out) as work:
+    with _working(out) as work:
         yield work / "new"
-        _move([(work / "new", out)], work)
+        _move_in(work, out, kind.entries)
 
 
 @contextmanager
-def updating(out: Path | str, names: Collection[str]) -> Iterator[Path]:
+def updating(out: Path | str, names: Collection[str], marker: str | None = None) -> Iterator[Path]:
     """Yield an empty folder whose content goes into `out` when the block ends well; the rest of `out` stays.
 
     Args:
         out: The folder, made if there is none.
         names: Entries of `out` that this replaces; those not written again are removed.
+        marker: The one of them that every such folder has: without it the others are somebody else's.
 
     Raises:
-        ScenarioError: `out` is a file, or cannot be written.
+        ScenarioError: `out` is a file, cannot be written, holds such names of others, or another command writes it.
     """
     out = Path(out).resolve()
     if out.exists() and not out.is_dir():
         raise ScenarioError(f"{out}: is a file; name a folder")
-    with _beside(out) as work:
-        new = work / "new"
-        yield new
-        if not out.exists():
-            _move([(new, out)], work)
-        else:
-            stale = [name for name in names if (out / name).exists()]
-            moving = sorted({*stale, *(path.name for path in new.iterdir())})
-            _move([(new / name, out / name) for name in moving], work)
+    settle(out)
+    strange = [] if marker is None or (out / marker).is_file() else [n for n in names if os.path.lexists(out / n)]
+    if strange:
+        raise ScenarioError(
+            f"{out}: holds {', '.join(sorted(strange))} but no {marker}; move it away, or name another --out"
+        )
+    with _working(out) as work:
+        yield work / "new"
+        _move_in(work, out, names)
+
+
+@contextmanager
+def one_file(path: Path | str) -> Iterator[Path]:
+    """Yield a new path beside a file, which takes its place when the block ends well.
+
+    Raises:
+        ScenarioError: It is a folder, or cannot be written.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise ScenarioError(f"{path}: is a folder; name a file")
+    part = path.with_name(f".{path.name[:100]}.{os.urandom(4).hex()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.open("x").close()
+        yield part
+        os.replace(part, path)
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        if os.path.lexists(part):
+            part.unlink()
 
 
 def check_replaceable(out: Path, kind: Kind) -> None:
@@ -97,6 +135,7 @@ def check_replaceable(out: Path, kind: Kind) -> None:
     Raises:
         ScenarioError: It is a file, the folder one is in, or holds what this program does not write.
     """
+    settle(out)
     if not out.exists():
         return
     if not out.is_dir():
@@ -113,25 +152,64 @@ def check_replaceable(out: Path, kind: Kind) -> None:
         )
 
 
+def settle(out: Path | str) -> None:
+    """Complete or remove what killed commands left of writing `out`.
+
+    Raises:
+        ScenarioError: A living command is writing it.
+    """
+    out = Path(out).resolve()
+    ours = re.compile(r"\.[0-9a-f]{16}\.partial")
+    for folder, name in ((out.parent, f".{out.name}"), (out, _INSIDE)):
+        for found in folder.glob(f"{glob.escape(name)}.*.partial") if folder.is_dir() else ():
+            if not ours.fullmatch(found.name.removeprefix(name)) or found.is_symlink() or not found.is_dir():
+                continue
+            with _held(found, out):
+                _complete(found, out)
+                shutil.rmtree(found, ignore_errors=True)
+
+
 def _is_remnant(name: str) -> bool:
     """Whether it is a file or folder of this program that a killed process left half written."""
     return name.startswith(".") and name.endswith((".part", ".partial"))
 
 
 @contextmanager
-def _beside(out: Path) -> Iterator[Path]:
-    """Yield a work folder in the parent of `out`, with an empty folder `new` in it; remove it in the end.
+def _held(work: Path, out: Path) -> Iterator[None]:
+    """Hold a work folder; the hold ends with the process, however that ends."""
+    try:
+        handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
+    except OSError as error:
+        raise ScenarioError(f"{work}: cannot be read: {error.strerror}; remove it") from error
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ScenarioError(f"{out}: another command is writing it; wait for it, or stop it") from error
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def _working(out: Path) -> Iterator[Path]:
+    """Yield a work folder in `out`, or beside it where there is none, with an empty folder `new`; remove it in the end.
 
     Parents that had to be made are removed too when nothing came into them.
     """
+    settle(out)
     made = [parent for parent in out.parents if not parent.exists()]
-    work = out.with_name(f".{out.name}.{os.urandom(4).hex()}.partial")
+    stem = out / _INSIDE if out.is_dir() else out.with_name(f".{out.name}")
+    work = stem.with_name(f"{stem.name}.{os.urandom(8).hex()}.partial")
     try:
         try:
-            (work / "new").mkdir(parents=True)
+            work.parent.mkdir(parents=True, exist_ok=True)
+            work.mkdir()
+            (work / "new").mkdir()
         except OSError as error:
             raise ScenarioError(f"{out}: cannot be written: {error.strerror}") from error
-        yield work
+        with _held(work, out):
+            yield work
     finally:
         shutil.rmtree(work, ignore_errors=True)
         for parent in made:
@@ -139,23 +217,65 @@ def _beside(out: Path) -> Iterator[Path]:
                 parent.rmdir()
 
 
-def _move(pairs: Sequence[tuple[Path, Path]], work: Path) -> None:
-    """Move each new path to its place, all or none; a new path that is not there only removes the old one.
+def _move_in(work: Path, out: Path, names: Collection[str]) -> None:
+    """Move what is in `new` to its place, and what `out` has of `names` away: all or nothing.
 
-    What was in the way goes into `work`, and comes back from there when something interrupts.
+    What was in the way goes into `old`, and comes back from there when something interrupts.
     """
-    olds = [work / f"old{i}" for i in range(len(pairs))]
-    written = [new.exists() for new, _ in pairs]
+    new, old = work / "new", work / "old"
+    if not out.exists():
+        new.rename(out)
+        return
+    written = {path.name for path in new.iterdir()}
+    moving = sorted({*written, *(name for name in names if os.path.lexists(out / name))}, key=_order)
+    old.mkdir()
+    (work / _JOURNAL).write_text(json.dumps({name: name in written for name in moving}), encoding="utf-8")
     try:
-        for (new, place), old in zip(pairs, olds, strict=True):
-            if place.exists():
-                place.rename(old)
-            if new.exists():
-                new.rename(place)
+        _move(work, out, moving)
     except BaseException:
-        for (new, place), old, was_written in zip(pairs, olds, written, strict=True):
-            if was_written and not new.exists():
-                place.rename(new)
-            if old.exists():
-                old.rename(place)
+        for name in moving:
+            if name in written and not (new / name).exists():
+                (out / name).rename(new / name)
+            if os.path.lexists(old / name):
+                (old / name).rename(out / name)
         raise
+    _keep_others(old, out)
+    (work / _JOURNAL).unlink()
+
+
+def _move(work: Path, out: Path, moving: Sequence[str]) -> None:
+    """Away what is in the way, results first; then in what is new, results last."""
+    for name in reversed(moving):
+        if os.path.lexists(out / name) and not os.path.lexists(work / "old" / name):
+            (out / name).rename(work / "old" / name)
+    for name in moving:
+        if os.path.lexists(work / "new" / name):
+            (work / "new" / name).rename(out / name)
+
+
+def _complete(work: Path, out: Path) -> None:
+    """Go on where a killed command stopped moving."""
+    try:
+        listed: dict[str, bool] = json.loads((work / _JOURNAL).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return
+    left = [name for name, written in listed.items() if (work / "new" / name).exists() or not written]
+    _move(work, out, left)
+    _keep_others(work / "old", out)
+    (work / _JOURNAL).unlink()
+
+
+def _keep_others(old: Path, out: Path) -> None:
+    """Put back what somebody else put into folders that are replaced."""
+    for root, _, files in os.walk(old):
+        for name in files:
+            place = out / (Path(root) / name).relative_to(old)
+            mine = name in _WRITTEN or name.endswith(".nc") or len(place.relative_to(out).parts) == 1
+            if not mine and not os.path.lexists(place):
+                place.parent.mkdir(parents=True, exist_ok=True)
+                (Path(root) / name).rename(place)
+
+
+def _order(name: str) -> tuple[int, str]:
+    """Files by which a folder is read come last."""
+    return (_READ_BY.index(name) if name in _READ_BY else -1), name

@@ -4,6 +4,7 @@ import difflib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
@@ -21,6 +22,9 @@ UNKNOWN_NAME = "unknown_name"
 
 OF_KEY = "[key]"
 """What pydantic puts behind the key of a mapping when the key is wrong."""
+
+MOST_FINDINGS = 100
+"""Of one file that are shown."""
 
 LONGEST_VALUE = 60
 """Characters of a found value that are shown."""
@@ -51,14 +55,16 @@ class Source:
             above: Path of what was validated within `values`.
         """
         placed = []
-        for detail in error.errors(include_url=False):
+        details = error.errors(include_url=False)
+        for detail in details[:MOST_FINDINGS]:
             path = _path(self.values, (*above, *detail["loc"]), detail["type"])
             known = _fields(adapter, self.values, above, path[:-1]) if detail["type"] in UNKNOWN else []
             text = ": ".join(part for part in (".".join(path), _message(detail, path, known)) if part)
             of_key = detail["type"] in UNKNOWN + MISSING or detail["loc"][-1:] == (OF_KEY,)
             rank, line, column, where = self._where(path, path[:-1] if detail["type"] in MISSING else path, of_key)
             placed.append((rank, line, column, f"{where}{text}"))
-        return [text for *_, text in sorted(placed, key=lambda found: found[:3])]
+        more = [f"{self.file}: and {len(details) - MOST_FINDINGS} more"] if len(details) > MOST_FINDINGS else []
+        return [text for *_, text in sorted(placed, key=lambda found: found[:3])] + more
 
     def _where(self, path: tuple[str, ...], holder: tuple[str, ...], of_key: bool) -> tuple[int, int, int, str]:
         """The place of `path`: 0 for this file or the number of an override from 1, line, column, and all in words.
@@ -121,7 +127,7 @@ def _shown(value: Any) -> str:
 def _fields(adapter: TypeAdapter[Any], values: Any, above: Sequence[str], path: Sequence[str]) -> list[str]:
     """Return the field names possible in the mapping at `path`, as far as the types tell."""
     try:
-        root = adapter.json_schema()
+        root = _schema(adapter)
     except PydanticInvalidForJsonSchema:
         return []
     node = values
@@ -137,6 +143,11 @@ def _fields(adapter: TypeAdapter[Any], values: Any, above: Sequence[str], path: 
             for member in member_schemas(inner, root, node)
         ]
     return sorted({name for schema in schemas for name in schema.get("properties", {})})
+
+
+@lru_cache(maxsize=4)
+def _schema(adapter: TypeAdapter[Any]) -> dict[str, Any]:
+    return adapter.json_schema()
 
 
 def inner_schemas(schema: Mapping[str, Any], step: str) -> Iterator[Mapping[str, Any]]:

@@ -15,8 +15,9 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq, TaggedScalar
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from calibration.errors import InputError
+from calibration.untrusted import read_text, yaml_of
 from scenarios.files.errors import ScenarioError
 from scenarios.files.overrides import Override
 from scenarios.files.validation_messages import Source
@@ -70,7 +71,11 @@ def mapping(path: Path) -> CommentedMap:
     Raises:
         ScenarioError: The file cannot be read as YAML, or holds something else.
     """
-    tree = _parse(_text(path), str(path))
+    try:
+        text = read_text(path)
+    except InputError as error:
+        raise ScenarioError(str(error)) from error
+    tree = _parse(text, str(path))
     if not isinstance(tree, CommentedMap):
         kind = "the file is empty" if tree is None else f"the file holds {_kind(tree)}"
         raise ScenarioError(f"{path}:1:1: {kind}; write `field: value` lines")
@@ -98,28 +103,12 @@ def text(instance: Any, beside: Mapping[str, Any] | None = None) -> str:
     return stream.getvalue()
 
 
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"{path}: not UTF-8 text (byte {error.start}); is it a YAML file?") from error
-
-
 def _parse(text: str, where: str) -> Any:
     """Load YAML with the line and column of every value."""
     try:
-        return YAML(typ="rt", pure=True).load(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        place = f"{where}:{mark.line + 1}:{mark.column + 1}" if mark else where
-        message = ", ".join(part for part in (error.context, error.problem) if part)
-        raise ScenarioError(f"{place}: not YAML: {message}") from error
-    except YAMLError as error:
-        raise ScenarioError(f"{where}: not YAML: {' '.join(str(error).split())}") from error
-    except RecursionError as error:
-        raise ScenarioError(f"{where}: nested too deeply") from error
+        return yaml_of(text, where, YAML(typ="rt", pure=True).load)
+    except InputError as error:
+        raise ScenarioError(str(error)) from error
 
 
 def _plain(node: Any, place: str) -> Any:

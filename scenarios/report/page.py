@@ -1,13 +1,14 @@
 """report.html and the figures beside it: the same results give the same bytes, wherever the run folder is."""
 
 import base64
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from scenarios.files.errors import ScenarioError
+from scenarios.files.output_folder import one_file
 from scenarios.plots.style import svg
 from scenarios.report.results import formatting
 from scenarios.report.results.run_results import read
@@ -60,13 +61,15 @@ def write(run_dir: Path | str) -> None:
     drawings = {name: _drawing(name, drawn) for one in sections for name, drawn in one.figures().items()}
     page = render(view, sections, {name: drawing for name, drawing in drawings.items() if drawing is not None})
     folder = run / "figures"
+    if folder.is_symlink():
+        raise ScenarioError(f"{folder}: is a link; remove it, pages are not written through links")
     folder.mkdir(exist_ok=True)
     for name, drawing in drawings.items():
         if drawing is not None:
-            replace_text(folder / f"{name}.svg", drawing.file)
+            _write(folder / f"{name}.svg", drawing.file)
         else:
             (folder / f"{name}.svg").unlink(missing_ok=True)
-    replace_text(run / "report.html", page)
+    write_page(run, page)
 
 
 def render(view: RunView, sections: Iterable[Section], drawings: Mapping[str, Drawing]) -> str:
@@ -106,19 +109,18 @@ def environment() -> Environment:
     return found
 
 
+def write_page(run: Path, page: str) -> None:
+    """Write RUN/report.html whole."""
+    _write(run / "report.html", page)
+
+
+def _write(path: Path, text: str) -> None:
+    with one_file(path) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
+
+
 def _drawing(name: str, drawn: Drawn) -> Drawing | None:
     if drawn is None:
         return None
     text = drawn.read_text(encoding="utf-8") if isinstance(drawn, Path) else svg(drawn, name)
     return Drawing(text[text.index("<svg") :].strip(), text)
-
-
-def replace_text(path: Path, text: str) -> None:
-    """Write a file whole; nothing is written through a link that somebody else put there."""
-    part = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
-    try:
-        with part.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)

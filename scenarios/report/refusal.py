@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import calibration
-from scenarios.report.page import environment, replace_text
+from scenarios.report.page import environment, write_page
 from scenarios.report.results.recordings import recorded
 from scenarios.report.results.run_results import read_scenario
 
@@ -29,4 +29,4 @@ def write_refusal(run_dir: Path | str) -> None:
         "has_plan": os.path.isfile(estimate / "record_next.yaml"),
     }
     style = (Path(__file__).parent / "report.css").read_text(encoding="utf-8")
-    replace_text(run / "report.html", environment().get_template("refusal.html").render(**values, style=style))
+    write_page(run, environment().get_template("refusal.html").render(**values, style=style))

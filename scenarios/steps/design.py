@@ -50,12 +50,12 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
         f"{n} postures by criterion {criterion}: standard deviation of the predicted hand {worst:.2f} mm at worst, "
         f"{usual:.2f} mm with as many random ones"
     )
-    with output_folder.updating(out.parent, [out.name]) as new:
+    with output_folder.one_file(out) as new:
         text = plans_text(description.joint_names, [found.remedy("geometry", why)])
-        (new / out.name).write_text(text, encoding="utf-8", newline="\n")
+        new.write_text(text, encoding="utf-8", newline="\n")
     if campaign is not None:
-        with output_folder.updating(campaign.parent, [campaign.name]) as new:
-            yaml_file.write(new / campaign.name, recording(scenario, found))
+        with output_folder.one_file(campaign) as new:
+            yaml_file.write(new, recording(scenario, found))
     return Designed(found, against)
 
 

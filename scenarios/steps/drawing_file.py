@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from calibration.untrusted import check_file
 from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
@@ -15,13 +16,16 @@ if TYPE_CHECKING:
 
 NAME = "markers.csv"
 HEADER = ("body", "link", "marker", "x", "y", "z")
+_LONGEST = 1000  # characters of a first line
 
 
 def is_drawing(path: Path) -> bool:
     """Whether a file is such a table, by its header."""
     try:
-        with path.open(encoding="utf-8") as stream:
-            return tuple(name.strip() for name in stream.readline().split(",")) == HEADER
+        if not path.is_file():
+            return False
+        with path.open(encoding="utf-8-sig") as stream:
+            return tuple(name.strip() for name in stream.readline(_LONGEST).split(",")) == HEADER
     except (OSError, UnicodeDecodeError):
         return False
 
@@ -35,7 +39,8 @@ def bodies(path: Path) -> list[dict[str, Any]]:
     if not is_drawing(path):
         raise ScenarioError(f"{path}: bodies: no such table; its header is {','.join(HEADER)}")
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    with path.open(encoding="utf-8", newline="") as stream:
+    check_file(path, 2**20)
+    with path.open(encoding="utf-8-sig", newline="") as stream:
         for line, row in enumerate(csv.DictReader(stream), start=2):
             try:
                 xyz = [float(row[axis]) for axis in "xyz"]

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from calibration.untrusted import checked_urdf, read_text
 from scenarios.files import output_folder, yaml_file
 from scenarios.files.errors import ScenarioError
 from scenarios.steps import drawing_file
@@ -125,8 +126,8 @@ def init_mapping(files: Sequence[Path], out: Path, urdf: Path | None = None) -> 
     session = session_of(recordings, _robot(name, out), drawing)
     wheels = PACKAGED if urdf is None and any(view.plates for view in session.views) else None
     text = draft(session, name, _patterns(recordings, out), wheels)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(text, encoding="utf-8")
+    with output_folder.one_file(out) as new:
+        new.write_text(text, encoding="utf-8")
     return text
 
 
@@ -192,10 +193,8 @@ def export_urdf(estimate: Path, out: Path) -> None:
     if not path.is_file():
         why = [v.message for v in found.verdicts if v.stage == "geometry" and v.verdict == "missing"]
         raise NotCalibrated([f"{estimate}: no geometry in this estimate, so no calibrated URDF", *why])
-    if out.exists() and out.is_dir():
-        raise ScenarioError(f"{out}: is a folder; name a file")
-    with output_folder.updating(out.parent, [out.name]) as new:
-        (new / out.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    with output_folder.one_file(out) as new:
+        new.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
 
 
 def _exported(kind: str, trials: Sequence[str]) -> output_folder.Kind:
@@ -221,7 +220,4 @@ def _robot(name: str, path: Path) -> str:
 
         return mjcf.urdf()
     found = path.parent / name
-    try:
-        return found.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: urdf: {found} cannot be read ({error}); or write `urdf: {PACKAGED}`") from error
+    return checked_urdf(read_text(found, hint=f"it is `urdf` of {path}; or write `urdf: {PACKAGED}`"), found)

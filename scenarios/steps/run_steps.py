@@ -84,13 +84,13 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
     Raises:
         ScenarioError: `out` must not be overwritten.
         TwinError: The simulation failed.
-        NotEnoughData, NotCalibrated: The data do not allow a result that may be used; the folder keeps the recordings,
-            and a report of why.
+        NotEnoughData, NotCalibrated, NumericalFailure: The data do not allow a result that may be used; the folder
+            keeps the recordings, and a report of why.
     """
-    from calibration.errors import NotCalibrated, NotEnoughData
+    from calibration.errors import NotCalibrated, NotEnoughData, NumericalFailure
 
     scenario = scenario.quick() if quick else scenario
-    refused: NotCalibrated | NotEnoughData | None = None
+    refused: NotCalibrated | NotEnoughData | NumericalFailure | None = None
     with folder.replacing(out, folder.RUN) as new, one_blas_thread():
         _simulate(scenario, new, progress)
         try:
@@ -100,7 +100,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
             evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
             score = _score(new / "estimate", new, new / "truth", evaluation, progress)
             _report(new, progress)
-        except (NotCalibrated, NotEnoughData) as error:
+        except (NotCalibrated, NotEnoughData, NumericalFailure) as error:
             refused = error
             _refuse(new, error, progress)
     if refused is not None:
@@ -111,7 +111,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
 
 def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent) -> None:
     """Write dataset/, truth/ and scenario.yaml into the run folder `out`."""
-    with folder.replacing(out, folder.RUN) as new, one_blas_thread():
+    with folder.replacing(out, folder.SIMULATED) as new, one_blas_thread():
         _simulate(scenario, new, progress)
 
 
@@ -144,6 +144,8 @@ def calibrate(
     unknown = [name for name in stages or () if name not in STAGES]
     if unknown:
         raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
+    folder.settle(dataset)
+    folder.settle(Path(dataset).resolve().parent)
     with folder.replacing(out, folder.ESTIMATE) as new, one_blas_thread():
         return _calibrate(Path(dataset), new, stages, options, progress, plan_next, cross_validate=stages is None)
 
@@ -179,7 +181,10 @@ def evaluate(
 
     `estimate` is an estimate folder, an estimate.json, a URDF with its `zeros`, or predicted poses (.csv, .nc).
     """
-    with folder.updating(out, folder.EVALUATION) as new, one_blas_thread():
+    for place in (estimate, dataset):
+        folder.settle(place)
+        folder.settle(Path(place).resolve().parent)
+    with folder.updating(out, folder.EVALUATION, "evaluation.json") as new, one_blas_thread():
         evaluation = _evaluate(Path(estimate), Path(dataset), new, progress, zeros)
         score = None
         if truth is not None:
@@ -193,6 +198,7 @@ def report(run_folder: Path | str, progress: Progress = silent) -> Path:
     Raises:
         ScenarioError: The folder holds no evaluation, or a file that cannot be read.
     """
+    folder.settle(run_folder)
     _report(Path(run_folder), progress)
     return Path(run_folder) / "report.html"
 
@@ -244,15 +250,17 @@ def _evaluate(
     estimate: Path, dataset: Path, out: Path, progress: Progress, zeros: Path | str | None = None
 ) -> "Evaluation":
     import calibration
+    from calibration.breakdown import Breakdowns
     from calibration.evaluation import read_submission
 
     progress("evaluate", "", 0.0)
     poses = estimate.suffix.lower() in _POSES
-    evaluation = calibration.evaluate(
-        read_submission(estimate) if poses else calibration.load_estimate(estimate, zeros),
-        calibration.load(dataset),
-        lambda at, fraction: progress("evaluate", at, fraction),
-    )
+    with Breakdowns("evaluation"):
+        evaluation = calibration.evaluate(
+            read_submission(estimate) if poses else calibration.load_estimate(estimate, zeros),
+            calibration.load(dataset),
+            lambda at, fraction: progress("evaluate", at, fraction),
+        )
     evaluation.save(out)
     evaluation.save_predictions(out)
     return evaluation

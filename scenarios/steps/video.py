@@ -1,11 +1,10 @@
 """Stills and clips of the trials of a simulated run, from its scenario and its truth."""
 
-import json
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenarios.files.errors import ScenarioError
+from scenarios.files.output_folder import one_file
 
 if TYPE_CHECKING:
     from twin.rendering import ClipOptions
@@ -29,25 +28,19 @@ def film(run_folder: Path | str, trial_id: str, out: Path | str, options: "ClipO
     scenario = load(run_folder / "scenario.yaml")
     lab = laboratory(scenario.twin, scenario.seed)
     lab = second_session(lab) if role == "confirmation" else lab
-    part = out.with_name(f".{out.name}.part")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        n = clip(lab, truth.read_trial(run_folder / "truth" / "trials" / f"{trial_id}.nc"), part, options)
-        os.replace(part, out)
-    except OSError as error:
-        raise ScenarioError(f"{out}: cannot be written: {error.strerror or error}") from error
-    finally:
-        part.unlink(missing_ok=True)
-    return n
+    with one_file(out) as part:
+        return clip(lab, truth.read_trial(run_folder / "truth" / "trials" / f"{trial_id}.nc"), part, options)
 
 
 def _role(run_folder: Path, trial_id: str) -> str:
     """The session a trial belongs to."""
+    import calibration.recording
+
     for name in ("scenario.yaml", "dataset/dataset.json", "truth/trials"):
         if not (run_folder / name).exists():
             raise ScenarioError(f"{run_folder}: holds no {name}; a picture is made of a run that was simulated here")
-    trials = json.loads((run_folder / "dataset" / "dataset.json").read_text(encoding="utf-8"))["trials"]
-    roles = {str(t["id"]): str(t["role"]) for t in trials}
+    trials = calibration.recording.load(run_folder / "dataset").description.trials
+    roles = {trial.id: str(trial.role) for trial in trials}
     if trial_id not in roles:
         raise ScenarioError(f"{run_folder}: no trial {trial_id!r}; its trials are {', '.join(roles)}")
     return roles[trial_id]

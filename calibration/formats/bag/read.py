@@ -17,8 +17,10 @@ from calibration.formats.bag.poses import read_poses
 from calibration.formats.mapping.channels import Joints, Reader, Recorded
 from calibration.formats.mapping.layouts import BagLayout
 from calibration.numerics.signals import interpolate_columns
+from calibration.recording.trial import check_times
 
 _FIELDS = tuple(SUFFIXES)
+_MESSAGE_BYTES, _ALL_BYTES = 2**20, 2**28  # of a message, and of all [B]
 _FIRST = 200  # messages from which the names of joints are taken
 _COMPRESSION = "ompression"  # in every message of rosbags about one it does not know
 
@@ -57,7 +59,11 @@ def _messages(path: Path, topics: Sequence[str]) -> dict[str, list[Any]]:
     found: dict[str, list[Any]] = {topic: [] for topic in topics}
     try:
         with AnyReader([path], default_typestore=store) as bag:
+            total = 0
             for connection, _, raw in bag.messages([c for c in bag.connections if c.topic in found]):
+                total += len(raw)
+                if len(raw) > _MESSAGE_BYTES or total > _ALL_BYTES:
+                    raise InputError(path, f"{connection.topic}: {len(raw)} bytes a message, {total} so far: too large")
                 found[connection.topic].append(bag.deserialize(raw, connection.msgtype))
             known = sorted(bag.topics)
     except _unreadable() as error:
@@ -194,6 +200,8 @@ def _seconds(message: Any) -> float:
 
 def _check_increasing(path: Path, topic: str, t: np.ndarray) -> None:
     back = np.flatnonzero(~(np.diff(t) > 0.0))
+    if not len(back):
+        check_times(path, topic, t)
     if len(back):
         k = int(back[0])
         said = "has the stamp of the one before" if t[k + 1] == t[k] else "has an earlier stamp than the one before"

@@ -14,9 +14,13 @@ from typing import Any
 import numpy as np
 
 from calibration.errors import InputError
+from calibration.formats.c3d.parameters import faults
+from calibration.untrusted import check_file
 
 MOST_FRAMES = 65535
 _BLOCK = 512
+_MOST_BYTES, _SECTION = 128 * 2**20, 255 * 512  # [B] of a file, which take ten times as much in memory; of parameters
+_MOST_RATE = 1e5  # [Hz]
 _MAGIC = 0x50
 _INTEL = 84
 CLOCK = "CLOCK"
@@ -58,12 +62,14 @@ def checked_header(path: Path) -> C3dHeader:
         InputError: It is no C3D file, was written on a machine with other numbers, is truncated, or holds more frames
             than it can say.
     """
+    check_file(path, _MOST_BYTES)
     try:
         with path.open("rb") as stream:
             first, size = stream.read(_BLOCK), path.stat().st_size
             parameters = (first[0] - 1) * _BLOCK if first else 0
             stream.seek(max(parameters, 0))
-            processor = stream.read(4)
+            section = stream.read(_SECTION)
+            processor = section[:4]
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})") from error
     if len(first) < _BLOCK or first[1] != _MAGIC or len(processor) < 4:
@@ -73,6 +79,15 @@ def checked_header(path: Path) -> C3dHeader:
     points, analog, begin, end = struct.unpack_from("<4H", first, 2)
     scale, start, per_frame, rate = struct.unpack_from("<f2Hf", first, 12)
     header = C3dHeader(points, analog, end - begin + 1, per_frame, rate, (start - 1) * _BLOCK, 4 if scale < 0.0 else 2)
+    if header.frames < 1 or not 0.0 < header.rate < _MOST_RATE or not parameters < header.data_start:
+        raise InputError(path, f"has {header.frames} frames at {header.rate:g} Hz by its header; export it again")
+    channels = header.analog // max(header.per_frame, 1)
+    if channels * max(header.per_frame, 1) != header.analog:
+        raise InputError(
+            path, f"has {header.analog} analog values in {header.per_frame} samples a frame; export it again"
+        )
+    for fault in faults(section[: header.data_start - parameters], {"points": points, "channels": channels}):
+        raise InputError(path, f"is no C3D file, or damaged: {fault}; export it again")
     missing = header.data_start + header.data_bytes - size
     if missing > 0:
         raise InputError(path, f"is truncated: {missing} bytes of {header.frames} frames are missing; copy it again")

@@ -18,8 +18,12 @@ from calibration.formats.mapping.layouts import ANGLES, LENGTHS, MOMENTS, CsvTab
 from calibration.formats.mapping.plate_convention import checked_against_cop, to_action
 from calibration.formats.mapping.poses import AXES, marker_names, marker_sigma, markers_at
 from calibration.recording.schema import Plate, Setup
+from calibration.recording.trial import check_times
+from calibration.untrusted import check_file
 
 _UNITS = ANGLES | LENGTHS
+_MOST_BYTES, _MOST_COLUMNS = 128 * 2**20, 2000  # [B] of a file; its cells take some ten times as much while it is read
+_LARGEST = 1e15  # of a number
 
 
 def read_csv(files: Sequence[Path], tables: Sequence[CsvTable], setup: Setup) -> Recorded:
@@ -86,11 +90,16 @@ class CsvText:
         """
         chosen = self.cells[:, [self.index(name) for name in columns]]
         try:
-            return np.asarray(np.where(chosen == "", "nan", chosen) if gaps else chosen, dtype=float) * factor
-        except ValueError as error:
+            found = np.asarray(np.where(chosen == "", "nan", chosen) if gaps else chosen, dtype=float)
+        except (ValueError, OverflowError) as error:
             row, k, text = next((r, k, t) for (r, k), t in np.ndenumerate(chosen) if not _is_number(t, gaps))
-            what = f"{str(text)!r} is no number" if text else "the cell is empty"
+            what = f"{str(text)[:40]!r} is no number" if text else "the cell is empty"
             raise self.error(row, columns[k], f"{what}; only an occluded marker may be left out") from error
+        beyond = np.argwhere(~(np.abs(found) < _LARGEST) & ~(np.isnan(found) & gaps))
+        if len(beyond):
+            row, k = beyond[0]
+            raise self.error(row, columns[k], f"{str(chosen[row, k])[:40]!r} is no value of an instrument")
+        return found * factor
 
     def seconds(self, column: str, unit: str) -> np.ndarray:
         """Times (n,) [s] of a column in `s`, `ms` or `utc` (since the midnight before the first row)."""
@@ -179,6 +188,7 @@ def _check_times(text: CsvText, column: str, t: np.ndarray) -> None:
         row = int(back[0]) + 1
         said = "is the same as in the row before" if t[row] == t[row - 1] else "does not increase"
         raise text.error(row, column, f"time {text.cells[row, text.index(column)]} {said}; remove or sort such rows")
+    check_times(text.path, column, t)
 
 
 def _joints(text: CsvText, table: CsvTable, t: np.ndarray) -> Joints:
@@ -239,18 +249,21 @@ def read_text(path: Path) -> CsvText:
     Raises:
         InputError: It cannot be read, has no header or no rows, names a column twice, or a row is of another length.
     """
+    check_file(path, _MOST_BYTES)
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            rows = [row for row in csv.reader(stream) if row]
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(stream) if row]
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(path, f"is no CSV text ({error}); export it again") from error
     if len(rows) < 2:
         raise InputError(f"{path}:1:1", "no rows below the header; export the file again")
-    header = tuple(name.strip() for name in rows[0])
+    header = tuple(rows[0])
     if all(_is_number(name, gaps=False) for name in header[1:]):
         raise InputError(f"{path}:1:1", "the first line holds numbers; write a header line that names the columns")
+    if len(header) > _MOST_COLUMNS:
+        raise InputError(f"{path}:1:1", f"{len(header)} columns; at most {_MOST_COLUMNS} are read")
     twice = sorted({name for name in header if header.count(name) > 1})
     if twice:
         raise InputError(f"{path}:1:{header.index(twice[0]) + 1}", f"columns named more than once: {twice}")
@@ -258,7 +271,7 @@ def read_text(path: Path) -> CsvText:
         if len(row) != len(header):
             message = f"{len(row)} cells, the header has {len(header)}: truncated or damaged; export the file again"
             raise InputError(f"{path}:{line}:{len(row)}", message)
-    return CsvText(path, header, np.char.strip(np.array(rows[1:], dtype=str)))
+    return CsvText(path, header, np.array(rows[1:], dtype=object))
 
 
 def _is_number(text: str, gaps: bool) -> bool:

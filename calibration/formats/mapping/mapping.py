@@ -5,6 +5,7 @@ sit on the robot; which file is which trial. It is a YAML file of these fields, 
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -21,10 +22,13 @@ from calibration.recording.schema import (
     Declaration,
     Kind,
     Marker,
+    Name,
     NonNegative,
+    Number,
     Positive,
     Role,
     Setup,
+    Text,
     Vector6,
     refuse_repeated,
 )
@@ -54,12 +58,12 @@ class MappedBody(Declaration):
             calibration postures.
     """
 
-    name: str
-    link: str
+    name: Name
+    link: Name
     markers: tuple[Marker, ...] = ()
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     pose: PoseChannels | PoseTopic | None = None
-    undrawn: tuple[str, ...] = ()
+    undrawn: tuple[Name, ...] = ()
     standing: Standing | None = None
     fitted: bool = False
 
@@ -107,16 +111,27 @@ class MappedTrial(Declaration):
         approach: Sign of each joint's last motion before each posture, -1, 0 or 1.
     """
 
-    id: str
+    id: Name
     file: str | None = None
     role: Role
     kind: Kind
-    motion: str | None = None
-    start: float | None = None
+    motion: Text | None = None
+    start: Number | None = None
     part: tuple[NonNegative, Positive] | None = None
     payload: NonNegative | None = None
-    dwells: tuple[tuple[float, float], ...] | None = None
+    dwells: tuple[tuple[Number, Number], ...] | None = None
     approach: tuple[tuple[Literal[-1, 0, 1], ...], ...] | None = None
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> "MappedTrial":
+        times = [t for pair in self.dwells or () for t in pair]
+        if any(b < a for a, b in pairwise(times)) or any(a == b for a, b in self.dwells or ()):
+            raise ValueError(f"trial {self.id}: a dwell begins before it ends and after the one before")
+        if self.part is not None and self.part[1] <= self.part[0]:
+            raise ValueError(f"trial {self.id}: part begins before it ends")
+        if self.approach is not None and len({len(row) for row in self.approach}) > 1:
+            raise ValueError(f"trial {self.id}: rows of approach are of different lengths")
+        return self
 
     @property
     def stem(self) -> str:

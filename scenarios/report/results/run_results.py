@@ -1,19 +1,17 @@
 """What a run folder holds, read for its report: every file but evaluation.json or an estimate may be missing."""
 
 import hashlib
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 import calibration
 from calibration.prediction import PredictedTrial, read_predicted
 from calibration.recording import Description
+from calibration.untrusted import read_json, read_text, yaml_of
 from scenarios.files.errors import ScenarioError
 from scenarios.report.results.recordings import Recorded, recorded
 from scenarios.report.results.result_files import Derived, Evaluation, ScenarioNote, Score, Truth
@@ -98,9 +96,7 @@ def _matrix(rows: tuple[tuple[float | None, ...], ...] | None) -> np.ndarray | N
 
 def _json(path: Path, model: type[M]) -> M:
     try:
-        return model.model_validate(json.loads(path.read_text(encoding="utf-8")))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: broken JSON: {error}; make it again with tiago-twin evaluate") from error
+        return model.model_validate(read_json(path))
     except ValidationError as error:
         raise ScenarioError(_findings(path, error)) from error
 
@@ -114,9 +110,7 @@ def read_scenario(path: Path) -> ScenarioNote:
     if not path.is_file():
         return ScenarioNote()
     try:
-        return ScenarioNote.model_validate(YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")))
-    except (YAMLError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: broken YAML: {error}") from error
+        return ScenarioNote.model_validate(yaml_of(read_text(path), path))
     except ValidationError as error:
         raise ScenarioError(_findings(path, error)) from error
 

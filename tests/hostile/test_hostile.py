@@ -1,0 +1,29 @@
+"""Every row of the tables of hostile cases: refused or done, with the words expected, within its bounds."""
+
+import shutil
+
+import pytest
+
+from tests.hostile import files, folders
+from tests.hostile.case import Case, judged
+from tests.hostile.laboratory import copied, make
+
+ROWS = [
+    pytest.param(case, id=f"{group}: {case.name}", marks=[pytest.mark.slow] if case.slow else [])
+    for table in (files.GROUPS, folders.GROUPS)
+    for group, cases in table.items()
+    for case in cases
+]
+
+
+@pytest.fixture(scope="session")
+def laboratory(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("hostile") / "laboratory")
+
+
+@pytest.mark.parametrize("case", ROWS)
+def test_a_hostile_case_ends_as_its_row_says(laboratory, tmp_path, case: Case):
+    folder = copied(laboratory, tmp_path / "at")
+    found = judged(case, folder)
+    shutil.rmtree(folder, ignore_errors=True)
+    assert not found.wrong, f"{found.wrong}\n{found.outcome.said[-3000:]}"
