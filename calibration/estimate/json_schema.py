@@ -22,9 +22,11 @@ from calibration.estimate.plain_values import plain, restored
 from calibration.inference.parameters import Combination, Model, Parameter, Status
 from calibration.options import Options
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description, Name, Number, refuse_repeated
+from calibration.recording.schema import Description, Name, refuse_repeated
 from calibration.stages.bundle.robot import BundleParts
 from calibration.verdict import Verdict
+
+_Value = Annotated[float, Field(ge=-1e30, le=1e30)]
 
 
 class Entry(BaseModel):
@@ -38,8 +40,8 @@ class ParameterEntry(Entry):
 
     name: str
     unit: str = ""
-    nominal: Number = 0.0
-    value: Number
+    nominal: _Value = 0.0
+    value: _Value
     sigma: float | None = None
     status: Status = "estimated"
 

@@ -55,7 +55,7 @@ class Joint(Declaration):
 class Marker(Declaration):
     """A marker and its nominal position in its body's frame [m]."""
 
-    name: Name
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}[+]?$")]  # `hand.x+` stands for a pose
     xyz: Vector3
 
 

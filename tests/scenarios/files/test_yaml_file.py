@@ -160,7 +160,7 @@ def test_what_is_no_mapping_of_fields_is_told_once(tmp_path, text, start, words)
 
 def test_unreadable_files_are_told(tmp_path):
     (tmp_path / "binary.yaml").write_bytes(b"name: \xff\xfe")
-    for path, words in (("missing.yaml", "no such file"), ("binary.yaml", "UTF-8"), ("", "directory")):
+    for path, words in (("missing.yaml", "no such file"), ("binary.yaml", "UTF-8"), ("", "is a folder")):
         with pytest.raises(ScenarioError, match=words):
             yaml_file.read(tmp_path / path, Example)
 

@@ -267,7 +267,7 @@ def test_the_headline_is_the_main_model_where_it_was_evaluated(whole):
         ("evaluation.json", "{", "broken JSON"),
         ("evaluation.json", '{"rows": [{"model": 3}]}', "rows.0.model"),
         ("score.json", "{}", "rows: Field required"),
-        ("scenario.yaml", "a: [", "broken YAML"),
+        ("scenario.yaml", "a: [", "not YAML"),
         ("evaluation.nc", "not netCDF", "evaluation.nc"),
     ],
 )
