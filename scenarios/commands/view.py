@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios.commands.options import FAILED
+from scenarios.files.ending import FAILED
 
 
 def view(
