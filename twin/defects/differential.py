@@ -104,8 +104,8 @@ class Differential(Defect):
         of = [(f.stiffness, f.slip) if (f := slips.get(g.joint_name)) else (0.0, 0.0) for g in self.gears]
         soft = sum(1.0 / g.stiffness for g in self.gears)
         slip = sum(s / g.stiffness for (_, s), g in zip(of, self.gears, strict=True)) / soft
-        held = sum(1.0 / (g.stiffness + k) for (k, _), g in zip(of, self.gears, strict=True))
-        stiffness = 2.0 / held - 2.0 / soft
+        series = sum(1.0 / (g.stiffness + k) for (k, _), g in zip(of, self.gears, strict=True))
+        stiffness = 2.0 / series - 2.0 / soft
         holding = {f.joint_name: f.holding for f in self.frictions}
         for i, (gear, (k, s)) in enumerate(zip(self.gears, of, strict=True), 1):
             yield from friction_parameters(gear.joint_name, stiffness, slip, holding.get(gear.joint_name, 0.0))

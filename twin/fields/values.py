@@ -66,8 +66,8 @@ def _within_limits(posture: _Posture) -> _Posture:
     for k, (name, value) in enumerate(zip((TORSO, *ARM), posture, strict=True)):
         low, high = mjcf.model().joint(name).range.tolist()
         if not low <= value <= high:
-            said = {"joint": name, "low": low, "high": high}
-            error = PydanticCustomError("joint_limit", "{joint} goes from {low} to {high}", said)
+            context = {"joint": name, "low": low, "high": high}
+            error = PydanticCustomError("joint_limit", "{joint} goes from {low} to {high}", context)
             beyond.append(InitErrorDetails(type=error, loc=(k,), input=value))
     refuse("GivenPosture", beyond)
     return posture

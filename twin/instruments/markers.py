@@ -22,7 +22,7 @@ from twin.truth import Parameter, twist_parameters
 
 @validated(frozen=True, config=STRICT)
 class LooseMarker:
-    """A marker that hangs by its slack, until it is mounted anew.
+    """A marker that hangs by its slack, until it is mounted again.
 
     Attributes:
         name: The marker.

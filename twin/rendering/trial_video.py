@@ -125,10 +125,10 @@ def annotated(
     arrow = reaction(trial.plate_wrench[k], centre)
     if arrow is not None:
         _draw_arrow(pen, projected(view, arrow))
-    told = f"{trial.t_mocap[k] - trial.t_mocap[0]:5.1f} s   plate {-trial.plate_wrench[k, 2]:.0f} N"
+    caption = f"{trial.t_mocap[k] - trial.t_mocap[0]:5.1f} s   plate {-trial.plate_wrench[k, 2]:.0f} N"
     if options.magnify != 1.0:
-        told += f"   base's motion x {options.magnify:g}"
-    pen.text((8, view.size[1] - 22), told, fill=(60, 66, 74), font=ImageFont.load_default(14))
+        caption += f"   base's motion x {options.magnify:g}"
+    pen.text((8, view.size[1] - 22), caption, fill=(60, 66, 74), font=ImageFont.load_default(14))
     return drawn
 
 
