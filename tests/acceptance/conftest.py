@@ -1,4 +1,8 @@
-"""Runs of the default scenario that several files of claims look at, made once by each worker."""
+"""A run of the default scenario that several files of claims look at, made once for all workers."""
+
+import fcntl
+import pickle
+from pathlib import Path
 
 import pytest
 
@@ -7,9 +11,16 @@ from tests.acceptance.claims import keep
 
 
 @pytest.fixture(scope="session")
-def quick_run(tmp_path_factory):
-    """The short variant of the default scenario, whole."""
-    return run(load("humanoids2024"), tmp_path_factory.mktemp("run") / "quick", quick=True)
+def quick_run(tmp_path_factory, worker_id):
+    """The short variant of the default scenario, whole; the first worker that asks makes it, the others wait."""
+    base: Path = tmp_path_factory.getbasetemp()
+    shared = base if worker_id == "master" else base.parent
+    with (shared / "quick_run.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        kept = shared / "quick_run.pickle"
+        if not kept.is_file():
+            kept.write_bytes(pickle.dumps(run(load("humanoids2024"), shared / "quick_run", quick=True)))
+        return pickle.loads(kept.read_bytes())
 
 
 @pytest.fixture

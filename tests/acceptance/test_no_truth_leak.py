@@ -19,12 +19,6 @@ def copied(run, tmp_path):
     return shutil.copytree(run.folder / "dataset", tmp_path / "dataset")
 
 
-def test_nothing_but_the_dataset_reaches_the_calibration(quick_run, tmp_path):
-    steps.calibrate(copied(quick_run, tmp_path), tmp_path / "estimate")
-    for name in FILES:
-        assert (tmp_path / "estimate" / name).read_bytes() == (quick_run.folder / "estimate" / name).read_bytes(), name
-
-
 def overwrite_with_noise(path, rng):
     """Replace all recorded channels of a trial; its times stay."""
     with netCDF4.Dataset(path, "a") as file:
@@ -33,7 +27,7 @@ def overwrite_with_noise(path, rng):
                 variable[:] = rng.normal(size=variable.shape)
 
 
-def test_validation_trials_replaced_by_noise_give_the_same_estimate(quick_run, tmp_path):
+def test_a_dataset_alone_with_noise_for_validation_trials_gives_the_same_estimate(quick_run, tmp_path):
     dataset = copied(quick_run, tmp_path)
     path, rng = dataset / "dataset.json", np.random.default_rng(0)
     declared = json.loads(path.read_text())

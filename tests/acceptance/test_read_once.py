@@ -8,12 +8,12 @@ import pytest
 from calibration.recording import dataset as datasets
 from calibration.stages.joints import separable_fit
 from calibration.stages.suspension import base_response
-from scenarios import load, run, steps
+from scenarios import steps
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return run(load("humanoids2024"), tmp_path_factory.mktemp("run") / "quick", quick=True).folder
+def folder(quick_run):
+    return quick_run.folder
 
 
 def counted(monkeypatch, counts, module, name, key):

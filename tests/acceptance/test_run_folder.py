@@ -17,15 +17,15 @@ from calibration.numerics.lie import from_vector, inverse, mean, to_vector
 from calibration.prediction.predict import predictor
 from calibration.recording.clock import Clock
 from calibration.stages.joints.correction import velocities
-from scenarios import load, run, steps
+from scenarios import steps
 from twin.truth import read_parameters, read_trial
 
 SAME = Clock("one", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory):
-    return run(load("humanoids2024"), tmp_path_factory.mktemp("run") / "quick", quick=True)
+def result(quick_run):
+    return quick_run
 
 
 def figure(rows, model, base, trials="dynamic", name="position_rmse_component_mm"):
