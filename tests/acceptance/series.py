@@ -39,6 +39,10 @@ class Series:
         """One figure of a row, by robot."""
         return np.array([_row(score, key)[name] for score in self.scores])
 
+    def coverage(self) -> np.ndarray:
+        """Share of the 95 % intervals of all models that contain the truth, by robot."""
+        return np.array([score["every_model"]["coverage_95"] for score in self.scores])
+
     def base_r2(self, axis: str, source: str = "plate") -> np.ndarray:
         """R2 of the base's predicted motion about an axis over the validation swings, by robot."""
         return np.array(

@@ -1,5 +1,8 @@
 """The ladder's claims on robots that no method was developed on: a band for each row, on fixed and on sampled arms."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,35 +10,60 @@ from tests.acceptance.series import SAMPLED, Key, series
 
 pytestmark = pytest.mark.slow
 SEEDS = range(1000, 1010)
+MM, DEG = "position_rmse_component_mm", "orientation_rmse_deg"
 
 BANDS = {
-    # row: [median at most, worst at most] of ten robots, mm per component against the truth, dynamic trials
-    Key("registration"): (8.8, 9.5),
-    Key("model_2"): (1.8, 2.2),
-    Key("model_3"): (1.45, 1.8),
-    Key("model_2", "measured"): (1.6, 2.0),
-    Key("model_3", "measured"): (1.15, 1.5),
-    Key("full"): (0.45, 0.7),
-    Key("full", "dynamics"): (0.65, 1.0),
-    Key("full", "measured"): (0.45, 0.7),
-    Key("floor", "measured", "link"): (0.25, 0.3),
+    # row: [median at most, worst at most] of ten fixed arms, mm per component and degrees, against the truth
+    Key("registration"): ((8.8, 9.5), (5.5, 6.0)),
+    Key("model_2"): ((1.8, 2.2), (1.0, 1.2)),
+    Key("model_3"): ((1.45, 1.8), (0.55, 0.7)),
+    Key("model_2", "measured"): ((1.6, 2.0), (1.0, 1.2)),
+    Key("model_3", "measured"): ((1.15, 1.5), (0.55, 0.7)),
+    Key("full"): ((0.50, 1.0), (0.18, 0.36)),
+    Key("full", "dynamics"): ((0.65, 1.3), (0.18, 0.36)),
+    Key("full", "measured"): ((0.42, 0.84), (0.13, 0.26)),
+    Key("full", "plate", trials="static"): ((0.8, 1.6), (0.2, 0.4)),
+    Key("floor", "measured", "link"): ((0.25, 0.3), (0.05, 0.06)),
 }
+SPREAD = 1.3  # by which errors of `full` may be larger on sampled arms
+SKILL = {"fixed": (0.95, 0.90), "sampled": (0.88, 0.78)}  # median, worst
 
 
 @pytest.fixture(scope="module", params=["fixed", "sampled"])
 def robots(request, tmp_path_factory):
+    """Scores of ten arms; runs in the folder that the environment variable CLAIM_RUNS names are read, not repeated."""
     overrides = SAMPLED if request.param == "sampled" else ()
-    return request.param, series(tmp_path_factory.mktemp(request.param), SEEDS, overrides)
+    kept = os.environ.get("CLAIM_RUNS")
+    folder = Path(kept) / request.param if kept else tmp_path_factory.mktemp(request.param)
+    return request.param, series(folder, SEEDS, overrides)
 
 
-@pytest.mark.parametrize("key", BANDS, ids=lambda key: "-".join((key.model, key.base, key.encoder)))
+@pytest.mark.parametrize("key", BANDS, ids=lambda key: "-".join((key.model, key.base, key.encoder, key.trials)))
 def test_each_row_lies_in_its_band(robots, key, claim):
     arms, found = robots
-    mm = found.figures(key)
-    claim(f"ladder/{arms}/{key.model}/{key.base}/{key.encoder}/{key.trials}", mm)
-    if arms == "fixed":
-        assert np.median(mm) <= BANDS[key][0]
-        assert mm.max() <= BANDS[key][1]
+    for name, quantity, (median, worst) in zip((MM, DEG), ("ladder", "orientation"), BANDS[key], strict=True):
+        error = found.figures(key, name)
+        claim(f"{quantity}/{arms}/{key.model}/{key.base}/{key.encoder}/{key.trials}", error)
+        if arms == "sampled" and key.model == "full":
+            median, worst = SPREAD * median, SPREAD * worst
+        if arms == "fixed" or key.model == "full":
+            assert np.median(error) <= median
+            assert error.max() <= worst
+
+
+def test_the_delivered_row_removes_most_of_what_can_be(robots, claim):
+    arms, found = robots
+    skill = found.figures(Key("full"), "skill")
+    claim(f"skill/{arms}/full/plate", skill)
+    assert np.median(skill) >= SKILL[arms][0]
+    assert skill.min() >= SKILL[arms][1]
+
+
+def test_intervals_hold_the_truth(robots, claim):
+    arms, found = robots
+    share = found.coverage()
+    claim(f"coverage/{arms}/every model", share)
+    assert np.median(share) >= 0.85
 
 
 def test_the_rows_keep_their_order_on_every_robot(robots):

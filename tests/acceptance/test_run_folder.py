@@ -1,7 +1,6 @@
 """The short variant of the default scenario, from the simulation to the report."""
 
 import json
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,6 @@ from calibration.numerics.lie import from_vector, inverse, mean, to_vector
 from calibration.prediction.predict import predictor
 from calibration.recording.clock import Clock
 from calibration.stages.joints.correction import velocities
-from scenarios import steps
 from twin.truth import read_parameters, read_trial
 
 SAME = Clock("one", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
@@ -70,13 +68,6 @@ def test_each_step_of_the_ladder_is_a_step_down(result, rows):
         m: figure(rows, m, "measured", name="orientation_rmse_deg") for m in ("nominal", "registration", "model_2")
     }
     assert angle["model_2"] < 0.5 * angle["registration"] < 0.5 * angle["nominal"]
-
-
-def test_nothing_but_the_dataset_reaches_the_calibration(result, tmp_path):
-    shutil.copytree(result.folder / "dataset", tmp_path / "elsewhere" / "dataset")
-    steps.calibrate(tmp_path / "elsewhere" / "dataset", tmp_path / "estimate")
-    for name in ("estimate.json", "estimate.nc", "calibrated.urdf", "master_calibration.yaml"):
-        assert (tmp_path / "estimate" / name).read_bytes() == (result.folder / "estimate" / name).read_bytes(), name
 
 
 def test_the_dataset_holds_no_seed_and_no_drawn_value(result):
