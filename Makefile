@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help demo test test-fast check slow claims bench bench-peer clean
+.PHONY: help demo test test-fast check slow claims bench bench-peer peer clean
 
 help:
 	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
@@ -16,6 +16,7 @@ help:
 	@echo "make claims      measure the claims on ten fixed and ten sampled robots into docs/claims.md (half an hour)"
 	@echo "make bench       the benchmarks"
 	@echo "make bench-peer  geometric calibration beside FIGAROH's, in an environment of its own"
+	@echo "make peer        FIGAROH 1.0.2 in .venv-peer, for tiago-twin peer"
 	@echo "make clean       remove .venv, caches and built files; runs/ stays"
 
 demo: $(READY)
@@ -46,6 +47,8 @@ bench: $(READY)
 
 bench-peer: $(READY) .venv-peer/ready
 	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_peer.py' tests/bench
+
+peer: .venv-peer/ready
 
 .venv-peer/ready:
 	@echo "Installing the peer, FIGAROH 1.0.2, into .venv-peer (once, about 1 GB)"

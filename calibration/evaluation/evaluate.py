@@ -99,7 +99,7 @@ def evaluate(
     later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
     if registering and later:
         again = reregistered(predict, dataset)
-        confirmed = [error for one in _each(again, dataset, later, report) for error in one.errors]
+        confirmed = [error for one in _each(again, dataset, later, report, submitted) for error in one.errors]
     errors = [error for one in scored for error in one.errors]
     joints = validation_qualities(predict.joints, [one.residuals for one in scored if one.residuals is not None])
     means = ((one.entry, one.means) for one in scored if one.means is not None)

@@ -79,7 +79,7 @@ class Submission:
             InputError: It has trials that the dataset does not have.
         """
         known = {entry.id for entry in dataset.entries(role)}
-        unknown = sorted(self.trials.keys() - known)
+        unknown = sorted(self.trials.keys() - known - {entry.id for entry in dataset.entries("confirmation")})
         if unknown:
             raise InputError(self.path, f"no {role} trial named {', '.join(unknown)}; there are {sorted(known)}")
         missing = sorted(known - self.trials.keys())

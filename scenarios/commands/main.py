@@ -14,15 +14,16 @@ from typing import Annotated
 import typer
 
 from scenarios.commands import check as command_check
-from scenarios.commands import dataset as command_dataset
 from scenarios.commands import design as command_design
 from scenarios.commands import import_export, quicklook, video
 from scenarios.commands import predict as command_predict
 from scenarios.commands import process as command_process
 from scenarios.commands import reality as command_reality
 from scenarios.commands import show as command_show
-from scenarios.commands import study as command_study
 from scenarios.commands import view as command_view
+from scenarios.commands.many import benchmark as command_benchmark
+from scenarios.commands.many import dataset as command_dataset
+from scenarios.commands.many import study as command_study
 from scenarios.commands.options import Out, Overrides, Quick, ScenarioName, Seed, overriding
 from scenarios.files.ending import FAILED, Ending
 
@@ -206,6 +207,8 @@ picture = app.command(epilog=_example("picture runs/short --still posture.png --
 view = app.command(epilog=_example("view runs/short --trial xyz --magnify 50"))(command_view.view)
 reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"))(command_reality.reality)
 show = app.command(epilog=_example("show humanoids2024 gap"))(command_show.show)
+benchmark = app.command(epilog=_example("benchmark make --out runs/bench"))(command_benchmark.benchmark)
+peer = app.command(epilog=_example("peer runs/short/dataset --out runs/peer"))(command_benchmark.peer)
 check = app.command(epilog=_example("check runs/short --max model_2.mm=2.5"))(command_check.check)
 
 

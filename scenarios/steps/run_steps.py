@@ -11,14 +11,14 @@ import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from scenarios.files import output_folder as folder
 from scenarios.files.errors import ScenarioError
 from scenarios.steps.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from calibration import Estimate, Evaluation
+    from calibration import Dataset, Estimate, Evaluation
     from calibration.options import Options
     from scenarios.files.scenario import Scenario
     from scenarios.score.score import Score
@@ -97,8 +97,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
             estimate = _calibrate(
                 new / "dataset", new / "estimate", None, scenario.calibration, progress, cross_validate=True
             )
-            evaluation = _evaluate(new / "estimate", new / "dataset", new, progress)
-            score = _score(new / "estimate", new, new / "truth", evaluation, progress)
+            evaluation, score = _evaluate(new / "estimate", new / "dataset", new, new / "truth", progress)
             _report(new, progress)
         except (NotCalibrated, NotEnoughData, NumericalFailure) as error:
             refused = error
@@ -106,7 +105,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
     if refused is not None:
         refused.add_note(f"The recordings are kept, with a report of why: {Path(out) / 'report.html'}")
         raise refused
-    return RunResult(Path(out), scenario, estimate, evaluation, score)
+    return RunResult(Path(out), scenario, estimate, evaluation, cast("Score", score))
 
 
 def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent) -> None:
@@ -185,11 +184,8 @@ def evaluate(
         folder.settle(place)
         folder.settle(Path(place).resolve().parent)
     with folder.updating(out, folder.EVALUATION, "evaluation.json") as new, one_blas_thread():
-        evaluation = _evaluate(Path(estimate), Path(dataset), new, progress, zeros)
-        score = None
-        if truth is not None:
-            score = _score(Path(estimate), new, Path(truth), evaluation, progress, zeros)
-    return evaluation, score
+        truth = None if truth is None else Path(truth)
+        return _evaluate(Path(estimate), Path(dataset), new, truth, progress, zeros)
 
 
 def report(run_folder: Path | str, progress: Progress = silent) -> Path:
@@ -246,42 +242,50 @@ def _calibrate(
     return estimate
 
 
-def _evaluate(
-    estimate: Path, dataset: Path, out: Path, progress: Progress, zeros: Path | str | None = None
-) -> "Evaluation":
+def evaluated(
+    estimate: Path, dataset: "Dataset", zeros: Path | str | None = None, progress: Progress = silent
+) -> tuple["Estimate | None", "Evaluation"]:
+    """An estimate, None for predicted poses, and its evaluation.
+
+    Raises:
+        InputError: It cannot be read, or is not of this dataset.
+        NotCalibrated: It must not be used.
+    """
     import calibration
     from calibration.breakdown import Breakdowns
     from calibration.evaluation import read_submission
 
     progress("evaluate", "", 0.0)
     poses = estimate.suffix.lower() in _POSES
+    found = None if poses else calibration.load_estimate(estimate, zeros)
     with Breakdowns("evaluation"):
-        evaluation = calibration.evaluate(
-            read_submission(estimate) if poses else calibration.load_estimate(estimate, zeros),
-            calibration.load(dataset),
+        return found, calibration.evaluate(
+            read_submission(estimate) if found is None else found,
+            dataset,
             lambda at, fraction: progress("evaluate", at, fraction),
         )
-    evaluation.save(out)
-    evaluation.save_predictions(out)
-    return evaluation
 
 
-def _score(
+def _evaluate(
     estimate: Path,
+    dataset: Path,
     out: Path,
-    truth: Path,
-    evaluation: "Evaluation",
+    truth: Path | None,
     progress: Progress,
     zeros: Path | str | None = None,
-) -> "Score":
+) -> tuple["Evaluation", "Score | None"]:
     import calibration
     from scenarios.score.score import score
 
+    found, evaluation = evaluated(estimate, calibration.load(dataset), zeros, progress)
+    evaluation.save(out)
+    evaluation.save_predictions(out)
+    if truth is None:
+        return evaluation, None
     progress("score", "", 0.0)
-    poses = estimate.suffix.lower() in _POSES
-    scored = score(None if poses else calibration.load_estimate(estimate, zeros), evaluation, truth)
+    scored = score(found, evaluation, truth)
     scored.save(out)
-    return scored
+    return evaluation, scored
 
 
 def _refuse(run_folder: Path, why: Exception, progress: Progress) -> None:

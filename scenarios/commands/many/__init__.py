@@ -1,0 +1,1 @@
+"""Commands about many robots: datasets, studies, frozen tasks."""
