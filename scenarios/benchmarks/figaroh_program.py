@@ -15,8 +15,6 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-os.environ.setdefault("MPLBACKEND", "Agg")
-
 
 class Robot:
     """All that BaseCalibration needs of a robot."""

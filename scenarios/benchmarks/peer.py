@@ -8,6 +8,7 @@ has no base that moves: where the base's markers are hidden, the base stays as i
 """
 
 import json
+import os
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -88,9 +89,8 @@ class Table:
 
 
 def _environment() -> dict[str, str]:
-    import os
-
-    return {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"OMP_NUM_THREADS": "1"}
+    own = {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+    return {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | own
 
 
 def predict_dataset(peer: Peer, folder: Path, out: Path) -> None:

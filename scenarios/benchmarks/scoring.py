@@ -37,6 +37,7 @@ class Figure:
         model: Row of the ladder; empty where the entry has one of its own.
         task: Name of the task.
         robot: Number of the robot.
+        main: Whether it is what the entry delivers.
         mm: RMSE of the hand's position per component [mm].
         deg: RMSE of its orientation [deg].
         again_mm: As `mm`, in the second session, against the motion capture.
@@ -48,6 +49,7 @@ class Figure:
     model: str
     task: str
     robot: int
+    main: bool
     mm: float
     deg: float
     again_mm: float = np.nan
@@ -133,6 +135,7 @@ def _figures(entry: Entry, task: Task, robot: Robot, run: Run, path: Path) -> It
             "" if model == path.stem else model,  # named after its file
             task.name,
             robot.id,
+            model in (scored.main, path.stem),
             row.metrics.position_rmse_component_mm,
             row.metrics.orientation_rmse_deg,
             np.nan if again is None else again.metrics.position_rmse_component_mm,

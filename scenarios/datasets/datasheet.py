@@ -1,4 +1,4 @@
-"""The page that tells a stranger what a collection holds: how it was drawn, its parts, units, splits, licence."""
+"""The card of a collection: how it was sampled, its parts, units, splits, licence."""
 
 import json
 from collections import Counter
@@ -10,8 +10,9 @@ import numpy as np
 from calibration.recording import Trial
 from scenarios.datasets.index import Row
 
-_DRAWN = """Every run is one robot of the series: seed `SeedSequence(root, spawn_key=(id,))`, so that a run depends on
-neither the others nor the order. What is drawn and how wide stands in `collection.json` (`scenario.twin.widths`)."""
+_SAMPLED = """Every run is one robot: seed `SeedSequence(root, spawn_key=(id,))`, so that a run depends on neither the
+others nor the order. What is sampled and how widely is in `collection.json` (`scenario.twin`; `widths.spread` is the
+relative half width of encoder zeros and gaps). Splits are by robot: all motions of a robot are in one part."""
 _BLIND = "The collection is blind: seeds, scenario values and truth are with its author."
 
 
@@ -28,9 +29,9 @@ def text(folder: Path, rows: Sequence[Row]) -> str:
         "",
         "Synthetic: a MuJoCo twin of a TIAGo mobile manipulator, measured by simulated instruments. No real robot.",
         "",
-        "## How it was drawn",
+        "## How it was sampled",
         "",
-        _BLIND if blind else _DRAWN,
+        _BLIND if blind else _SAMPLED,
         "",
         "## What is there",
         "",
@@ -44,6 +45,11 @@ def text(folder: Path, rows: Sequence[Row]) -> str:
         "- licence: that of the program; state the scenario and the versions when you publish results",
         "",
         *_figures(rows),
+        "## Uses and limits",
+        "",
+        "For training and judging calibrations where the truth must be known. It is simulated: what a real TIAGo shows",
+        "beyond the twin's defects is not in it. Validate an error model that is learnt here on your robot.",
+        "",
         *_variables(),
     ]
     return "\n".join(lines) + "\n"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.datasets.run_spec import Magnitude
+from scenarios.datasets.run_spec import Magnitude, Produce
 from scenarios.files.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -36,6 +36,55 @@ def recordings(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     magnitudes = _record(scenario, out)
     shutil.rmtree(out / "truth")
     return magnitudes
+
+
+def aligned_recordings_and_truth(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
+    """As `recordings_and_truth`, and aligned/."""
+    magnitudes = recordings_and_truth(scenario, out)
+    _align(out)
+    return magnitudes
+
+
+def aligned_recordings(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
+    """As `recordings`, and aligned/."""
+    magnitudes = recordings(scenario, out)
+    _align(out)
+    return magnitudes
+
+
+PRODUCE: dict[tuple[bool, bool], Produce] = {
+    (False, False): recordings_and_truth,
+    (False, True): aligned_recordings_and_truth,
+    (True, False): recordings,
+    (True, True): aligned_recordings,
+}
+"""What makes a run, by whether it is blind and whether it is aligned."""
+
+_ALIGNED: dict[str, tuple[str, ...]] = {
+    "t": ("t",),
+    "q_motor": ("t", "joint"),
+    "q_link": ("t", "joint"),
+    "T_lab_base": ("t", "row", "column"),
+    "T_lab_hand": ("t", "row", "column"),
+    "plate_wrench": ("t", "plate", "wrench"),
+}
+
+
+def _align(out: Path) -> None:
+    """Write aligned/<trial>.nc: every instrument at the motion capture's times, its clock estimated, not true."""
+    import calibration
+    from calibration.recording import netcdf
+
+    dataset = calibration.load(out / "dataset")
+    (out / "aligned").mkdir()
+    for entry in dataset.description.trials:
+        trial = dataset.trial(entry.id).aligned()
+        sizes = {"t": len(trial.t), "joint": trial.q_motor.shape[1], "plate": trial.plate_wrench.shape[1]}
+        with netcdf.created(out / "aligned" / f"{entry.id}.nc") as file:
+            netcdf.add_dimensions(file, sizes | {"row": 4, "column": 4, "wrench": 6})
+            for name, dims in _ALIGNED.items():
+                kind = "f8" if name == "t" else "f4"
+                netcdf.write_variable(file, name, getattr(trial, name), dims, kind, {"clock": "mocap"})
 
 
 def _record(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:

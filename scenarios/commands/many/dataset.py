@@ -8,6 +8,8 @@ from scenarios.commands.options import Out, Overrides, ScenarioName, Scheduler, 
 from scenarios.files.ending import FAILED
 from scenarios.files.errors import ScenarioError
 
+_SPREAD = "twin.widths.spread"
+
 
 def dataset(  # noqa: PLR0913  an option each
     scenario: ScenarioName,
@@ -16,21 +18,24 @@ def dataset(  # noqa: PLR0913  an option each
     workers: Workers = 0,
     scheduler: Scheduler = None,
     blind: Annotated[bool, typer.Option("--blind", help="Leave truth, seeds and scenario out.")] = False,
+    aligned: Annotated[bool, typer.Option("--aligned", help="Each trial on one clock, too, in aligned/.")] = False,
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Simulate N sampled robots of a scenario; run again to resume."""
+    """Simulate N sampled robots of a scenario (offsets and gaps 0.5 to 1.5 of its own); run again to resume."""
     from scenarios import steps
     from scenarios.commands import console
+    from scenarios.datasets import run_content
     from scenarios.datasets import workers as engine
     from scenarios.datasets.collection import Plan, collect
-    from scenarios.datasets.run_content import recordings, recordings_and_truth
 
     if workers and scheduler:
         raise ScenarioError("--workers and --scheduler: name one of them")
-    plan = Plan(
-        steps.load(scenario, overriding(overrides, seed)), n, out, recordings if blind else recordings_and_truth, blind
-    )
+    loaded = steps.load(scenario, overriding(overrides, seed))
+    if loaded.twin.widths.spread == 0.0 and not any(given.startswith(_SPREAD) for given in overrides or ()):
+        loaded = steps.load(scenario, [*overriding(overrides, seed), f"{_SPREAD}=0.5"])
+    produce = run_content.PRODUCE[blind, aligned]
+    plan = Plan(loaded, n, out, produce, blind)
     with console.progress() as progress:
         rows = collect(
             plan,

@@ -1,24 +1,32 @@
 """The command `study`."""
 
+import json
 from dataclasses import asdict
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from scenarios.commands.options import Out, Overrides, ScenarioName, Scheduler, Seed, Workers, overriding
+from scenarios.commands.options import Out, Overrides, Scheduler, Seed, Workers, overriding
 from scenarios.files.ending import FAILED
 from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
     from scenarios.steps import Progress
+    from scenarios.studies.statistics import Level, Parameter
 
 
 def study(  # noqa: PLR0913  an option each
-    kind: Annotated[Literal["coverage", "power"], typer.Argument(metavar="{coverage,power}", help="What to find out.")],
-    scenario: ScenarioName,
+    kind: Annotated[
+        Literal["coverage", "power", "compare"],
+        typer.Argument(metavar="{coverage,power,compare}", help="What to find out."),
+    ],
+    names: Annotated[
+        list[str], typer.Argument(metavar="SCENARIO|FOLDER...", help="A scenario; compare: studies or scores.")
+    ],
     out: Out,
-    n: Annotated[int, typer.Option("-n", min=2, metavar="N", help="How many robots, for each value.")],
+    n: Annotated[int, typer.Option("-n", min=2, metavar="N", help="How many robots, for each value.")] = 20,
     vary: Annotated[
         str | None, typer.Option(metavar="PATH=V1,V2,...", help="power: a value of the scenario and what it is set to.")
     ] = None,
@@ -30,7 +38,7 @@ def study(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Calibrate many robots: coverage of the intervals, or how often a gain shows."""
+    """Calibrate many robots: coverage of the intervals, how often a gain shows; or compare such studies, paired."""
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import workers as engine
@@ -39,8 +47,12 @@ def study(  # noqa: PLR0913  an option each
     from scenarios.studies.full_run import judged
     from scenarios.studies.matched_run import matched as without_physics
 
-    if workers and scheduler:
-        raise ScenarioError("--workers and --scheduler: name one of them")
+    if kind == "compare":
+        _compare([Path(name) for name in names], out)
+        return
+    if len(names) != 1 or (workers and scheduler):
+        raise ScenarioError(f"study {kind}: one scenario, and one of --workers and --scheduler")
+    scenario = names[0]
     path, values = _varied(kind, vary)
     produce = without_physics if matched else judged
     levels, found = [], []
@@ -55,12 +67,31 @@ def study(  # noqa: PLR0913  an option each
             levels.append(study.level(value, rows))
             found = list(study.parameters(folder, rows))
     study.save(out / "study.json", levels, found if kind == "coverage" else [])
+    _show(levels, found if kind == "coverage" else [], out)
+
+
+def _show(levels: "list[Level]", found: "list[Parameter]", out: Path) -> None:
+    from scenarios.commands import console
+
     console.show(console.records([_flat(asdict(x)) for x in levels]))
-    if kind == "coverage":
+    if found:
         console.show(console.records([_flat(asdict(p)) for p in sorted(found, key=lambda p: p.coverage_95)[:10]]))
     typer.echo(f"Study: {out / 'study.json'}")
     if all(x.calibrated.value == 0.0 for x in levels):
         raise typer.Exit(FAILED)
+
+
+def _compare(folders: list[Path], out: Path) -> None:
+    from scenarios.commands import console
+    from scenarios.datasets.index import write_whole
+    from scenarios.studies.compare import compare
+
+    found = [asdict(d) for d in compare(folders)]
+    out.mkdir(parents=True, exist_ok=True)
+    text = json.dumps({"schema": 1, "differences": found}, indent=1).replace("NaN", "null")
+    write_whole(out / "differences.json", text + "\n")
+    console.show(console.records([_flat(d) for d in found]))
+    typer.echo(f"Differences: {out / 'differences.json'}")
 
 
 def _tell(progress: "Progress", value: str, at: str, share: float) -> None:
