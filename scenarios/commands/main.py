@@ -18,11 +18,11 @@ from scenarios.commands import design as command_design
 from scenarios.commands import import_export, quicklook, video
 from scenarios.commands import predict as command_predict
 from scenarios.commands import process as command_process
-from scenarios.commands import reality as command_reality
 from scenarios.commands import show as command_show
 from scenarios.commands import view as command_view
 from scenarios.commands.many import benchmark as command_benchmark
 from scenarios.commands.many import dataset as command_dataset
+from scenarios.commands.many import reality as command_reality
 from scenarios.commands.many import study as command_study
 from scenarios.commands.options import Out, Overrides, Quick, ScenarioName, Seed, overriding
 from scenarios.files.ending import FAILED, Ending

@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from scenarios.commands.options import FAILED, Out, Workers
+from scenarios.commands.options import Out, Workers
+from scenarios.files.ending import FAILED
 from scenarios.files.errors import ScenarioError
 
 Tier = Annotated[str, typer.Option(metavar="quick|full", help="4 or 20 robots.")]
