@@ -25,6 +25,9 @@ def picture(  # noqa: PLR0913  an option each
     magnify: Annotated[float, typer.Option(min=0.0, help="How many times as large the base's motion is drawn.")] = 1.0,
     start: Annotated[float, typer.Option(min=0.0, metavar="S", help="From the trial's start.")] = 0.0,
     duration: Annotated[float, typer.Option(min=0.1, max=120.0, metavar="S", help="Of the clip.")] = 10.0,
+    ghost: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of the nominal robot that is mixed in, 0 to 1.")
+    ] = 0.0,
     renderer: Annotated[Renderer, typer.Option(help="What draws.")] = Renderer.auto,
 ) -> None:
     """Render a trial of a simulated run, with markers and plate force."""
@@ -44,6 +47,6 @@ def picture(  # noqa: PLR0913  an option each
 
     for path, seconds in ((still, 0.0), (clip, duration)):
         if path is not None:
-            options = ClipOptions(magnify=magnify, start=start, duration=seconds, renderer=renderer.value)
+            options = ClipOptions(magnify=magnify, start=start, duration=seconds, renderer=renderer.value, ghost=ghost)
             n = film(run_folder, trial, path, options)
             typer.echo(f"{path}: {n} picture{'s' if n > 1 else ''} of {trial}")

@@ -1,12 +1,14 @@
 """A clip of a recorded trial: the robot as it truly moved, its markers, and the force the plate bears.
 
     base     T_0 exp6(m log6(T_0^-1 T(t)))      its motion from the first sample on, m times as large
+    ghost    the nominal robot at the motor readings, its base where it first stood, mixed into the picture
     arrow    the plate's reaction, from the centre of pressure (-My, Mx) / Fz, 0.7 mm a newton, drawn over the robot
 
 Arm and torso are drawn at their true angles; the bending of links and wheels below the base is not recorded and not
 drawn. A GIF runs at the speed of the recording.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,6 +47,7 @@ class ClipOptions:
         rate: Pictures a second [Hz].
         size: Width and height [pixel].
         renderer: `auto`, `egl` or `rays`.
+        ghost: Share of the nominal robot in the picture [-].
     """
 
     magnify: float = 1.0
@@ -53,6 +56,7 @@ class ClipOptions:
     rate: float = 10.0
     size: tuple[int, int] = (480, 373)
     renderer: Renderer = "auto"
+    ghost: float = 0.0
 
 
 def clip(lab: Laboratory, trial: TruthTrial, path: Path, options: ClipOptions) -> int:
@@ -76,14 +80,17 @@ def clip(lab: Laboratory, trial: TruthTrial, path: Path, options: ClipOptions) -
     mujoco.mj_kinematics(model, data)
     centre = data.site("plate").xpos.copy()
     poses = magnified(trial.base_pose, options.magnify)
+    q = trial.q_link_true
     with Frames(model, view, options.renderer) as frames:
-        images = [frames.draw(posed(model, poses[k], trial, k)) for k in shown]
+        images = [frames.draw(posed(model, poses[k], trial.joint, q[k])) for k in shown]
+    if options.ghost:
+        images = _with_ghosts(images, view, trial, shown, options)
     pictures = [annotated(image, view, trial, int(k), centre, options) for image, k in zip(images, shown, strict=True)]
     path.parent.mkdir(parents=True, exist_ok=True)
     if options.duration == 0.0:
         pictures[0].save(path, format="png", optimize=True)
         return 1
-    palette = [p.quantize(128, dither=Image.Dither.NONE) for p in pictures]
+    palette = [p.quantize(128, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE) for p in pictures]
     pause = round(1000.0 / options.rate)
     palette[0].save(path, format="gif", save_all=True, append_images=palette[1:], duration=pause, loop=0)
     return len(pictures)
@@ -105,11 +112,24 @@ def magnified(T: np.ndarray, m: float) -> np.ndarray:
     return np.asarray((first * RigidTransform.from_exp_coords(m * motion)).as_matrix())
 
 
-def posed(model: mujoco.MjModel, T_lab_base: np.ndarray, trial: TruthTrial, k: int) -> mujoco.MjData:
-    """The state of sample k with the base at T_lab_base (4, 4)."""
+def _with_ghosts(
+    images: list[np.ndarray], view: View, trial: TruthTrial, shown: np.ndarray, options: ClipOptions
+) -> list[np.ndarray]:
+    """The pictures with the nominal robot mixed in: the two differ where the robots do."""
+    model = build(mjcf.spec(), (), visual=True).model
+    model.vis.global_.fovy = np.degrees(view.field)
+    still, q, part = trial.base_pose[0], trial.q_motor_true, options.ghost
+    with Frames(model, view, options.renderer) as frames:
+        ghosts = [frames.draw(posed(model, still, trial.joint, q[k])) for k in shown]
+    mixed = (np.rint((1.0 - part) * a + part * b) for a, b in zip(images, ghosts, strict=True))
+    return [image.astype(np.uint8) for image in mixed]
+
+
+def posed(model: mujoco.MjModel, T_lab_base: np.ndarray, joints: Sequence[str], q: np.ndarray) -> mujoco.MjData:
+    """The state with the base at T_lab_base (4, 4) and the joints at q [rad, m]."""
     stood, data = place_base(model, T_lab_base)
     model.body_pos[:], model.body_quat[:] = stood.body_pos, stood.body_quat
-    for joint, value in zip(trial.joint, trial.q_link_true[k], strict=True):
+    for joint, value in zip(joints, q, strict=True):
         data.joint(joint).qpos = value
     mujoco.mj_kinematics(model, data)
     mujoco.mj_camlight(model, data)
@@ -128,6 +148,8 @@ def annotated(
     caption = f"{trial.t_mocap[k] - trial.t_mocap[0]:5.1f} s   plate {-trial.plate_wrench[k, 2]:.0f} N"
     if options.magnify != 1.0:
         caption += f"   base's motion x {options.magnify:g}"
+    if options.ghost:
+        caption += "   pale: nominal"
     pen.text((8, view.size[1] - 22), caption, fill=(60, 66, 74), font=ImageFont.load_default(14))
     return drawn
 

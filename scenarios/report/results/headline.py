@@ -15,6 +15,11 @@ from scenarios.report.results.result_files import Row
 from scenarios.report.results.run_results import Results
 
 _NBSP = "\N{NO-BREAK SPACE}"
+_BASE, _FLOOR = "motion of the base", "floor of the instruments"
+_ADVICE = {
+    "arm": "record more postures and swings for the joints, chosen by tiago-twin calibrate DATASET --out DIR --next",
+    "base": "measure the base while the robot works, or record more motion on the force plate",
+}
 _STEPS = 3
 _WORTH = 0.05  # of the error, below which a gain is no next step [-]
 
@@ -79,7 +84,8 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
     shares = shares or (_shares(steps, best) if best else ())
     gains = tuple(NextStep(s.remedy, s.gain_mm) for s in budget.next_steps) if budget else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
-    ranked = (*refused, *_next_steps(steps, best, found, gains))[:_STEPS]
+    found_or_most = _next_steps(steps, best, found, gains) or tuple(_worth(best, shares))
+    ranked = (*refused, *found_or_most)[:_STEPS]
     return Headline(badge, _sentence(steps, best), shares, ranked, found)
 
 
@@ -114,9 +120,9 @@ def _shares(steps: Sequence[Step], best: Step) -> tuple[Share, ...]:
     last = min(rest, low.position_rmse_component_mm) if low else 0.0
     arm = "arm: joints and geometry" if low else "arm: joints, geometry and measurement noise"
     found = (
-        Share("motion of the base", (whole**2 - rest**2) ** 0.5),
+        Share(_BASE, (whole**2 - rest**2) ** 0.5),
         Share(arm, (rest**2 - last**2) ** 0.5),
-        Share("floor of the instruments", last),
+        Share(_FLOOR, last),
     )
     return tuple(sorted((share for share in found if share.size > 0.0), key=lambda share: -share.size))
 
@@ -129,6 +135,16 @@ def _next_steps(
     found.sort(key=lambda step: -(step.gain or 0.0))
     asked = [NextStep(f"{n.stage}: {n.message}", None) for n in notices if "record_next" in n.message]
     return (*found, *asked)
+
+
+def _worth(best: Step | None, shares: Sequence[Share]) -> Iterator[NextStep]:
+    """What better models of each part could gain at most, where no row of this run does."""
+    for share in shares:
+        if best is not None and share.cause != _FLOOR:
+            whole = best.main.position_rmse_component_mm
+            left = (whole**2 - share.size**2) ** 0.5
+            advice = _ADVICE["base" if share.cause == _BASE else "arm"]
+            yield NextStep(f"at most: {advice} ({error(left)}{_NBSP}mm would be left)", whole - left)
 
 
 def _gains(steps: Sequence[Step], best: Step) -> Iterator[NextStep]:
