@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help demo test test-fast check slow claims bench bench-peer peer clean
+.PHONY: help demo test test-fast check slow claims docs pictures bench bench-peer peer clean
 
 help:
 	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
@@ -14,6 +14,8 @@ help:
 	@echo "make check       format, lint, types"
 	@echo "make slow        the tests that take minutes"
 	@echo "make claims      measure the claims on ten fixed and ten sampled robots into docs/claims.md (half an hour)"
+	@echo "make docs        the documentation site into docs/_site, offline once its tools are installed"
+	@echo "make pictures    the pictures of the README and the documents from runs/demo; needs Chromium"
 	@echo "make bench       the benchmarks"
 	@echo "make bench-peer  geometric calibration beside FIGAROH's, in an environment of its own"
 	@echo "make peer        FIGAROH 1.0.2 in .venv-peer, for tiago-twin peer"
@@ -42,6 +44,19 @@ claims: $(READY)
 	$(BIN)/python -m pytest -q -m slow tests/acceptance/test_ladder.py
 	$(BIN)/python -m tests.acceptance.claims
 
+docs: $(READY) .venv/docs-ready
+	$(BIN)/python docs/reference.py
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_site
+	@echo "docs/_site/index.html"
+
+.venv/docs-ready: docs/requirements.txt $(READY)
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -r docs/requirements.txt
+	@touch $@
+
+pictures: $(READY)
+	$(BIN)/tiago-twin report runs/demo
+	$(BIN)/python docs/pictures.py runs/demo
+
 bench: $(READY)
 	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench --ignore=tests/bench/bench_peer.py
 
@@ -69,5 +84,5 @@ $(READY): requirements.txt pyproject.toml scenarios/testing/pytest_plugin.py
 	@touch $@
 
 clean:
-	rm -rf .venv .venv-peer dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peer dist docs/_site docs/reference .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

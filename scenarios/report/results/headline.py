@@ -84,7 +84,7 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
     shares = shares or (_shares(steps, best) if best else ())
     gains = tuple(NextStep(s.remedy, s.gain_mm) for s in budget.next_steps) if budget else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
-    found_or_most = _next_steps(steps, best, found, gains) or tuple(_worth(best, shares))
+    found_or_most = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, shares))
     ranked = (*refused, *found_or_most)[:_STEPS]
     return Headline(badge, _sentence(steps, best), shares, ranked, found)
 
@@ -137,10 +137,10 @@ def _next_steps(
     return (*found, *asked)
 
 
-def _worth(best: Step | None, shares: Sequence[Share]) -> Iterator[NextStep]:
-    """What better models of each part could gain at most, where no row of this run does."""
+def _worth(steps: Sequence[Step], best: Step | None, shares: Sequence[Share]) -> Iterator[NextStep]:
+    """What more data on each part could gain at most; of the arm only where the floor is known."""
     for share in shares:
-        if best is not None and share.cause != _FLOOR:
+        if best is not None and share.cause != _FLOOR and (share.cause == _BASE or floor(steps) is not None):
             whole = best.main.position_rmse_component_mm
             left = (whole**2 - share.size**2) ** 0.5
             advice = _ADVICE["base" if share.cause == _BASE else "arm"]
@@ -151,8 +151,8 @@ def _gains(steps: Sequence[Step], best: Step) -> Iterator[NextStep]:
     rows = [s for s in steps if s.model != FLOOR and better(s.main, best.main)]
     whole = best.main.position_rmse_component_mm
     ways = (
-        ("predict with", [s for s in rows if s.kind == "predictive"]),
-        ("measure the base while the robot works, with", [s for s in rows if s.kind == "oracle: base"]),
+        ("predict with", [s for s in rows if s.kind in ("predictive", best.kind)]),
+        ("measure the base while the robot works, with", [s for s in rows if s.kind == "oracle: base" != best.kind]),
         ("read the link-side encoders, with", [s for s in rows if s.kind == "oracle: encoder"]),
     )
     for verb, possible in ways:
@@ -174,7 +174,7 @@ def _notices(results: Results, steps: Sequence[Step]) -> tuple[Notice, ...]:
 
 
 def _no_gain(steps: Sequence[Step], model: str) -> Iterator[Notice]:
-    best, baseline = predictive(steps, model), predictive(steps, BASELINE)
+    best, baseline = (predictive(steps, m) or oracle_base(steps, m) for m in (model, BASELINE))
     if best is None or baseline is None or best is baseline or model == "arm_tool":
         return  # arm_tool and registration place the same hand; they differ in what they call its frames
     if not better(best.main, baseline.main):

@@ -82,10 +82,11 @@ def _index(known: Sequence[str], name: str) -> int:
 
 
 def best_of_each(steps: Iterable[Step]) -> tuple[Step, ...]:
-    """One predictive row a model, in the order of the ladder."""
+    """One predictive row a model, in the order of the ladder; with the base measured where no row is predictive."""
     steps = tuple(steps)
-    found = (predictive(steps, model) for model in dict.fromkeys(s.model for s in steps) if model != FLOOR)
-    return tuple(step for step in found if step is not None)
+    models = [model for model in dict.fromkeys(s.model for s in steps) if model != FLOOR]
+    found = [step for model in models if (step := predictive(steps, model)) is not None]
+    return tuple(found or [step for model in models if (step := oracle_base(steps, model)) is not None])
 
 
 def readable(steps: Sequence[Step]) -> tuple[Step, ...]:

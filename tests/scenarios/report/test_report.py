@@ -329,3 +329,11 @@ def test_nothing_is_written_through_a_link(run, tmp_path):
     write(run)
     assert (tmp_path / "mine").read_text() == "mine"
     assert not [path for path in run.iterdir() if path.name.startswith(".")]
+
+
+def test_rows_with_the_base_measured_are_shown_where_nothing_is_predictive(tmp_path):
+    write_evaluation(tmp_path, bases=("measured",))
+    write(tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert "base measured" in page and (tmp_path / "figures" / "headline.svg").is_file()
+    assert "measure the base while" not in page

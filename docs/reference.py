@@ -1,0 +1,122 @@
+"""Pages of the site that are generated: `docs/reference/*.md` from the types, docstrings, scenarios and commands."""
+
+import importlib
+import inspect
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import typer.main
+
+from scenarios import load
+from scenarios.commands.main import app
+from scenarios.files import registry
+from scenarios.files.value_paths import value_paths
+from twin import laboratory
+from twin.rendering import picture
+
+OUT = Path(__file__).parent / "reference"
+FACES = (
+    "scenarios",
+    "calibration",
+    "calibration.recording",
+    "calibration.robot",
+    "calibration.prediction",
+    "calibration.evaluation",
+    "calibration.estimate",
+    "calibration.design",
+    "calibration.formats",
+    "twin",
+    "twin.defects",
+    "twin.motions",
+    "mjcf",
+)
+DEFAULT = "humanoids2024"
+
+
+def table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown."""
+    names = list(columns)
+    lines = [names, ["---"] * len(names), *rows]
+    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def configuration() -> str:
+    """Every value of the default scenario that `--set` reaches."""
+    found = value_paths(load(DEFAULT))
+    rows = ((f"`{v.path}`", f"`{v.value}`", v.unit, v.range, v.default, v.meaning) for v in found)
+    text = "Every value `--set PATH=VALUE` reaches, as in the default scenario; `tiago-twin show SCENARIO` for another."
+    return f"# Configuration\n\n{text}\n\n{table(('path', 'value', 'unit', 'range', 'default', 'meaning'), rows)}\n"
+
+
+def parameters() -> str:
+    """Names, units and values of the truth of the default robot."""
+    truth = laboratory(load(DEFAULT).twin, load(DEFAULT).seed).twin.truth
+    rows = ((f"`{p.name}`", p.unit, f"{p.value:.6g}") for p in truth)
+    text = "Names and units in `truth.json`, `estimate.json` and `score.json`; values of the default robot."
+    return f"# Parameters\n\n{text}\n\n{table(('name', 'unit', 'value'), rows)}\n"
+
+
+def api() -> str:
+    """Public names of each package, with their docstrings."""
+    return "# Python API\n\n" + "\n".join(_face(importlib.import_module(name)) for name in FACES)
+
+
+def _face(module: object) -> str:
+    name, names = getattr(module, "__name__", ""), getattr(module, "__all__", ())
+    return f"## {name}\n\n{inspect.getdoc(module)}\n\n" + "\n".join(
+        _entry(n, getattr(module, n)) for n in sorted(names)
+    )
+
+
+def _entry(name: str, value: object) -> str:
+    if inspect.ismodule(value) or not callable(value):
+        return f"### {name}\n\n"
+    kind = "class " if inspect.isclass(value) else ""
+    try:
+        signature = str(inspect.signature(value))
+    except ValueError:
+        signature = "(...)"
+    methods = "".join(
+        f"\n\n{n}{inspect.signature(m)}\n    {inspect.getdoc(m)}"
+        for n, m in inspect.getmembers(value, inspect.isfunction if inspect.isclass(value) else lambda _: False)
+        if not n.startswith("_") and n in vars(value)
+    )
+    return f"### {name}\n\n```text\n{kind}{name}{signature}\n\n{inspect.getdoc(value)}{methods}\n```\n"
+
+
+def commands() -> str:
+    """`--help` of every command."""
+    group = typer.main.get_command(app)
+    context = typer.Context(group, info_name="tiago-twin")
+    parts = [f"# Help of every command\n\n```text\n{group.get_help(context)}\n```\n"]
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        below = typer.Context(command, info_name=name, parent=context, max_content_width=110)
+        parts.append(f"## {name}\n\n```text\n{command.get_help(below)}\n```\n")
+    return "\n".join(parts)
+
+
+def scenarios() -> str:
+    """Purpose and picture of every scenario."""
+    parts = ["# Scenarios\n"]
+    for name in registry.names():
+        loaded = load(name)
+        picture(loaded.twin, loaded.seed, OUT / f"{name}.png", (450, 350))
+        run = f"```bash\ntiago-twin run {name}\n```"
+        parts.append(f"## {name}\n\n{loaded.description}.\n\n![The robot of {name}]({name}.png)\n\n{run}\n")
+    parts.append("Results: [evidence](../results/README.md).\n")
+    return "\n".join(parts)
+
+
+def main() -> int:
+    """Write every page."""
+    OUT.mkdir(exist_ok=True)
+    for page in (configuration, parameters, api, commands, scenarios):
+        name = "help" if page is commands else page.__name__
+        (OUT / f"{name}.md").write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
