@@ -10,16 +10,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from calibration.breakdown import Breakdowns
-from calibration.checks.recordings import implausible_inputs
+from calibration.checks.recordings import judged
+from calibration.checks.trial_times import listed_twice
 from calibration.context import Context, with_postures
 from calibration.design.next_motions import drive_next, sweeps_next, swings_next
 from calibration.design.next_postures import record_next
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
 from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.estimate.rows import MAIN
+from calibration.mocap.dwells import resting
 from calibration.mocap.labels import relabelled_trials
 from calibration.options import Options
 from calibration.recording.dataset import Dataset
+from calibration.recording.posture_means import PostureMeans
+from calibration.recording.schema import TrialEntry
+from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.stage import BUNDLE
 from calibration.stages.clocks.stage import synchronise
@@ -86,17 +91,16 @@ def _calibrated(
     wanted = _wanted(_usual(dataset) if stages is None else stages)
     lab = Laboratory(dataset.urdf, dataset.description)
     tell("reading", 0.0)
-    pairs, means = tuple(relabelled_trials(dataset, "calibration")), tuple(m for _, m in dataset.means("calibration"))
+    pairs, means, findings = _read(dataset, lab)
     data = StageInput(
         lab,
         tuple(trial for entry, trial in pairs if entry.kind not in MOVES),
         tuple((entry.kind, trial) for entry, trial in pairs if entry.kind in MOVES),
         options=options or Options(),
     )
-    context = Context(data, _empty(dataset, data.options))
-    rejected = _implausible(dataset, lab, (*(trial for _, trial in pairs), *means))
-    if rejected:
-        return context.with_findings(*rejected).estimate
+    context = Context(data, _empty(dataset, data.options)).with_findings(*findings)
+    if context.data.rejected:
+        return context.estimate
     tell("clocks", 0.2)
     if not data.trials and not means:
         raise NotEnoughData("in every calibration trial the base moves; record static postures of the arm too")
@@ -137,19 +141,23 @@ def _wanted(stages: Sequence[str]) -> set[str]:
     return wanted | {stage.needs for stage in _STAGES if stage.name in wanted and stage.needs}
 
 
-def _implausible(dataset: Dataset, lab: Laboratory, trials: Sequence) -> tuple[Verdict, ...]:
-    """Why the recordings must not be used.
+def _read(
+    dataset: Dataset, lab: Laboratory
+) -> tuple[tuple[tuple[TrialEntry, Trial], ...], tuple[PostureMeans, ...], tuple[Verdict, ...]]:
+    """The calibration trials with the dwells in which the hand rests, posture means, and what is wrong with them.
 
     Raises:
         InputError: There are none.
     """
-    if not trials:
+    read, means = tuple(relabelled_trials(dataset, "calibration")), tuple(m for _, m in dataset.means("calibration"))
+    if not read and not means:
         raise InputError(
             dataset.folder / "dataset.json",
             "trials: no calibration trial; record static postures and one moving trial with that role",
         )
-    messages = implausible_inputs(dataset.description, lab.chain, trials)
-    return tuple(Verdict("reading", "refused", message) for message in messages)
+    twice = (Verdict("reading", "refused", m) for m in listed_twice(dataset.entries("calibration")))
+    findings = (*twice, *judged(lab, (*(trial for _, trial in read), *means), calibrated=True))
+    return tuple((entry, resting(trial)) for entry, trial in read), means, findings
 
 
 def _after(context: Context, stage: Stage) -> Context:

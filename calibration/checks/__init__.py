@@ -1,6 +1,6 @@
 """What makes recordings implausible: units, marker bodies, joint columns, force plates."""
 
 from calibration.checks.joint_readings import wrong_links
-from calibration.checks.recordings import implausible_inputs
+from calibration.checks.recordings import judged
 
-__all__ = ["implausible_inputs", "wrong_links"]
+__all__ = ["judged", "wrong_links"]

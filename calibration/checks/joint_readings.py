@@ -51,6 +51,22 @@ def implausible_readings(chain: Chain, q: np.ndarray) -> Iterator[str]:
             )
 
 
+def commanded(trial: Trial, sigma: float) -> Iterator[str]:
+    """Joints whose readings follow the command more closely than the encoder, of noise sigma [rad, m], can show."""
+    names = []
+    for name, read, asked in zip(trial.joint, trial.q_motor.T, trial.q_command.T, strict=True):
+        known = np.isfinite(asked)
+        moves = np.abs(np.gradient(np.where(known, asked, 0.0))) > sigma if len(asked) > 1 else known
+        apart = (read - asked)[known & moves]
+        if len(apart) >= _FEW and apart.std() < sigma:
+            names.append(name)
+    if names:
+        yield (
+            f"readings of {', '.join(names)} are the commands, to {sigma:.1g} rad in motion: a motor follows later; "
+            "record what its encoder read"
+        )
+
+
 def wrong_sides(trial: Trial) -> Iterator[str]:
     """Link readings of one trial that do not follow their motor's."""
     for k, name in enumerate(trial.joint):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.checks.plates import moved_by
 from calibration.errors import NotEnoughData
 from calibration.estimate.estimate import Estimate
 from calibration.evaluation.budget import Causes, budget, causes
@@ -35,7 +36,6 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body, Role, TrialEntry
 from calibration.recording.trial import REST, Trial
 from calibration.stages.frames.base_rests import MOVES
-from calibration.stages.suspension.checks import moved_by
 from calibration.verdict import Verdict
 
 Progress = Callable[[str, float], None]

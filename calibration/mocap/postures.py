@@ -17,6 +17,7 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.cluster_pose import BodyPoses, body_poses, point_of_means, poses_of_means, still_poses
+from calibration.mocap.dwells import inner_windows
 from calibration.mocap.measured_trial import MeasuredTrial, hand_covariance
 from calibration.numerics.lie import compose, inverse, skew, to_vector
 from calibration.numerics.signals import GAP, interpolate_columns
@@ -25,7 +26,6 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import REST, Trial
 
-_MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
 BLOCKS = 4
 _log = logging.getLogger(__name__)
 
@@ -82,12 +82,6 @@ class Postures:
 def dwell_windows(trial: Trial) -> np.ndarray:
     """Start and stop of each dwell without its margins, (n, 2) [s, mocap clock]."""
     return inner_windows(np.stack([trial.dwell_start, trial.dwell_stop], axis=1))
-
-
-def inner_windows(dwells: np.ndarray) -> np.ndarray:
-    """Start and stop of dwells (n, 2) [s] without their margins."""
-    margin = np.minimum(_MARGIN, 0.25 * (dwells[:, 1] - dwells[:, 0]))
-    return np.stack([dwells[:, 0] + margin, dwells[:, 1] - margin], axis=1)
 
 
 def static_postures(description: Description, trials: Iterable[Trial], robot: Clock) -> Postures:

@@ -1,6 +1,6 @@
 """Stage `suspension`: the base's springs from the base markers and the wrench on the floor, calibration trials alone.
 
-    1  wrong data are told by name (suspension_checks)
+    1  wrong data are told by name (checks.plates)
     2  the printed form, displacement -> wrench; refused unless K > 0, C >= 0, it settles, and, run forward on trials it
        was not fitted to, it is on no axis worse than a base that stays nor, by 2 % of the motion, than
     3  the reduced 6x6 compliance, fitted wrench -> displacement, which then takes its place
@@ -14,14 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.checks.plates import STAGE, moved_by, wrong_plate
 from calibration.inference.parameters import Combination, Model
+from calibration.numerics.signals import RATE
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
-from calibration.recording.trial import Trial
+from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.stages.suspension.base_response import Sway, Sways, WrenchSources, read_sways
-from calibration.stages.suspension.checks import STAGE, moved_bases, wrong_plate
 from calibration.stages.suspension.cross_validation import HeldOut, held_out
 from calibration.stages.suspension.form_selection import (
     Springs,
@@ -65,8 +66,8 @@ def fit_suspension(
     """
     sources = WrenchSources(lab, robot, plate, lab.T_base_B if T_base_B is None else T_base_B)
     sways = read_sways(sources, trials)
-    found = list(wrong_plate(lab.description, *sways.forcings)) if sways.plate else []
-    moved = moved_bases(sways.dynamics or sways.plate)
+    found = list(wrong_plate(lab, *sways.forcings)) if sways.plate else []
+    moved = _moved_bases(sways.dynamics or sways.plate)
     told = ", ".join(f"{name} by {how}" for name, how in moved.items())
     if moved:
         found.append(Verdict(STAGE, "warning", f"base moved during {told}: left out; brake it, or record again"))
@@ -82,6 +83,12 @@ def fit_suspension(
         found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
     suspension, said = _fitted(lab.description, sways, form or Form())
     return suspension, (*found, *said)
+
+
+def _moved_bases(sways: Sequence[Sway]) -> dict[str, str]:
+    """Trials after which the base rests elsewhere, and by how much."""
+    after = {sway.trial_id: moved_by(sway.x[-int(0.5 * REST * RATE) :].mean(axis=0)) for sway in sways}
+    return {name: how for name, how in after.items() if how}
 
 
 def _fitted(description: Description, sways: Sways, form: Form) -> tuple[Suspension, list[Verdict]]:

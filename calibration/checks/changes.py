@@ -1,0 +1,245 @@
+"""What changed while a campaign was recorded, or does not follow the robot: from the hand's residuals along all motion.
+
+    r_i = log6(T_measured_i^-1 T_B_H(q_i)) = J_theta e + J_j c_ij x + noise        x the size of a change        [m, rad]
+
+c_ij of joint j        gain q_ij - mean, slip 0 before a time and 1 after, drift the time
+of the readings        late by x after a time: the joints' velocities
+of the hand's markers, slipped after a time: a constant twist in the hand, and of the base's markers in the base
+
+e are the errors of the geometry, as large as its fit says; gears' compliance and backlash under gravity are nuisances
+as well, since they follow the angle too. What is left is divided by its own size, and the variance of x sums over
+blocks of time, because gears lag for as long as a motion lasts. The change that explains most is named, where it is
+larger than gears, clocks and mounts explain (their datasheet's tolerances) and than five of its standard deviations.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.mocap.postures import passed_rows, readings_at
+from calibration.numerics.lie import adjoint, inverse, log6
+from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
+from calibration.robot.blocks import BacklashPreload, Compliance
+from calibration.robot.hand import HandModel
+from calibration.verdict import Verdict
+
+STAGE = "reading"
+_SPACING, _MOST = 0.25, 600  # [s] between samples, at least; so many of them, about
+_STEP = 0.02  # [s] either side, for velocities
+_BLOCK = 4.0  # [s] of samples that hang together
+_TIMES = 9  # at which something may have changed
+_SURE = 5.0  # standard deviations
+_LATE = 3e-3  # [s]
+_HALF, _TOLD = 0.4, 0.15  # of a difference between sides that moves the hand; its standard deviation [-]
+_PLAY = 1e-2  # [rad, rad/(N.m)] width of what gears do under gravity
+_WRONG = 5.0  # times what is explained beyond which the effect is not bounded
+
+
+@dataclass(frozen=True)
+class Passed:
+    """Samples of all trials.
+
+    Attributes:
+        trial: (n,) number of the trial.
+        t: (n,) [s, mocap clock].
+        q: (n, n_measured) readings [rad, m].
+        v: (n, n_measured) their velocities [rad/s, m/s].
+        link: (n, n_measured) link readings [rad, m], NaN without one.
+        T: (n, 4, 4) measured T_B_H.
+    """
+
+    trial: np.ndarray
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    link: np.ndarray
+    T: np.ndarray
+
+
+@dataclass(frozen=True)
+class Change:
+    """A possible change.
+
+    Attributes:
+        text: What it is called.
+        columns: (n, 6, g) what a unit of it adds to the residuals.
+        limit: (g,) sizes that are explained otherwise.
+        unit: In which a single one is written.
+        factor: Of that unit.
+    """
+
+    text: str
+    columns: np.ndarray
+    limit: np.ndarray
+    unit: str = ""
+    factor: float = 1e3
+
+    def size(self, value: np.ndarray) -> str:
+        """A size (g,) as it is written."""
+        if len(value) == 1:
+            return f"{self.factor * value[0]:+.2g} {self.unit}"
+        return f"{1e3 * np.linalg.norm(value[:3]):.1f} mm and {1e3 * np.linalg.norm(value[3:]):.0f} mrad"
+
+
+def passed(trials: Sequence[MeasuredTrial], robot: Clock) -> Passed:
+    """Samples along all trials, their first seconds left out."""
+    seconds = sum(float(t.t_mocap[-1] - t.t_mocap[0]) for t in trials)
+    found = []
+    for k, trial in enumerate(trials):
+        t = trial.t_mocap
+        rows = passed_rows(t, max(_SPACING, seconds / _MOST))
+        before, q, after = (readings_at(trial, robot, t[rows] + d, trial.q_motor) for d in (-_STEP, 0.0, _STEP))
+        T = trial.T_base_hand[rows]
+        good = np.isfinite(before + q + after).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
+        v = (after - before) / (2.0 * _STEP)
+        link = readings_at(trial, robot, t[rows], trial.q_link)
+        found.append((np.full(good.sum(), k), t[rows][good], q[good], v[good], link[good], T[good]))
+    return Passed(*(np.concatenate(x) for x in zip(*found, strict=True)))
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What a calibrated geometry leaves of the hand's poses.
+
+    Attributes:
+        hand: Calibrated.
+        x: Samples.
+        J: (n, 6, k) derivatives by joint position.
+        r: (6 n,) residuals over their size, what errors of the geometry and of gears explain taken out.
+        keep: Takes the same out of columns (n, 6, g), in the same units, (6 n, g).
+    """
+
+    hand: HandModel
+    x: Passed
+    J: np.ndarray
+    r: np.ndarray
+    keep: Callable[[np.ndarray], np.ndarray]
+
+    def fitted(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Sizes (g,) of columns (n, 6, g), their covariance (g, g), and how much of the residuals they explain."""
+        C = self.keep(columns)
+        value, S = _fitted(C, self.r, _blocks(self.x))
+        return value, S, float(self.r @ self.r) - float(((self.r - C @ value) ** 2).sum())
+
+
+def unexplained(hand: HandModel, names: Sequence[str], covariance: np.ndarray, x: Passed) -> Unexplained:
+    """Residuals of samples x of a hand calibrated in the parameters `names` (p,), of covariance (p, p)."""
+    tau = hand.chain.gravity_torques(hand.angles(x.q))
+    gears = [n for kind in (Compliance, BacklashPreload) for n in hand.block(kind).names if n not in names]
+    at = hand.poses_and_derivatives(x.q, tau, (*names, *gears))
+    r, p = log6(inverse(x.T) @ at.T), len(names)
+    r = r - np.median(r, axis=0)
+    size = np.repeat([np.sqrt((r[:, part] ** 2).mean()) for part in (slice(3), slice(3, 6))], 3)
+    B = np.concatenate([at.J[:, :, :p] @ _root(covariance), _PLAY * at.J[:, :, p:]], axis=2) / size[:, None]
+    without = _without(_stacked(B))
+    return Unexplained(
+        hand, x, at.J_joint, without((r / size).ravel()), lambda columns: without(_stacked(columns / size[:, None]))
+    )
+
+
+def changes(left: Unexplained, description: Description, ids: Sequence[str]) -> Iterator[Verdict]:
+    """The change that explains the residuals best, if it is one; `ids` are the names of the trials."""
+    best, found = 0.0, None
+    for change in _possible(left, description, ids):
+        value, S, gain = left.fitted(change.columns)
+        sure = float(np.sqrt(value @ np.linalg.solve(S, value) / len(value)))
+        over = float(np.abs(value / change.limit).max())
+        if sure > _SURE and over > 1.0 and gain > best:
+            message = f"{change.text} by {change.size(value)} (+- {100.0 / sure:.0f} %); correct it, or record again"
+            best, found = gain, Verdict(STAGE, "refused" if over > _WRONG else "warning", message)
+    if found is not None:
+        yield found
+
+
+def exchanged_sides(left: Unexplained) -> Iterator[Verdict]:
+    """Joints whose motor reading is where the link is: r = x J_j (motor - link), x = 1 as the sides are meant to be."""
+    joints, columns = left.hand.nominal.joints, left.hand.nominal.columns
+    d = (left.x.q - left.x.link)[:, columns]
+    known = np.flatnonzero(np.isfinite(d).all(axis=0))
+    if not len(known):
+        return
+    d = d[:, known] - np.median(d[:, known], axis=0)
+    value, S, _ = left.fitted(left.J[:, :, known] * d[:, None])
+    sigma = np.sqrt(np.diag(S))
+    wrong = (value < _HALF) & (1.0 - value > _SURE * sigma) & (sigma < _TOLD)
+    if wrong.any():
+        names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
+        message = (
+            f"motor and link readings of {names} are exchanged: the hand is where the motor side says "
+            f"({100.0 * value[wrong].mean():.0f} % of their difference moves it, +- {100.0 * sigma[wrong].mean():.0f} %)"
+        )
+        yield Verdict(STAGE, "refused", f"{message}; exchange the columns")
+
+
+def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -> Iterator[Change]:
+    """Everything that may have changed."""
+    hand, x, J = left.hand, left.x, left.J
+    order = np.argsort(x.t)
+    moments = x.t[order[np.linspace(0, len(order) - 1, _TIMES + 2).astype(int)[1:-1]]]
+    steps = [(_when(x, ids, moment), (x.t >= moment).astype(float)) for moment in moments]
+    tol, columns = description.tolerances, hand.nominal.columns
+    ago = (x.t - x.t.mean()) / max(float(np.ptp(x.t)), 1.0)
+    for j, name in enumerate(hand.nominal.joints):
+        scale = 0.1 if hand.nominal.is_prismatic(name) else 1.0
+        q = x.q[:, columns[j]]
+        lever, unit, play = J[:, :, j, None], "mm" if scale < 1.0 else "mrad", 0.5 * tol.joint_play * scale
+        centred = q - q.mean()
+        if (spread := float(centred.std())) > 10.0 * play:
+            yield Change(
+                f"readings of {name} are off in scale",
+                lever * centred[:, None, None],
+                np.array([play / spread]),
+                "%",
+                100.0,
+            )
+        yield Change(f"readings of {name} drift", lever * ago[:, None, None], np.array([2.0 * play]), unit)
+        for when, step in steps:
+            yield Change(f"readings of {name} slip {when}", lever * step[:, None, None], np.array([play]), unit)
+    late = (J * x.v[:, None, columns]).sum(axis=2)[..., None]
+    mount = np.repeat([0.4 * tol.body_translation, 0.4 * tol.body_rotation], 3)
+    in_base = adjoint(inverse(x.T))
+    for when, step in steps:
+        yield Change(f"readings come late {when}", -late * step[:, None, None], np.array([_LATE]), "ms")
+        yield Change(f"markers of the hand slip {when}", np.eye(6) * step[:, None, None], mount)
+        yield Change(f"markers of the base slip {when}", in_base * step[:, None, None], mount)
+
+
+def _when(x: Passed, ids: Sequence[str], moment: float) -> str:
+    k = int(x.trial[np.argmin(np.abs(x.t - moment))])
+    return f"from {moment - x.t[x.trial == k].min():.0f} s of {ids[k]} on"
+
+
+def _stacked(columns: np.ndarray) -> np.ndarray:
+    return columns.reshape(-1, columns.shape[2])
+
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _without(B: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """What is left of columns once those of B (m, p), each of unit size before the data, have explained what they can."""
+    root = np.linalg.cholesky(B.T @ B + np.eye(B.shape[1]))
+    W = np.linalg.solve(root, B.T)
+    return lambda c: c - W.T @ (W @ c)
+
+
+def _blocks(x: Passed) -> np.ndarray:
+    """(n,) number of the block of time each sample belongs to."""
+    return np.unique(np.stack([x.trial, (x.t // _BLOCK).astype(int)], axis=1), axis=0, return_inverse=True)[1].ravel()
+
+
+def _fitted(C: np.ndarray, y: np.ndarray, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes (g,) of columns C (6 n, g) and their covariance (g, g), residuals of a block hanging together."""
+    H = C.T @ C + 1e-12 * np.trace(C.T @ C) * np.eye(C.shape[1])
+    value = np.linalg.solve(H, C.T @ y)
+    each = (C * (y - C @ value)[:, None]).reshape(len(blocks), 6, -1).sum(axis=1)
+    summed = np.zeros((blocks.max() + 1, C.shape[1]))
+    np.add.at(summed, blocks, each)
+    H_inv = np.linalg.inv(H)
+    n = len(summed)
+    return value, H_inv @ (summed.T @ summed) @ H_inv * (n / max(n - C.shape[1] - 1, 1))

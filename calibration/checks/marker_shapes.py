@@ -1,0 +1,167 @@
+"""Marker bodies that contradict their drawing, or themselves: scale, one marker elsewhere, a marker that was moved.
+
+    p_k = R (s x_k + e_k) + t        x_k drawn, s the scale of the measurement, e_k where marker k really is   [m]
+    s = 1 + sum e_k . x_k / sum |x_k|^2 over all bodies, x_k from each body's centre
+
+e_k are medians over samples of the residuals of the rigid bodies that fit best. Their usual size u, over all bodies,
+is what drawing and drilling leave; s has the standard deviation u / sqrt(sum |x_k|^2), and a marker is compared with
+where the others put it. Motion capture that is 1 % too large makes a robot 1 % too large: joint placements follow it,
+and no residual shows it.
+
+Within a campaign the e_k of a rigid body stay: where those of some windows differ from what most have by ten times the
+markers' noise, a marker was moved, slipped, or is another.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.mocap.cluster_pose import body_poses
+from calibration.recording.posture_means import PostureMeans
+from calibration.recording.schema import Body, Description
+from calibration.recording.trial import Trial
+from calibration.verdict import Verdict
+
+STAGE = "reading"
+_MANY = 400  # samples of a trial that are looked at
+_SURE = 5.0  # standard deviations
+_SCALE, _WRONG_SCALE = 1e-3, 5e-3  # off by less is 1 mm at the hand, by more 5 mm [-]
+_ODD, _FAR = 3.0, 1e-3  # times the usual size, and [m], a marker may be off its drawing unsaid
+_WINDOW = 2.0  # [s]
+_MOVED, _LASTING = 10.0, 2  # standard deviations of a marker's noise; windows in which it shows, a ghost in one
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What the samples of a trial show of a body.
+
+    Attributes:
+        trial: Its id.
+        t: (n,) [s], sample numbers where the file has no time.
+        e: (n, m, 3) markers less their drawing [m, body], NaN where hidden; all of them are fitted together.
+    """
+
+    trial: str
+    t: np.ndarray
+    e: np.ndarray
+
+
+def wrong_shapes(description: Description, trials: Sequence[Trial | PostureMeans]) -> Iterator[Verdict]:
+    """What the markers of each body say against their drawing or against each other."""
+    shapes = {b.name: [s for t in trials if (s := _shape(b, t)) is not None] for b in description.bodies}
+    bodies = {b.name: b for b in description.bodies if shapes[b.name] and len(b.markers) >= 3}
+    usual = {name: _median(np.concatenate([s.e for s in shapes[name]])) for name in bodies}
+    known = {name: e for name, e in usual.items() if np.isfinite(e).all()}
+    if not known:
+        return
+    xyz = {name: _drawn(bodies[name]) for name in known}
+    scale, sigma = _scale([(xyz[name], e) for name, e in known.items()])
+    if abs(scale - 1.0) > max(_SURE * sigma, _SCALE):
+        message = (
+            f"markers are {scale:.4f} +- {sigma:.4f} times as far apart as drawn, and the robot would become as much "
+            "too large: calibrate the motion capture again (its wand), or correct the drawings"
+        )
+        yield Verdict(STAGE, "refused" if abs(scale - 1.0) > _WRONG_SCALE else "warning", message)
+    else:
+        scale = 1.0
+    left = {name: e - (scale - 1.0) * (xyz[name] - xyz[name].mean(axis=0)) for name, e in known.items()}
+    u = _size(list(left.values()))
+    limit = description.tolerances.body_translation
+    for name, e in left.items():
+        moved = list(_moved(bodies[name], shapes[name], description.sigmas.marker, limit))
+        yield from moved or _misdrawn(bodies[name], e, u, limit)
+
+
+def _drawn(body: Body) -> np.ndarray:
+    return np.array([m.xyz for m in body.markers])
+
+
+def _shape(body: Body, trial: Trial | PostureMeans) -> Shape | None:
+    """A body in some samples of a trial; None where its markers are not all there, or never three at once."""
+    if len(body.markers) < 3 or any(m.name not in trial.marker for m in body.markers):
+        return None
+    columns = [trial.marker.index(m.name) for m in body.markers]
+    rows = slice(None, None, max(1, len(trial.marker_position) // _MANY))
+    found = body_poses(_drawn(body), trial.marker_position[rows][:, columns])
+    if not np.isfinite(found.T).any():
+        return None
+    t = np.arange(len(found.T), dtype=float) if isinstance(trial, PostureMeans) else trial.t_mocap[rows]
+    return Shape(trial.id, t, np.einsum("nji,nmj->nmi", found.T[:, :3, :3], found.residual))
+
+
+def _median(e: np.ndarray) -> np.ndarray:
+    """Median (m, 3) over samples e (n, m, 3) that show every marker; NaN without one."""
+    whole = e[np.isfinite(e).all(axis=(1, 2))]
+    return np.median(whole, axis=0) if len(whole) else np.full(e.shape[1:], np.nan)
+
+
+def _scale(known: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
+    """Scale of the measurement and its standard deviation [-], from drawings and residuals (m, 3) of all bodies."""
+    centred = [(x - x.mean(axis=0), e) for x, e in known]
+    square = sum(float((x**2).sum()) for x, _ in centred)
+    grown = sum(float((x * e).sum()) for x, e in centred) / square
+    free = sum(3 * len(x) - 6 for x, _ in centred) - 1
+    left = sum(float(((e - grown * x) ** 2).sum()) for x, e in centred)
+    return 1.0 + grown, float(np.sqrt(left / max(free, 1) / square))
+
+
+def _size(e: Sequence[np.ndarray]) -> float:
+    """Usual size of a coordinate of the residuals (m, 3) of several bodies, one strange body apart [m]."""
+    return float(np.median([np.sqrt((x**2).sum() / max(3 * len(x) - 6, 1)) for x in e]))
+
+
+def _misdrawn(body: Body, e: np.ndarray, usual: float, limit: float) -> Iterator[Verdict]:
+    """A marker that is not where the others put it, or a body of another shape; e (m, 3) its residuals."""
+    xyz = _drawn(body)
+    m, measured = len(xyz), xyz + e
+    size = float(np.sqrt((e**2).sum() / max(3 * m - 6, 1)))
+    if m < 4:  # a triangle does not say which of its corners is wrong
+        worst, name, left = size, "", 0.0
+    else:
+        off, rest = zip(*(_against_others(xyz, measured, k) for k in range(m)), strict=True)
+        k = int(np.argmin(rest))
+        worst, name, left = off[k], body.markers[k].name, rest[k]
+    if size <= max(_ODD * min(usual, _FAR), 0.5 * _FAR) or worst <= _FAR:
+        return
+    alone = name and left < 0.5 * size
+    what = (
+        f"marker {name} is {1e3 * worst:.1f} mm from its drawing" if alone else f"its shape is {1e3 * size:.1f} mm off"
+    )
+    remedy = "correct the drawing in dataset.json, or the labels" + (", or leave this marker out" if alone else "")
+    off_by = worst if alone else size
+    yield Verdict(
+        STAGE, "refused" if off_by > limit else "warning", f"body {body.name}: {what} from the drawing; {remedy}"
+    )
+
+
+def _against_others(xyz: np.ndarray, measured: np.ndarray, k: int) -> tuple[float, float]:
+    """How far marker k is from where the others put it, and how large the others' own residuals are [m]."""
+    others = np.arange(len(xyz)) != k
+    found = body_poses(xyz[others], measured[None, others])
+    T = found.T[0]
+    off = float(np.linalg.norm(T[:3, :3] @ xyz[k] + T[:3, 3] - measured[k]))
+    return off, float(np.sqrt((found.residual**2).sum() / max(3 * others.sum() - 6, 1)))
+
+
+def _moved(body: Body, shapes: Sequence[Shape], sigma: float, limit: float) -> Iterator[Verdict]:
+    """Trials and times in which a body has another shape than in most of the campaign."""
+    windows = [
+        (f"{s.trial} at {start - s.t[0]:.0f} s", _median(s.e[(s.t >= start) & (s.t < start + _WINDOW)]))
+        for s in shapes
+        for start in np.arange(s.t[0], s.t[-1], _WINDOW)
+    ]
+    windows = [(name, e) for name, e in windows if np.isfinite(e).all()]
+    if not windows:
+        return
+    e = np.array([e for _, e in windows])
+    usual = e[int(np.argmin([np.median(np.linalg.norm(e - one, axis=2).max(axis=1)) for one in e]))]
+    off = np.linalg.norm(e - usual, axis=2).max(axis=1)
+    moved = np.flatnonzero(off > _MOVED * sigma)
+    if len(moved) < _LASTING:
+        return
+    message = (
+        f"body {body.name}: a marker moved by {1e3 * off.max():.1f} mm against the others, in {len(moved)} of "
+        f"{len(e)} windows of {_WINDOW:.0f} s, the first in {windows[moved[0]][0]}; fix it, and record these again"
+    )
+    yield Verdict(STAGE, "refused" if off.max() > limit else "warning", message)
