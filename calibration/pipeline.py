@@ -6,10 +6,11 @@ A stage that needs another runs it. Only calibration trials are opened. Spins an
 purpose, are for `base_frame` alone; all other stages use the trials in which it stands.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from calibration.breakdown import Breakdowns
+from calibration.checks.changes import changes, exchanged_sides, passed, unexplained
 from calibration.checks.recordings import judged
 from calibration.checks.trial_times import listed_twice
 from calibration.context import Context, with_postures
@@ -20,6 +21,7 @@ from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.estimate.rows import MAIN
 from calibration.mocap.dwells import resting
 from calibration.mocap.labels import relabelled_trials
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.options import Options
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
@@ -32,6 +34,7 @@ from calibration.stages.frames.arm_tool_stage import ARM_TOOL
 from calibration.stages.frames.base_rests import MOVES, read_stations
 from calibration.stages.frames.base_stage import BASE_FRAME
 from calibration.stages.geometry.cross_validation import cross_validated
+from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.registration import REGISTRATION
 from calibration.stages.geometry.rows import GEOMETRY
 from calibration.stages.joints.correction import JointModels
@@ -166,7 +169,20 @@ def _after(context: Context, stage: Stage) -> Context:
     if absent:
         return context.with_findings(Verdict(stage.name, "missing", f"no {stage.name}: {absent}"))
     result = stage.run(context.data)
-    return _advised(context.with_result(result), result)
+    context = _advised(context.with_result(result), result)
+    return context.with_findings(*_changed(context.data)) if stage is GEOMETRY else context
+
+
+def _changed(data: StageInput) -> Iterator[Verdict]:
+    """What changed in the course of the trials, by the calibrated geometry."""
+    model, robot = data.model("model_2"), data.clock("robot")
+    trials = [MeasuredTrial.of(data.lab.description, t) for t in data.trials if len(t.t_robot)]
+    if model is None or robot is None or data.rejected or data.lab.description.hand_body.is_point:
+        return
+    hand = hand_of(model, data.lab.chain, data.lab.nominal_frames)
+    left = unexplained(hand, model, passed(trials, robot))
+    yield from changes(left, data.lab.description, [t.id for t in trials])
+    yield from exchanged_sides(left)
 
 
 def _advised(context: Context, result: StageResult) -> Context:

@@ -1,6 +1,6 @@
 """What changed while a campaign was recorded, or does not follow the robot: from the hand's residuals along all motion.
 
-    r_i = log6(T_measured_i^-1 T_B_H(q_i)) = J_theta e + J_j c_ij x + noise        x the size of a change        [m, rad]
+    r_i = log6(T_measured_i^-1 T_B_H(q_i)) = J_theta e + J_j c_ij x + noise        x the size of a change    [m, rad]
 
 c_ij of joint j        gain q_ij - mean, slip 0 before a time and 1 after, drift the time
 of the readings        late by x after a time: the joints' velocities
@@ -12,11 +12,13 @@ blocks of time, because gears lag for as long as a motion lasts. The change that
 larger than gears, clocks and mounts explain (their datasheet's tolerances) and than five of its standard deviations.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
+from calibration.inference.parameters import Model
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import passed_rows, readings_at
 from calibration.numerics.lie import adjoint, inverse, log6
@@ -30,7 +32,10 @@ STAGE = "reading"
 _SPACING, _MOST = 0.25, 600  # [s] between samples, at least; so many of them, about
 _STEP = 0.02  # [s] either side, for velocities
 _BLOCK = 4.0  # [s] of samples that hang together
+_CORRELATED = 0.25  # share of a block's samples that count as one, at least: a few blocks do not tell their scatter
+_FEWEST = 30  # samples
 _TIMES = 9  # at which something may have changed
+_CHANCE, _CLEAR = 5.7e-7, 1.5  # five standard deviations; times the square of them
 _SURE = 5.0  # standard deviations
 _LATE = 3e-3  # [s]
 _HALF, _TOLD = 0.4, 0.15  # of a difference between sides that moves the hand; its standard deviation [-]
@@ -125,13 +130,14 @@ class Unexplained:
         return value, S, float(self.r @ self.r) - float(((self.r - C @ value) ** 2).sum())
 
 
-def unexplained(hand: HandModel, names: Sequence[str], covariance: np.ndarray, x: Passed) -> Unexplained:
-    """Residuals of samples x of a hand calibrated in the parameters `names` (p,), of covariance (p, p)."""
+def unexplained(hand: HandModel, model: Model, x: Passed) -> Unexplained:
+    """Residuals of samples x of a hand with the values of an estimated model."""
+    known = [k for k, p in enumerate(model.parameters) if p.name in hand.names]
+    names, covariance = [model.parameters[k].name for k in known], model.covariance[np.ix_(known, known)]
     tau = hand.chain.gravity_torques(hand.angles(x.q))
     gears = [n for kind in (Compliance, BacklashPreload) for n in hand.block(kind).names if n not in names]
     at = hand.poses_and_derivatives(x.q, tau, (*names, *gears))
     r, p = log6(inverse(x.T) @ at.T), len(names)
-    r = r - np.median(r, axis=0)
     size = np.repeat([np.sqrt((r[:, part] ** 2).mean()) for part in (slice(3), slice(3, 6))], 3)
     B = np.concatenate([at.J[:, :, :p] @ _root(covariance), _PLAY * at.J[:, :, p:]], axis=2) / size[:, None]
     without = _without(_stacked(B))
@@ -141,16 +147,30 @@ def unexplained(hand: HandModel, names: Sequence[str], covariance: np.ndarray, x
 
 
 def changes(left: Unexplained, description: Description, ids: Sequence[str]) -> Iterator[Verdict]:
-    """The change that explains the residuals best, if it is one; `ids` are the names of the trials."""
-    best, found = 0.0, None
-    for change in _possible(left, description, ids):
+    """The change that explains the residuals of a calibration's trials best, if it is one; `ids` are their names."""
+    for message, over in _best(left, _possible(left, description, ids)):
+        yield Verdict(STAGE, "refused" if over > _WRONG else "warning", f"{message}; correct it, or record again")
+
+
+def constants(left: Unexplained, description: Description, trial: str) -> Iterator[Verdict]:
+    """The one thing that is otherwise in a trial than in the calibration, if anything is."""
+    always = [("", np.ones(len(left.x.t)))]
+    for message, _ in _best(left, _otherwise(left, description, always)):
+        yield Verdict(STAGE, "warning", f"{trial}: against the calibration, {message}; its errors are not the model's")
+
+
+def _best(left: Unexplained, possible: Iterable[Change]) -> Iterator[tuple[str, float]]:
+    """What explains the residuals best, and how many times it exceeds what is explained otherwise."""
+    if len(left.x.t) < _FEWEST:
+        return
+    best, found = 0.0, ("", 0.0)
+    for change in possible:
         value, S, gain = left.fitted(change.columns)
-        sure = float(np.sqrt(value @ np.linalg.solve(S, value) / len(value)))
+        square = float(value @ np.linalg.solve(S, value))
         over = float(np.abs(value / change.limit).max())
-        if sure > _SURE and over > 1.0 and gain > best:
-            message = f"{change.text} by {change.size(value)} (+- {100.0 / sure:.0f} %); correct it, or record again"
-            best, found = gain, Verdict(STAGE, "refused" if over > _WRONG else "warning", message)
-    if found is not None:
+        if square > _CLEAR * chi2.isf(_CHANCE, len(value)) and over > 1.0 and gain > best:
+            best, found = gain, (f"{change.text} by {change.size(value)} (+- {100.0 / np.sqrt(square):.0f} %)", over)
+    if best > 0.0:
         yield found
 
 
@@ -169,7 +189,7 @@ def exchanged_sides(left: Unexplained) -> Iterator[Verdict]:
         names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
         message = (
             f"motor and link readings of {names} are exchanged: the hand is where the motor side says "
-            f"({100.0 * value[wrong].mean():.0f} % of their difference moves it, +- {100.0 * sigma[wrong].mean():.0f} %)"
+            f"({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
         )
         yield Verdict(STAGE, "refused", f"{message}; exchange the columns")
 
@@ -179,37 +199,51 @@ def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -
     hand, x, J = left.hand, left.x, left.J
     order = np.argsort(x.t)
     moments = x.t[order[np.linspace(0, len(order) - 1, _TIMES + 2).astype(int)[1:-1]]]
-    steps = [(_when(x, ids, moment), (x.t >= moment).astype(float)) for moment in moments]
-    tol, columns = description.tolerances, hand.nominal.columns
     ago = (x.t - x.t.mean()) / max(float(np.ptp(x.t)), 1.0)
     for j, name in enumerate(hand.nominal.joints):
-        scale = 0.1 if hand.nominal.is_prismatic(name) else 1.0
-        q = x.q[:, columns[j]]
-        lever, unit, play = J[:, :, j, None], "mm" if scale < 1.0 else "mrad", 0.5 * tol.joint_play * scale
-        centred = q - q.mean()
+        play, unit = _play(left, description, j)
+        q = x.q[:, hand.nominal.columns[j]]
+        centred = (q - q.mean())[:, None, None]
         if (spread := float(centred.std())) > 10.0 * play:
-            yield Change(
-                f"readings of {name} are off in scale",
-                lever * centred[:, None, None],
-                np.array([play / spread]),
-                "%",
-                100.0,
-            )
-        yield Change(f"readings of {name} drift", lever * ago[:, None, None], np.array([2.0 * play]), unit)
-        for when, step in steps:
-            yield Change(f"readings of {name} slip {when}", lever * step[:, None, None], np.array([play]), unit)
-    late = (J * x.v[:, None, columns]).sum(axis=2)[..., None]
+            limit = np.array([play / spread])
+            yield Change(f"readings of {name} are off in scale", J[:, :, j, None] * centred, limit, "%", 100.0)
+        yield Change(f"readings of {name} drift", J[:, :, j, None] * ago[:, None, None], np.array([2.0 * play]), unit)
+    for k, trial in enumerate(ids):
+        yield _late(left, f" in {trial}", (x.trial == k).astype(float))
+    yield from _otherwise(left, description, [(_when(x, ids, m), (x.t >= m).astype(float)) for m in moments])
+
+
+def _otherwise(
+    left: Unexplained, description: Description, steps: Sequence[tuple[str, np.ndarray]]
+) -> Iterator[Change]:
+    """What may be otherwise in the samples of each step (n,) of 0 and 1."""
+    hand, x, J, tol = left.hand, left.x, left.J, description.tolerances
     mount = np.repeat([0.4 * tol.body_translation, 0.4 * tol.body_rotation], 3)
     in_base = adjoint(inverse(x.T))
     for when, step in steps:
-        yield Change(f"readings come late {when}", -late * step[:, None, None], np.array([_LATE]), "ms")
-        yield Change(f"markers of the hand slip {when}", np.eye(6) * step[:, None, None], mount)
-        yield Change(f"markers of the base slip {when}", in_base * step[:, None, None], mount)
+        rows = step[:, None, None]
+        for j, name in enumerate(hand.nominal.joints):
+            play, unit = _play(left, description, j)
+            yield Change(f"readings of {name} slipped{when}", J[:, :, j, None] * rows, np.array([play]), unit)
+        yield _late(left, when, step)
+        yield Change(f"markers of the hand are elsewhere{when}", np.eye(6) * rows, mount)
+        yield Change(f"markers of the base are elsewhere{when}", in_base * rows, mount)
+
+
+def _late(left: Unexplained, when: str, step: np.ndarray) -> Change:
+    late = -(left.J * left.x.v[:, None, left.hand.nominal.columns]).sum(axis=2)
+    return Change(f"readings are late{when}", (late * step[:, None])[..., None], np.array([_LATE]), "ms")
+
+
+def _play(left: Unexplained, description: Description, j: int) -> tuple[float, str]:
+    """What joint j's gear explains of a reading [rad, m], and the unit it is written in."""
+    prismatic = left.hand.nominal.is_prismatic(left.hand.nominal.joints[j])
+    return 0.5 * description.tolerances.joint_play * (0.1 if prismatic else 1.0), "mm" if prismatic else "mrad"
 
 
 def _when(x: Passed, ids: Sequence[str], moment: float) -> str:
     k = int(x.trial[np.argmin(np.abs(x.t - moment))])
-    return f"from {moment - x.t[x.trial == k].min():.0f} s of {ids[k]} on"
+    return f" from {moment - x.t[x.trial == k].min():.0f} s of {ids[k]} on"
 
 
 def _stacked(columns: np.ndarray) -> np.ndarray:
@@ -222,7 +256,7 @@ def _root(covariance: np.ndarray) -> np.ndarray:
 
 
 def _without(B: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """What is left of columns once those of B (m, p), each of unit size before the data, have explained what they can."""
+    """What is left of columns when those of B (m, p), each of unit size before the data, explain what they can."""
     root = np.linalg.cholesky(B.T @ B + np.eye(B.shape[1]))
     W = np.linalg.solve(root, B.T)
     return lambda c: c - W.T @ (W @ c)
@@ -241,5 +275,5 @@ def _fitted(C: np.ndarray, y: np.ndarray, blocks: np.ndarray) -> tuple[np.ndarra
     summed = np.zeros((blocks.max() + 1, C.shape[1]))
     np.add.at(summed, blocks, each)
     H_inv = np.linalg.inv(H)
-    n = len(summed)
-    return value, H_inv @ (summed.T @ summed) @ H_inv * (n / max(n - C.shape[1] - 1, 1))
+    least = _CORRELATED * len(blocks) / len(summed) * float(((y - C @ value) ** 2).mean())
+    return value, H_inv @ (summed.T @ summed) @ H_inv + least * H_inv

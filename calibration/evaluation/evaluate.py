@@ -21,10 +21,11 @@ from calibration.evaluation.joint_regimes import TrialResiduals, residuals, vali
 from calibration.evaluation.ladder import TrialErrors, ladder, trial_errors
 from calibration.evaluation.marker_errors import point_rows
 from calibration.evaluation.pose_errors import PoseErrors, pose_errors
+from calibration.evaluation.recorded import Recorded, believable, departures, recorded
 from calibration.evaluation.results import STAGE, Evaluation
 from calibration.evaluation.submission import Submission
 from calibration.mocap.cluster_pose import point_of_means, poses_of, poses_of_means
-from calibration.mocap.labels import relabelled_trial
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import inverse, mean, places, to_vector
 from calibration.prediction.foreign import check_names, registered
 from calibration.prediction.predict import predictor
@@ -77,7 +78,7 @@ def evaluate(
     Marker frames of an estimate that does not have them are fitted on the calibration trials.
 
     Raises:
-        InputError: Names, units, frames or clocks of another program are not the contract's.
+        InputError: Names, units, frames or clocks of another program are not the contract's; recordings cannot be true.
         NotEnoughData: There is no trial of that role.
         NotCalibrated: The estimate must not be used.
     """
@@ -85,10 +86,12 @@ def evaluate(
     if not entries:
         raise NotEnoughData(f"no {role} trial to score on")
     submitted, estimate = (estimate, NOTHING) if isinstance(estimate, Submission) else (None, estimate)
-    remarks = check_names(estimate, dataset)
+    read = tuple(recorded(dataset, entry) for entry in entries)
+    remarks = (*check_names(estimate, dataset), *believable(dataset, role, read))
     estimate = estimate if estimate.registered else registered(estimate, dataset)
     predict, report = predictor(estimate, dataset), progress or (lambda at, share: None)
-    scored = tuple(_each(predict, dataset, entries, report, submitted))
+    remarks += tuple(departures(estimate, dataset, predict.robot, read)) if role == "validation" else ()
+    scored = tuple(_each(predict, dataset, read, report, submitted))
     if submitted is not None:
         rows = [p for one in scored for p in one.predicted.rows if p.base == "submitted"]
         remarks = tuple(submitted.remarks(dataset, role, rows))
@@ -96,7 +99,7 @@ def evaluate(
         remarks += estimate.verdicts
     registering = registration_trials(dataset) if role == "validation" else ()
     confirmed: list[TrialErrors] = []
-    later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
+    later = tuple(recorded(dataset, e) for e in dataset.entries("confirmation") if e not in registering)
     if registering and later:
         again = reregistered(predict, dataset)
         confirmed = [error for one in _each(again, dataset, later, report, submitted) for error in one.errors]
@@ -119,18 +122,22 @@ def evaluate(
 def _each(
     predict: Predictor,
     dataset: Dataset,
-    entries: tuple[TrialEntry, ...],
+    read: tuple[Recorded, ...],
     report: Progress,
     submitted: Submission | None = None,
 ) -> Iterator[_Scored]:
-    for k, entry in enumerate(entries):
-        report(f"evaluating {entry.id}", k / len(entries))
-        one = _of_means if dataset.has_means(entry) else _of_trial
-        yield one(predict, dataset, entry, submitted)
+    for k, (entry, trial) in enumerate(read):
+        report(f"evaluating {entry.id}", k / len(read))
+        if isinstance(trial, PostureMeans):
+            yield _of_means(predict, dataset, (entry, trial), submitted)
+        else:
+            yield _of_trial(predict, dataset, (entry, trial), submitted)
 
 
-def _of_trial(predict: Predictor, dataset: Dataset, entry: TrialEntry, submitted: Submission | None) -> _Scored:
-    trial = relabelled_trial(dataset, entry)
+def _of_trial(
+    predict: Predictor, dataset: Dataset, read: tuple[TrialEntry, MeasuredTrial], submitted: Submission | None
+) -> _Scored:
+    entry, trial = read
     T_measured, predicted = poses_of(dataset.description.hand_body, trial).T, predict(entry, trial)
     own = None if submitted is None else submitted.row(entry, trial.t_mocap, T_measured)
     predicted = predicted if own is None else replace(predicted, rows=(*predicted.rows, own))
@@ -152,8 +159,10 @@ def _causes(predict: Predictor, predicted: PredictedTrial, trial: Trial) -> Caus
     return causes(parts, t, hand.T, predicted.T_lab_B, parts.q_link, noise)
 
 
-def _of_means(predict: Predictor, dataset: Dataset, entry: TrialEntry, submitted: Submission | None) -> _Scored:
-    means = dataset.read_means(entry)
+def _of_means(
+    predict: Predictor, dataset: Dataset, read: tuple[TrialEntry, PostureMeans], submitted: Submission | None
+) -> _Scored:
+    entry, means = read
     rows = tuple(predict.of_means(entry, means))
     if submitted is not None:
         hand = dataset.description.hand_body

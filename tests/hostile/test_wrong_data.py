@@ -1,0 +1,66 @@
+"""Mistakes of a laboratory are named, good data are kept."""
+
+import numpy as np
+import pytest
+
+from calibration import load
+from calibration.checks import judged
+from calibration.mocap import relabelled_trials
+from calibration.robot.laboratory import Laboratory
+from tests.doubles import rigid_robot
+from tests.hostile.spoilt import reference_of, tried
+from tests.hostile.wrong_data import FAST, TABLE, Campaign, drawn
+
+DRAWN, ALLOWED = 300, 3
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory):
+    folder = rigid_robot.campaign(tmp_path_factory.mktemp("rigid") / "data", rigid_robot.defects(1), n_postures=6)
+    return load(folder), Campaign.of(load(folder), rigid_robot.defects(1).robot[0])
+
+
+@pytest.fixture(scope="module")
+def twin(tmp_path_factory):
+    from scenarios.steps import run_steps
+
+    out = tmp_path_factory.mktemp("twin") / "run"
+    run_steps.simulate(run_steps.load("short", ["seed=5"]).quick(), out)
+    good = load(out / "dataset")
+    return good, *reference_of(good)
+
+
+def said(folder) -> list[str]:
+    dataset = load(folder)
+    trials = [trial for _, trial in relabelled_trials(dataset, "calibration")]
+    return [v.message for v in judged(Laboratory(dataset.urdf, dataset.description), trials, calibrated=True)]
+
+
+def test_nothing_is_said_of_good_recordings(rigid):
+    assert not said(rigid[0].folder)
+
+
+@pytest.mark.parametrize("mistake", FAST, ids=lambda m: m.name)
+def test_a_mistake_seen_in_the_recordings_is_named(rigid, mistake, tmp_path):
+    found = said(mistake.spoil(rigid[1]).written(tmp_path / "data"))
+    assert any(mistake.says in message for message in found), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mistake", TABLE, ids=lambda m: m.name)
+def test_a_mistake_is_named_or_costs_little(twin, mistake, tmp_path):
+    good, campaign, reference = twin
+    found = tried(mistake, campaign, good, reference, tmp_path / "data")
+    assert not mistake.says or any(words in m for m in found.said for words in mistake.says.split("|")), found
+    assert mistake.says or (found.calibrated and found.error < mistake.worst * found.clean), found
+
+
+@pytest.mark.slow
+def test_mistakes_at_random_are_hardly_ever_silently_wrong(twin, tmp_path):
+    good, campaign, reference = twin
+    found = [
+        tried(mistake, campaign, good, reference, tmp_path / f"{k}")
+        for k, mistake in enumerate(drawn(np.random.default_rng(0), DRAWN))
+    ]
+    wrong = [t for t in found if t.silently_wrong]
+    assert len(wrong) <= ALLOWED, wrong
