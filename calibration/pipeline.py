@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from calibration.breakdown import Breakdowns
-from calibration.checks.changes import changes, exchanged_sides, passed, unexplained
+from calibration.checks.changes import changes, exchanged_sides, passed, unexplained, wrong_mounts
 from calibration.checks.recordings import judged
 from calibration.checks.trial_times import listed_twice
 from calibration.context import Context, with_postures
@@ -180,9 +180,10 @@ def _changed(data: StageInput) -> Iterator[Verdict]:
     if model is None or robot is None or data.rejected or data.lab.description.hand_body.is_point:
         return
     hand = hand_of(model, data.lab.chain, data.lab.nominal_frames)
+    yield from wrong_mounts(hand, model, data.lab.description)
     left = unexplained(hand, model, passed(trials, robot))
     yield from changes(left, data.lab.description, [t.id for t in trials])
-    yield from exchanged_sides(left)
+    yield from exchanged_sides(left, data.lab.description)
 
 
 def _advised(context: Context, result: StageResult) -> Context:

@@ -24,7 +24,7 @@ from calibration.mocap.postures import passed_rows, readings_at
 from calibration.numerics.lie import adjoint, inverse, log6
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
-from calibration.robot.blocks import BacklashPreload, Compliance
+from calibration.robot.blocks import BacklashPreload, Compliance, Frames
 from calibration.robot.hand import HandModel
 from calibration.verdict import Verdict
 
@@ -37,10 +37,11 @@ _FEWEST = 30  # samples
 _TIMES = 9  # at which something may have changed
 _CHANCE, _CLEAR = 5.7e-7, 1.5  # five standard deviations; times the square of them
 _SURE = 5.0  # standard deviations
+_MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
 _LATE = 3e-3  # [s]
-_HALF, _TOLD = 0.4, 0.15  # of a difference between sides that moves the hand; its standard deviation [-]
+_HALF, _TOLD = 0.3, 0.15  # of a difference between sides that moves the hand; its standard deviation [-]
 _PLAY = 1e-2  # [rad, rad/(N.m)] width of what gears do under gravity
-_WRONG = 5.0  # times what is explained beyond which the effect is not bounded
+_WRONG = 3.0  # times what is explained beyond which the effect is not bounded
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,23 @@ def _best(left: Unexplained, possible: Iterable[Change]) -> Iterator[tuple[str, 
         yield found
 
 
-def exchanged_sides(left: Unexplained) -> Iterator[Verdict]:
+def wrong_mounts(hand: HandModel, model: Model, description: Description) -> Iterator[Verdict]:
+    """Marker bodies that are many tolerances from where they are drawn on their links."""
+    frames, tol = hand.block(Frames).names, description.tolerances
+    for body, names in ((description.base_body, frames[:6]), (description.hand_body, frames[6:])):
+        found = {p.name: p.value - p.nominal for p in model.parameters}
+        off = np.array([found.get(name, 0.0) for name in names])
+        over = float(np.abs(off / np.repeat([tol.body_translation, tol.body_rotation], 3)).max())
+        if over > _MOUNTED:
+            message = (
+                f"body {body.name}: its markers are {1e3 * np.linalg.norm(off[:3]):.0f} mm and "
+                f"{np.degrees(np.linalg.norm(off[3:])):.1f} deg from where they are drawn on {body.link}, {over:.0f} "
+                "times the tolerance: correct the drawing or the placement in dataset.json"
+            )
+            yield Verdict(STAGE, "refused" if over > 2.0 * _MOUNTED else "warning", message)
+
+
+def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Verdict]:
     """Joints whose motor reading is where the link is: r = x J_j (motor - link), x = 1 as the sides are meant to be."""
     joints, columns = left.hand.nominal.joints, left.hand.nominal.columns
     d = (left.x.q - left.x.link)[:, columns]
@@ -182,9 +199,10 @@ def exchanged_sides(left: Unexplained) -> Iterator[Verdict]:
     if not len(known):
         return
     d = d[:, known] - np.median(d[:, known], axis=0)
+    loose = d.std(axis=0) > [_play(left, description, int(k))[0] for k in known]  # of less, other errors are as large
     value, S, _ = left.fitted(left.J[:, :, known] * d[:, None])
     sigma = np.sqrt(np.diag(S))
-    wrong = (value < _HALF) & (1.0 - value > _SURE * sigma) & (sigma < _TOLD)
+    wrong = loose & (value < _HALF) & (1.0 - value > _SURE * sigma) & (sigma < _TOLD)
     if wrong.any():
         names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
         message = (

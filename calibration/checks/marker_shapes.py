@@ -14,6 +14,7 @@ markers' noise, a marker was moved, slipped, or is another.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -125,14 +126,24 @@ def _misdrawn(body: Body, e: np.ndarray, usual: float, limit: float) -> Iterator
     if size <= max(_ODD * min(usual, _FAR), 0.5 * _FAR) or worst <= _FAR:
         return
     alone = name and left < 0.5 * size
-    what = (
-        f"marker {name} is {1e3 * worst:.1f} mm from its drawing" if alone else f"its shape is {1e3 * size:.1f} mm off"
-    )
-    remedy = "correct the drawing in dataset.json, or the labels" + (", or leave this marker out" if alone else "")
-    off_by = worst if alone else size
-    yield Verdict(
-        STAGE, "refused" if off_by > limit else "warning", f"body {body.name}: {what} from the drawing; {remedy}"
-    )
+    remedy = "correct the drawing in dataset.json, or the labels"
+    if _mirrored(xyz, measured) < 0.5 * size:
+        what, remedy = (
+            "its markers move as in a mirror",
+            "the laboratory's frame is left-handed: swap two axes or turn one",
+        )
+    elif alone:
+        what, remedy = f"marker {name} is {1e3 * worst:.1f} mm from its drawing", f"{remedy}, or leave this marker out"
+    else:
+        what = f"its markers are {1e3 * size:.1f} mm rms from their drawing"
+    verdict: Literal["warning", "refused"] = "refused" if (worst if alone else size) > limit else "warning"
+    yield Verdict(STAGE, verdict, f"body {body.name}: {what}; {remedy}")
+
+
+def _mirrored(xyz: np.ndarray, measured: np.ndarray) -> float:
+    """Size of the residuals against the mirrored drawing [m]."""
+    r = body_poses(xyz * [1.0, 1.0, -1.0], measured[None]).residual
+    return float(np.sqrt((r**2).sum() / max(3 * len(xyz) - 6, 1)))
 
 
 def _against_others(xyz: np.ndarray, measured: np.ndarray, k: int) -> tuple[float, float]:

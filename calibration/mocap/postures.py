@@ -27,6 +27,7 @@ from calibration.recording.schema import Body, Description
 from calibration.recording.trial import REST, Trial
 
 BLOCKS = 4
+_SEEN = 0.2  # share of a dwell in which a marker must be seen
 _log = logging.getLogger(__name__)
 
 
@@ -174,8 +175,8 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
         whole, blocks = [seen], np.array_split(seen, BLOCKS)
         base, hand = (mean_poses(body, trial, whole + blocks) for body in bodies)
         T = inverse(base.T) @ hand.T
-        if not np.isfinite(T).all():
-            _log.info("%s: base or hand not seen throughout dwell %d", trial.id, k)
+        if not np.isfinite(T[0]).all():
+            _log.info("%s: base or hand not seen in dwell %d", trial.id, k)
             continue
         covariance = hand_covariance(T[:1], base.covariance[:1], hand.covariance[:1])[0] / len(seen)
         misfit = np.sqrt(np.nanmean(np.concatenate([base.residual[0], hand.residual[0]]) ** 2) * 3.0)
@@ -201,13 +202,20 @@ def mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
     seen = np.isfinite(p).all(axis=2)
     means = np.full((len(groups), *xyz.shape), np.nan)
     for k, rows in enumerate(groups):
-        often = seen[rows].sum(axis=0) > 0.5 * len(rows)
+        often = seen[rows].sum(axis=0) > _SEEN * len(rows)
         means[k, often] = np.nanmean(p[rows][:, often], axis=0)
     return body_poses(xyz, means)
 
 
 def inflation(quarters: np.ndarray, unit: np.ndarray) -> float:
-    """Mean squared Mahalanobis distance, per degree of freedom, of quarter means (n, 4, 6) about their mean."""
+    """Mean squared Mahalanobis distance, per degree of freedom, of quarter means (n, 4, 6) about their mean.
+
+    Of postures seen in all quarters; 1 where there is none.
+    """
+    seen = np.isfinite(quarters).all(axis=(1, 2))
+    quarters, unit = quarters[seen], unit[seen]
+    if not len(quarters):
+        return 1.0
     d = quarters - quarters.mean(axis=1, keepdims=True)
     squared = np.einsum("nki,nij,nkj->n", d, np.linalg.inv(unit * BLOCKS), d)
     return max(1.0, float(squared.mean()) / (6 * (BLOCKS - 1)))

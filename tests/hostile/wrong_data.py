@@ -304,7 +304,7 @@ TABLE = (
     Mistake("arm_4 gain 3 %", gain(4, 0.03), "arm_4_joint are off in scale"),
     Mistake("arm_2 gain -2 %", gain(2, -0.02), "arm_2_joint are off in scale"),
     Mistake("arm_3 slips by 1 deg", slip(3, 0.0175, 0.5), SLIPPED),
-    Mistake("arm_5 drifts by 1 deg", drift(5, 0.0175), SLIPPED),
+    Mistake("arm_3 drifts by 1 deg", drift(3, 0.0175), SLIPPED),
     Mistake("readings 50 ms late from half-way on", late(0.05, 0.5), SLIPPED),
     Mistake("hand markers slip by 10 mm", moved("gripper", [0.0, 0.01, 0.0], 0.5), SLIPPED),
     Mistake("base markers slip by 10 mm", moved("base", [0.01, 0.0, 0.0], 0.5), SLIPPED),
