@@ -94,15 +94,15 @@ def evaluate(
     scored = tuple(_each(predict, dataset, read, report, submitted))
     if submitted is not None:
         rows = [p for one in scored for p in one.predicted.rows if p.base == "submitted"]
-        remarks = tuple(submitted.remarks(dataset, role, rows))
+        remarks += tuple(submitted.remarks(dataset, role, rows))
     if not estimate.robot:
         remarks += estimate.verdicts
     registering = registration_trials(dataset) if role == "validation" else ()
     confirmed: list[TrialErrors] = []
-    later = tuple(recorded(dataset, e) for e in dataset.entries("confirmation") if e not in registering)
+    later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
     if registering and later:
-        again = reregistered(predict, dataset)
-        confirmed = [error for one in _each(again, dataset, later, report, submitted) for error in one.errors]
+        again, others = reregistered(predict, dataset), tuple(recorded(dataset, e) for e in later)
+        confirmed = [error for one in _each(again, dataset, others, report, submitted) for error in one.errors]
     errors = [error for one in scored for error in one.errors]
     joints = validation_qualities(predict.joints, [one.residuals for one in scored if one.residuals is not None])
     means = ((one.entry, one.means) for one in scored if one.means is not None)
