@@ -39,7 +39,7 @@ _CHANCE, _CLEAR = 5.7e-7, 1.5  # five standard deviations; times the square of t
 _SURE = 5.0  # standard deviations
 _MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
 _LATE = 3e-3  # [s]
-_HALF, _TOLD = 0.3, 0.15  # of a difference between sides that moves the hand; its standard deviation [-]
+_HALF, _TOLD = 0.3, 0.08  # of a difference between sides that moves the hand; its standard deviation [-]
 _PLAY = 1e-2  # [rad, rad/(N.m)] width of what gears do under gravity
 _WRONG = 3.0  # times what is explained beyond which the effect is not bounded
 
