@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration import calibrate, evaluate, load
+from calibration import Compensator, calibrate, evaluate, fit_geometry, load
 from calibration.errors import InputError
 from scenarios.steps import import_export
 from tests.doubles.real_postures import KINDS, ROOT, TWO_DAYS, one_marker, real_rows, spoilt_rows, written
@@ -26,6 +26,19 @@ def test_static_postures_are_calibrated_and_say_what_is_missing(tmp_path):
     assert estimate.calibrated and estimate.main == "full"
     assert "37 postures" in said["registration"].message
     assert (said["suspension"].verdict, said["joints"].verdict) == ("missing", "missing")
+
+
+def test_arrays_give_the_answer_of_the_command(tmp_path):
+    folder, _ = imported(tmp_path, "qualisys_2021-11-30_postures.csv", "qualisys_postures.yaml")
+    dataset = load(folder)
+    ((_, means),) = dataset.means("calibration")
+    joints, tool = dataset.description.joint_names, dataset.description.tool_frame
+    arrays = fit_geometry(dataset.urdf, joints, tool, means.q_motor, means.marker_position, "base_footprint")
+    xyz = np.array([m.xyz for m in dataset.description.hand_body.markers])
+    command = Compensator.of(calibrate(dataset)).points(xyz, means.q_motor).positions
+    apart = np.linalg.norm(arrays.predict(means.q_motor) - command, axis=2)
+    left = np.linalg.norm(command - means.marker_position, axis=2)
+    assert np.sqrt((apart**2).mean()) < 0.05 * np.sqrt((left**2).mean())
 
 
 def test_a_second_file_is_predicted_within_its_band(tmp_path):

@@ -2,8 +2,9 @@
 
 The laboratory's frame, the marker body's place on the tool and its shape are unknown; three markers or more are
 compressed to one pose a posture, fewer give a position. Estimated are both frames, six increments for every joint
-placement, the zero of every reading and the compliance of every gear, together with the readings' and the hand's random
-errors and the priors' widths (`evidence`). Postures that no error of the robot explains are left out and named.
+placement, the zero of every reading, compliance and backlash of every gear, as by `calibrate` (`gear_deflection`),
+together with the readings' and the hand's random errors and the priors' widths (`evidence`). Postures that no error of
+the robot explains are left out and named.
 """
 
 from collections.abc import Sequence
@@ -33,12 +34,13 @@ from calibration.verdict import Verdict
 
 _STAGE = "geometry"
 _LEAST = 1e-6  # [m, rad] smallest noise of a measured pose
+_LEAST_READING = 2e-5  # [rad, a tenth of it in m] smallest random error of a reading
 _FIXED = 1e-6  # [rad]
 
 
 @dataclass(frozen=True)
 class Widths:
-    """Standard deviations to begin with; the data move them.
+    """Standard deviations to begin with; the data move them. Those of a mapping file that states no tolerances.
 
     Attributes:
         translation: Of a joint placement, per axis [m].
@@ -50,11 +52,11 @@ class Widths:
         orientation: Of the hand's random rotation error [rad].
     """
 
-    translation: float = 4e-3
-    rotation: float = 8e-3
-    offset: float = 4e-2
+    translation: float = 3e-3
+    rotation: float = 6e-3
+    offset: float = 6e-2
     deflection: float = 3e-2
-    reading: float = 2e-3
+    reading: float = 8e-3
     position: float = 5e-4
     orientation: float = 1e-3
 
@@ -134,7 +136,7 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     nominal, reading = hand_model(chain, start.frames), widths.reading * joint_lengths(chain)
     less, more = _parameters(nominal, widths, chain.gravity_torques(postures.q), oriented)
     pose = np.array([widths.position, widths.orientation][: 1 + oriented])
-    found = fit_gears(nominal, less, more, postures, NoiseModel(reading, 1e-2 * reading, pose))
+    found = fit_gears(nominal, less, more, postures, NoiseModel(reading, _LEAST_READING * joint_lengths(chain), pose))
     if found.rejected:
         raise NotCalibrated(found.rejected)
     used = found.robust.kept

@@ -14,10 +14,10 @@ import pytest
 import mjcf
 from calibration.errors import NotCalibrated
 from calibration.robot.chain import chain_of_frames
-from calibration.stages.geometry.from_arrays import Widths, fit_chain
+from calibration.stages.geometry.from_arrays import fit_chain
 from scenarios.studies.cross_validation import held_out
 from tests.calibration.stages.geometry.test_from_arrays import LAB, X
-from tests.calibration.stages.geometry.test_montecarlo import POSTURES, drawn, measured
+from tests.calibration.stages.geometry.test_montecarlo import BELIEVED, POSTURES, drawn, measured
 from tests.doubles import rigid_robot
 from tests.doubles.real_postures import KINDS, TWO_DAYS, one_marker, real_rows, spoilt, spoilt_rows, written
 
@@ -88,7 +88,7 @@ def test_four_wrong_postures_of_a_known_robot_are_named_and_change_nothing(m, ki
         rest = np.delete(np.arange(POSTURES), wrong)
         rms, fits = [], []
         for rows, p in ((np.arange(POSTURES), spoilt(seen, wrong, kind, rng)), (rest, seen[rest])):
-            fits.append(fit_chain(chain, reading[rows], p[:, :m], Widths()))
+            fits.append(fit_chain(chain, reading[rows], p[:, :m], BELIEVED))
             rms.append(1e3 * np.sqrt(((fits[-1].predict(reading[POSTURES:]) - true) ** 2).sum(axis=2).mean()))
         change.append([abs(rms[0] - rms[1])])
         missed.append(not set(wrong.tolist()) <= set(fits[0].left_out))

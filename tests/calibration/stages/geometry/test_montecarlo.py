@@ -29,13 +29,14 @@ from tests.doubles import rigid_robot
 
 SIGMA, POSTURES, NEW, KNOWN = 2e-4, 40, 200, 12 + 7 * 8
 SEEDS = range(1000, 2000)  # not used for development
+BELIEVED = Widths(translation=4e-3, rotation=8e-3, offset=4e-2, reading=2e-3)  # what the truth is sampled from
 LEAST = 1e-2  # of the widths random errors begin with: the least that is believed of them
 
 
 def measured(truth, q, rng, share=LEAST):
     """Marker positions (n, 4, 3) [m] of a robot at joint angles q (n, 8), with noise and a share of the random errors
     that are expected."""
-    w = Widths()
+    w = BELIEVED
     q = q + share * w.reading * np.r_[0.1, np.ones(7)] * rng.normal(size=q.shape)
     hand = share * np.repeat([w.position, w.orientation], 3) * rng.normal(size=(len(q), 6))
     return rigid_robot.positions(LAB @ rigid_robot.hand_in_base(truth, q) @ exp6(hand), X) + SIGMA * rng.normal(
@@ -65,7 +66,7 @@ def judged(chain, seed, soft):
     """
     rng = np.random.default_rng([seed, 31])
     truth, reading, q = drawn(chain, rng, soft)
-    found = fit_chain(chain, reading[:POSTURES], measured(truth, q[:POSTURES], rng), Widths())
+    found = fit_chain(chain, reading[:POSTURES], measured(truth, q[:POSTURES], rng), BELIEVED)
     true = body_poses(found.markers, rigid_robot.positions(LAB @ rigid_robot.hand_in_base(truth, q[POSTURES:]), X)).T
     predicted = found.hand.poses_and_derivatives(reading[POSTURES:], names=found.parameters.names)
     J, scale = predicted.J, found.parameters.scale[:KNOWN]
