@@ -6,7 +6,7 @@ SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -24,10 +24,26 @@ Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{0,200}$")]
 """One line for people."""
 Role = Literal["calibration", "validation", "confirmation"]
 Kind = Literal["static", "sweep", "swing", "spin", "drive"]
-BASE, HAND = "base", "gripper"
 _ORTHOGONAL = 1e-3  # axes of a plate may be rounded [-]
 _GRAVITY = (0.5, 30.0)  # [m/s2]
 _MOST_JOINTS, _MOST_BODIES, _MOST_MARKERS, _MOST_TRIALS = 100, 100, 1000, 10_000
+
+
+class OnLink(Protocol):
+    """A body with a name and the link it is on."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def link(self) -> str:
+        """The link it is fixed on."""
+        ...
+
+
+B = TypeVar("B", bound=OnLink)
 
 
 class Declaration(BaseModel):
@@ -279,16 +295,23 @@ class Description(Setup):
     @property
     def base_body(self) -> Body:
         """The marker body on the base frame."""
-        return self._body(BASE, self.base_frame)
+        return self._found(body_on(self.bodies, self.base_frame), f"base_frame {self.base_frame!r}")
 
     @property
     def hand_body(self) -> Body:
         """The marker body at the hand, whose frame is the pose predicted and scored."""
-        return self._body(HAND, self.tool_frame)
+        found = body_on(self.bodies, self.tool_frame, self.base_frame)
+        return self._found(found, f"tool_frame {self.tool_frame!r}")
 
-    def _body(self, name: str, link: str) -> Body:
-        found = self.body(name) or next((b for b in self.bodies if b.link == link), None)
-        if found is None:
-            known = [b.name for b in self.bodies]
-            raise NotEnoughData(f"dataset.json has no marker body {name!r} and none on {link!r}; bodies: {known}")
-        return found
+    def _found(self, body: Body | None, wanted: str) -> Body:
+        if body is None:
+            known = {b.name: b.link for b in self.bodies}
+            raise NotEnoughData(f"dataset.json has no marker body on its {wanted}; bodies and links: {known}")
+        return body
+
+
+def body_on(bodies: Sequence[B], link: str, base: str = "") -> B | None:
+    """The first body on a link; for a hand, the only one that is not on the link `base` where none is on its own."""
+    found = next((b for b in bodies if b.link == link), None)
+    others = [b for b in bodies if b.link != base]
+    return others[0] if found is None and base and len(others) == 1 else found

@@ -23,7 +23,7 @@ from calibration.robot.hand import HandModel
 class Session:
     """How far marker body and base are from where they were, on another day; standard deviations per axis.
 
-    The defaults are those of a TIAGo that was put away in between: the same posture, 2 mm (rms) elsewhere.
+    The defaults are those of a service robot that was put away in between: the same posture, 2 mm (rms) elsewhere.
 
     Attributes:
         base: Of the laboratory's frame in the base: translation [m], rotation [rad].

@@ -10,7 +10,7 @@ import numpy as np
 
 from calibration.errors import InputError
 from calibration.numerics.lie import from_vector, inverse, jlog6, local_twist, log6, to_vector
-from calibration.recording.schema import BASE, Body, Description
+from calibration.recording.schema import Body, Description
 from calibration.robot.chain import Chain
 
 PREFIX = "frame.base.arm"
@@ -59,7 +59,7 @@ def placement_derivative(chain: Chain, vector: np.ndarray) -> np.ndarray:
 
 def frame_names() -> tuple[str, str]:
     """Prefixes of the two registrations: base body in the base frame, hand body in the tool frame."""
-    return f"frame.base.{BASE}", "frame.tool.hand"
+    return "frame.base.base", "frame.tool.hand"
 
 
 def nominal_frames(chain: Chain, description: Description) -> np.ndarray:

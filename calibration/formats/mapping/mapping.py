@@ -16,8 +16,6 @@ from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable, 
 from calibration.formats.mapping.poses import marker_names as pose_markers
 from calibration.formats.mapping.poses import shape_of
 from calibration.recording.schema import (
-    BASE,
-    HAND,
     Body,
     Declaration,
     Kind,
@@ -30,6 +28,7 @@ from calibration.recording.schema import (
     Setup,
     Text,
     Vector6,
+    body_on,
     refuse_repeated,
 )
 
@@ -167,17 +166,14 @@ class Mapping(Declaration):
     @property
     def base_name(self) -> str:
         """Of the marker body on the base frame; empty where there is none."""
-        return self._name_of(BASE, self.setup.base_frame)
+        found = body_on(self.bodies, self.setup.base_frame)
+        return found.name if found else ""
 
     @property
     def hand_name(self) -> str:
         """Of the marker body on the tool frame; empty where there is none."""
-        return self._name_of(HAND, self.setup.tool_frame)
-
-    def _name_of(self, name: str, link: str) -> str:
-        if any(b.name == name for b in self.bodies):
-            return name
-        return next((b.name for b in self.bodies if b.link == link), "")
+        found = body_on(self.bodies, self.setup.tool_frame, self.setup.base_frame)
+        return found.name if found else ""
 
     @model_validator(mode="after")
     def _names_fit(self) -> "Mapping":

@@ -9,7 +9,8 @@ with the base (wheels are suspended in its axes), and its weight f moves with it
 
     G x = sum_i [theta x f_i ; p_i x (theta x f_i)] - [0 ; (t + theta x c) x f]            second term: dynamics only
 
-The first is 745 N/rad between force and tilt on TIAGo, the second takes W c_z = 270 N.m/rad off roll and pitch.
+On a mobile manipulator of 73 kg the first is 745 N/rad between force and tilt, the second takes W c_z = 270 N.m/rad off
+roll and pitch.
 
 Trials as sways, by the plate's wrench and by that of inverse dynamics.
 """
