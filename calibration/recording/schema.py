@@ -6,12 +6,13 @@ SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
-from typing import Annotated, Literal, Protocol, TypeVar
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from calibration.errors import NotEnoughData
+from calibration.recording.body_on_link import body_on
 
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 Vector3 = tuple[Number, Number, Number]
@@ -27,23 +28,6 @@ Kind = Literal["static", "sweep", "swing", "spin", "drive"]
 _ORTHOGONAL = 1e-3  # axes of a plate may be rounded [-]
 _GRAVITY = (0.5, 30.0)  # [m/s2]
 _MOST_JOINTS, _MOST_BODIES, _MOST_MARKERS, _MOST_TRIALS = 100, 100, 1000, 10_000
-
-
-class OnLink(Protocol):
-    """A body with a name and the link it is on."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        ...
-
-    @property
-    def link(self) -> str:
-        """The link it is fixed on."""
-        ...
-
-
-B = TypeVar("B", bound=OnLink)
 
 
 class Declaration(BaseModel):
@@ -308,10 +292,3 @@ class Description(Setup):
             known = {b.name: b.link for b in self.bodies}
             raise NotEnoughData(f"dataset.json has no marker body on its {wanted}; bodies and links: {known}")
         return body
-
-
-def body_on(bodies: Sequence[B], link: str, base: str = "") -> B | None:
-    """The first body on a link; for a hand, the only one that is not on the link `base` where none is on its own."""
-    found = next((b for b in bodies if b.link == link), None)
-    others = [b for b in bodies if b.link != base]
-    return others[0] if found is None and base and len(others) == 1 else found

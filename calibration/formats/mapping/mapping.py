@@ -15,6 +15,7 @@ from calibration.errors import InputError
 from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable, PoseChannels, PoseTopic
 from calibration.formats.mapping.poses import marker_names as pose_markers
 from calibration.formats.mapping.poses import shape_of
+from calibration.recording.body_on_link import body_on
 from calibration.recording.schema import (
     Body,
     Declaration,
@@ -28,7 +29,6 @@ from calibration.recording.schema import (
     Setup,
     Text,
     Vector6,
-    body_on,
     refuse_repeated,
 )
 
