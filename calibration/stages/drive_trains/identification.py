@@ -20,14 +20,15 @@ import numpy as np
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB
-from calibration.stages.drive_trains.quantities import reported, uncertainty
+from calibration.stages.drive_trains.quantities import covariance_of, reported
+from calibration.stages.drive_trains.steady_contact import steady_contact
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.drive_trains.train_fit import (
     FLOORS,
-    GAMMA_INFORMATION,
     Problem,
     TrainFit,
     derivatives,
+    evaluated,
     fit_train,
     prior_of,
     sizes,
@@ -58,11 +59,13 @@ class Candidate:
         fit: Of all trials.
         score: Of trials left out; less is better.
         left_out: Rms of what is left of trials left out [rad].
+        covariance: (p + 5, p + 5) of theta and gamma.
     """
 
     fit: TrainFit
     score: float
     left_out: float
+    covariance: np.ndarray
 
 
 def load_modes(loads: Sequence[LinkLoads], column: int, root: np.ndarray) -> np.ndarray:
@@ -94,7 +97,7 @@ def identify(
         inertials=modes @ fit.problem.modes(fit.theta),
         torque_sigma=torque_sigma(float(fit.problem.train(fit.theta).values[COULOMB])),
     )
-    return reported(train, fit, uncertainty(fit), motor_offset)
+    return reported(train, fit, chosen.covariance, motor_offset)
 
 
 def torque_sigma(coulomb: float) -> float:
@@ -117,42 +120,64 @@ def _start(fit: TrainFit) -> tuple[float, float]:
 
 def best_train(problem: Problem, coarse: JointData, backlash: float, deflection: float) -> Candidate:
     """The form that holds; priors as `prior_of`. The search begins with the joint's data in `coarse` windows."""
-    still, moving = (replace(problem, form="dead_zone", dynamic=dynamic) for dynamic in (False, True))
-    first = replace(moving, data=coarse)
-    roughly = [fit_train(first, theta, _ROUGH[:1], hasty=True) for theta in _starts(first)]
-    best = fit_train(first, min(roughly, key=lambda fit: fit.cost).theta, _ROUGH)
-    found = [judged(fit_train(problem, best.theta, _FINE)) for problem in (moving, still)]
-    plain = found[1] if found[1].score < found[0].score - _BETTER else found[0]
+    first = replace(problem, form="dead_zone", dynamic=False, data=coarse.sliding)
+    rough = min((fit_train(first, theta, _ROUGH) for theta in _starts(first)), key=lambda fit: fit.cost)
+    plain = _dead_zone(problem, rough)
     prior = prior_of(problem.data, "friction_held", backlash, deflection)
     richer = Problem(problem.joint, problem.data, prior, "friction_held", True)
     starts = [fit_train(richer, theta, ()) for theta in _with_friction(plain.fit.theta)]
     likely = min(starts, key=lambda fit: fit.cost)
     if likely.cost > fit_train(plain.fit.problem, plain.fit.theta, ()).cost - _HINT:
         return plain
-    rough = fit_train(replace(richer, data=coarse), likely.theta, _ROUGH[1:])
-    held = judged(fit_train(richer, rough.theta, _FINE))
+    roughly = fit_train(replace(richer, data=coarse), likely.theta, _ROUGH[1:])
+    held = judged(fit_train(richer, roughly.theta, _FINE))
     return held if held.score < plain.score - _BETTER else plain
 
 
-def judged(fit: TrainFit) -> Candidate:
-    """How a fit predicts trials left out."""
-    problem, data = fit.problem, fit.problem.data
-    A, r, n = derivatives(replace(problem, dynamic=False), fit.theta, fit.gamma), fit.residuals, len(fit.theta)
+def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
+    """The plain dead zone, with the link's inertia or without, whichever predicts better."""
+    still, moving = (replace(problem, form="dead_zone", dynamic=dynamic) for dynamic in (False, True))
+    steady = steady_contact(still, rough.theta, rough.gamma)
+    if steady is None:
+        slides = fit_train(replace(moving, data=problem.data.sliding), rough.theta, FLOORS[1:])
+        found = [judged(fit_train(of, slides.theta, _FINE)) for of in (moving, still)]
+    elif problem.believes(steady.information, COULOMB):  # whose friction steady contact does not show
+        found = [judged(fit_train(steady.continued(of), steady.theta, _FINE), of) for of in (moving, still)]
+    else:
+        fits = [evaluated(of, steady.theta, steady.gamma) for of in (moving, still)]
+        found = [_predicting(fit, steady.without(fit.problem), np.linalg.inv(steady.information)) for fit in fits]
+    return found[1] if found[1].score < found[0].score - _BETTER else found[0]
+
+
+def judged(fit: TrainFit, whole: Problem | None = None) -> Candidate:
+    """How a fit predicts trials left out; fits without them are one Gauss-Newton step away.
+
+    `whole` is the problem with all windows, where the fit's counts some.
+    """
+    problem, data, n = fit.problem, fit.problem.data, len(fit.theta)
+    A, r, prior = derivatives(problem, fit.theta, fit.gamma), fit.residuals, fit.problem.prior
     w = weights(problem, r, fit.scales) / problem.correlated
-    prior = problem.prior
-    H = (A.T * w) @ A + np.diag(np.append(prior.width**-2.0, GAMMA_INFORMATION))
-    known, left = np.where(np.isfinite(r), r, 0.0), np.full(len(r), np.nan)
+    H = (A.T * w) @ A + prior.information
+    known, without = np.where(np.isfinite(r), r, 0.0), []
     for i in range(len(data.trial_ids)):
         rows = np.flatnonzero((data.trial == i) & np.isfinite(r))
         B = A[rows].T * w[rows]
         step = -np.linalg.solve(H - B @ A[rows] + _DAMPED * np.diag(np.diag(H)), B @ known[rows])
-        theta, gamma = np.maximum(fit.theta + step[:n], prior.least), fit.gamma + step[n:]
-        again = data.y - problem.deltas(theta, gamma) - data.terms @ gamma
-        left[rows] = again[rows]
+        without.append(np.append(np.maximum(fit.theta + step[:n], prior.least), fit.gamma + step[n:]))
+    covariance = covariance_of(fit)
+    return _predicting(fit if whole is None else evaluated(whole, fit.theta, fit.gamma), np.array(without), covariance)
+
+
+def _predicting(fit: TrainFit, without: np.ndarray, covariance: np.ndarray) -> Candidate:
+    """A fit with the score of fits `without` each trial (n_trials, p + 5)."""
+    problem, data, n = fit.problem, fit.problem.data, len(fit.theta)
+    left = np.full(len(data.y), np.nan)
+    for i, x in enumerate(without):
+        left[data.trial == i] = replace(problem, data=data.only(i)).left(x[:n], x[n:])
     size = sizes(problem, left, FLOORS[-1])
-    count = np.bincount(data.trial[np.isfinite(data.y)], minlength=len(size))
+    count = np.bincount(data.group[data.known], minlength=len(size))
     score = float((count * np.log(size)).sum()) / problem.correlated
-    return Candidate(fit, score, float(np.sqrt(np.nanmean(left**2))))
+    return Candidate(fit, score, float(np.sqrt(np.nanmean(left**2))), covariance)
 
 
 def _starts(problem: Problem) -> list[np.ndarray]:

@@ -16,6 +16,10 @@ from calibration.stages.drive_trains.torques import LinkLoads
 
 WINDOW, COARSE = 0.1, 0.5  # [s]
 _START = 0.3  # [s] of a trial's rest that show where delta starts
+REGIMES = 3
+_FEW = 20  # windows
+_SLIDES, _RESTS = 0.05, 0.01  # [rad/s] a motor that moves all through a window, or does not
+_STEADY = 1.5  # [rad/s2]
 
 
 @dataclass(frozen=True)
@@ -28,9 +32,10 @@ class JointData:
         modes: (n, z) torque by unit modes of the inertial parameters [N.m].
         first: (k,) first sample of each window.
         trial: (k,) which trial a window is of.
+        regime: (k,) 0 steady sliding, 1 starts, stops and jolts, 2 rest: what is left of each differs in size.
         y: (k,) motor minus link reading, mean over the window [rad], NaN where there is none.
         terms: (k, 5) 1, cos, sin, cos 2, sin 2 of the joint's angle.
-        weight: (k,) of each window, 1 where all are alike.
+        weight: (k,) of each window, 1 where all are alike, 0 of one that does not count.
         window: Its length [s].
     """
 
@@ -39,10 +44,21 @@ class JointData:
     modes: np.ndarray
     first: np.ndarray
     trial: np.ndarray
+    regime: np.ndarray
     y: np.ndarray
     terms: np.ndarray
     weight: np.ndarray
     window: float = WINDOW
+
+    @property
+    def group(self) -> np.ndarray:
+        """(k,) windows whose residuals are of one size: those of one regime in one trial."""
+        return REGIMES * self.trial + self.regime
+
+    @property
+    def n_groups(self) -> int:
+        """One more than the largest `group` there can be."""
+        return REGIMES * len(self.trial_ids)
 
     def means(self, x: np.ndarray) -> np.ndarray:
         """Means (k, ...) over the windows of x (n, ...)."""
@@ -74,6 +90,32 @@ class JointData:
         """The data with the readings of one trial left out."""
         return replace(self, y=np.where(self.trial == trial, np.nan, self.y))
 
+    @property
+    def sliding(self) -> "JointData":
+        """The data where the joint slides steadily alone; all of it where it never does."""
+        slides = (self.regime == 0) & np.isfinite(self.y)
+        return self.counting(slides) if slides.sum() > _FEW else self
+
+    def counting(self, rows: np.ndarray) -> "JointData":
+        """The data in which only the windows of a mask (k,) count."""
+        return replace(self, weight=np.where(rows, self.weight, 0.0))
+
+    @property
+    def known(self) -> np.ndarray:
+        """(k,) windows that count."""
+        return np.isfinite(self.y) & (self.weight > 0.0)
+
+    def only(self, trial: int) -> "JointData":
+        """The data of one trial alone."""
+        start, stop = self.motion.begins[trial : trial + 2]
+        rows = np.flatnonzero(self.trial == trial)
+        own = [getattr(self.motion, name)[start:stop] for name in ("t", "q", "v", "a", "torque", "inertia")]
+        return JointData(
+            self.trial_ids[trial : trial + 1], DriveMotion(*own, np.array([0, stop - start])), self.modes[start:stop],
+            self.first[rows] - start, np.zeros(len(rows), dtype=int), self.regime[rows], self.y[rows], self.terms[rows], self.weight[rows],
+            self.window,
+        )  # fmt: skip
+
 
 def joint_data(
     loads: Sequence[LinkLoads],
@@ -94,8 +136,16 @@ def joint_data(
     bare = JointData(
         tuple(of_trial.trial_id for of_trial in loads), motion,
         np.concatenate([of_trial.regressor[:, column] for of_trial in loads]) @ modes,
-        np.concatenate(first), np.concatenate(trial), np.zeros(0), np.zeros((0, 5)), np.ones(n), window,
+        np.concatenate(first), np.concatenate(trial), _regimes(motion, np.concatenate(first)), np.zeros(0), np.zeros((0, 5)), np.ones(n), window,
     )  # fmt: skip
     angle = bare.means(np.concatenate([of_trial.angle[:, column] for of_trial in loads]))
     terms = np.column_stack([np.ones(len(angle)), harmonic_terms(angle)])
     return replace(bare, y=bare.means(np.concatenate(differences)[:, column]), terms=terms)
+
+
+def _regimes(motion: DriveMotion, first: np.ndarray) -> np.ndarray:
+    """`JointData.regime` of windows that begin at samples `first` (k,)."""
+    v, a = np.abs(motion.v), np.abs(motion.a)
+    slides = (np.minimum.reduceat(v, first) > _SLIDES) & (np.maximum.reduceat(a, first) < _STEADY)
+    rests = np.maximum.reduceat(v, first) < _RESTS
+    return np.where(slides, 0, np.where(rests, 2, 1))

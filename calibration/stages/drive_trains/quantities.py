@@ -5,7 +5,7 @@ its value. The others are what friction, load and motion of the trials do not sh
 Covariance by blocks of time; a direction no block speaks for has that of the prior.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,47 +30,33 @@ _REMEDIES = {
 }
 
 
-@dataclass(frozen=True)
-class Uncertainty:
-    """Standard deviations of a fit.
-
-    Attributes:
-        covariance: (p + 5, p + 5) of theta and gamma.
-        blocks: Stretches of time that counted as independent.
-    """
-
-    covariance: np.ndarray
-    blocks: int
-
-
-def uncertainty(fit: TrainFit) -> Uncertainty:
-    """Of theta and gamma; 1.96 standard deviations hold 95 %."""
+def covariance_of(fit: TrainFit) -> np.ndarray:
+    """(p + 5, p + 5) of theta and gamma, by blocks of time; 1.96 standard deviations hold 95 %."""
     problem, data, r = fit.problem, fit.problem.data, fit.residuals
     A = derivatives(problem, fit.theta, fit.gamma)
     w = np.sqrt(weights(problem, r, fit.scales))
     J, e = w[:, None] * A, w * np.where(np.isfinite(r), r, 0.0)
     known = [np.flatnonzero((data.trial == i) & np.isfinite(r)) for i in range(len(data.trial_ids))]
     known = [rows for rows in known if len(rows)]
-    information = np.append(problem.prior.width**-2.0, GAMMA_INFORMATION)
-    H = J.T @ J / problem.correlated + np.diag(information)
+    information = np.diag(problem.prior.information)
+    H = J.T @ J / problem.correlated + problem.prior.information
     floor = np.linalg.inv(H)
     try:
         found = block_covariance(
             [J[k][:, None] for k in known], [e[k][:, None] for k in known], problem.correlated * information
         )
     except NotEnoughData:
-        return Uncertainty(floor, 1)
+        return np.asarray(floor)
     sigma, least = (np.sqrt(np.maximum(np.diag(C), np.finfo(float).tiny)) for C in (found.covariance, floor))
     most = np.maximum(1.0 / np.sqrt(np.maximum(information, np.finfo(float).tiny)), least)
     wanted, spoken = np.clip(sigma, least, most), sigma > _SPOKEN * least
     factor = np.where(spoken, wanted / sigma, 0.0)
-    covariance = np.outer(factor, factor) * found.covariance + np.diag(np.where(spoken, 0.0, wanted**2))
-    return Uncertainty(covariance, found.blocks)
+    return np.asarray(np.outer(factor, factor) * found.covariance + np.diag(np.where(spoken, 0.0, wanted**2)))
 
 
-def reported(train: DriveTrain, fit: TrainFit, known: Uncertainty, motor_offset: float) -> DriveTrain:
+def reported(train: DriveTrain, fit: TrainFit, covariance: np.ndarray, motor_offset: float) -> DriveTrain:
     """The drive train with its parameters; `motor_offset` [rad] is the zero of its motor readings."""
-    sigma, names, n = np.sqrt(np.diag(known.covariance)), fit.problem.names, len(fit.theta)
+    sigma, names, n = np.sqrt(np.diag(covariance)), fit.problem.names, len(fit.theta)
     own = {
         "half_gap": ("backlash.{}.gap", "rad", 2.0),
         "compliance": ("gear.{}.compliance", "rad/(N.m)", 1.0),

@@ -19,14 +19,15 @@ from calibration.stages.drive_trains.drive_train import DriveTrain, Form
 from calibration.stages.drive_trains.joint_data import WINDOW, JointData
 
 CORRELATED = 15.0  # windows of a tenth of a second that hang together
-FLOORS = (4e-4, 2e-4, 1e-4, 5e-5)  # [rad] least size of residuals, round by round
-_NU = 4.0
+FLOORS = (4e-4, 1e-4, 5e-5, 2e-5)  # [rad] least size of residuals, round by round
+NU = 4.0
 _ECCENTRIC = np.array([3e-3, 3e-3, 1e-3, 1e-3])  # [rad] prior of once and twice per turn
 GAMMA_INFORMATION = np.append(0.0, _ECCENTRIC**-2.0)  # [1/rad2]
 _PARAMETERS = ("half_gap", "compliance", "coulomb", "viscous", "link_inertia")
 _RELAXATION = 1.5e-3  # [s] of a steel mesh; readings at 100 Hz hardly show it
 _HELD = ("spring", "slip")
 _STEPS = 6
+_OPEN = 0.5  # of the prior's standard deviation: more, and a parameter is not known
 _RUBS = 2.0  # [N.m] friction of a link that friction holds
 _SOFT = 1e-3  # [rad/(N.m)] compliance of a small gear
 _LESS = 0.03  # decrease of the cost [-] that is worth another step
@@ -41,12 +42,20 @@ class Prior:
         width: (p,) standard deviations.
         least: (p,) lower limits.
         step: (p,) of finite differences.
+        gamma: (5,) [rad].
+        information: (p + 5, p + 5) of theta and gamma.
     """
 
     nominal: np.ndarray
     width: np.ndarray
     least: np.ndarray
     step: np.ndarray
+    gamma: np.ndarray
+    information: np.ndarray
+
+    def off(self, theta: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+        """Theta and gamma (p + 5,) less the believed ones."""
+        return np.append(theta - self.nominal, gamma - self.gamma)
 
 
 @dataclass(frozen=True)
@@ -94,6 +103,14 @@ class Problem:
         """Window means (k,) of delta [rad]; `off` as `JointData.delta` has it."""
         return self.data.delta(self.train(theta), self.modes(theta), gamma, off)
 
+    def believes(self, information: np.ndarray, i: int) -> bool:
+        """Whether of parameter i little more is known than the prior, by information (p + 5, p + 5)."""
+        return bool(np.linalg.inv(information)[i, i] > (_OPEN * self.prior.width[i]) ** 2)
+
+    def left(self, theta: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+        """r (k,) [rad]."""
+        return np.asarray(self.data.y - self.deltas(theta, gamma) - self.data.terms @ gamma)
+
 
 @dataclass(frozen=True)
 class TrainFit:
@@ -103,7 +120,7 @@ class TrainFit:
         problem: What was fitted.
         theta: (p,).
         gamma: (5,) zero and eccentricities [rad].
-        scales: (n_trials,) sizes of the residuals [rad].
+        scales: (n_groups,) sizes of the residuals [rad].
         cost: At the solution.
     """
 
@@ -116,7 +133,7 @@ class TrainFit:
     @property
     def residuals(self) -> np.ndarray:
         """r (k,) [rad]."""
-        return _left(self.problem, self.problem.data.y - self.problem.deltas(self.theta, self.gamma), self.gamma)
+        return self.problem.left(self.theta, self.gamma)
 
 
 @dataclass(frozen=True)
@@ -145,7 +162,8 @@ def prior_of(data: JointData, form: Form, backlash: float, deflection: float) ->
     if form == "friction_held":
         rows += [(0.0, 1e4, 50.0, 50.0), (0.0, 2.0, 0.0, 0.03)]
     rows += [(0.0, 1.0, -np.inf, 0.1)] * data.modes.shape[1]
-    return Prior(*(np.array(x) for x in zip(*rows, strict=True)))
+    nominal, width, least, step = (np.array(x) for x in zip(*rows, strict=True))
+    return Prior(nominal, width, least, step, np.zeros(5), np.diag(np.append(width**-2.0, GAMMA_INFORMATION)))
 
 
 def fit_train(problem: Problem, theta: np.ndarray, floors: Sequence[float] = FLOORS, hasty: bool = False) -> TrainFit:
@@ -166,37 +184,44 @@ def fit_train(problem: Problem, theta: np.ndarray, floors: Sequence[float] = FLO
             elif before - state.cost < _LESS:
                 break
     scales = sizes(problem, _left(problem, state.difference, state.gamma), floors[-1] if floors else FLOORS[0])
-    count = np.bincount(problem.data.trial[np.isfinite(problem.data.y)], minlength=len(scales))
+    count = np.bincount(problem.data.group[problem.data.known], minlength=len(scales))
     total = cost(problem, state.theta, state.difference, state.gamma, scales)
     total += float((count * np.log(scales)).sum()) / problem.correlated
     return TrainFit(problem, state.theta, state.gamma, scales, total)
 
 
+def evaluated(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> TrainFit:
+    """Given theta (p,) and gamma (5,) as a fit."""
+    difference = problem.data.y - problem.deltas(theta, gamma)
+    scales = sizes(problem, _left(problem, difference, gamma), FLOORS[-1])
+    return TrainFit(problem, theta, gamma, scales, cost(problem, theta, difference, gamma, scales))
+
+
 def weights(problem: Problem, r: np.ndarray, scales: np.ndarray) -> np.ndarray:
     """Of residuals r (k,) in least squares [1/rad2], 0 where there is none."""
-    known = np.isfinite(r)
-    s = scales[problem.data.trial] ** 2 / problem.data.weight
-    return np.where(known, (_NU + 1.0) / (_NU * s + np.where(known, r, 0.0) ** 2), 0.0)
+    data, s = problem.data, scales[problem.data.group] ** 2
+    square = data.weight * np.where(data.known, r, 0.0) ** 2
+    return np.where(data.known, data.weight * (NU + 1.0) / (NU * s + square), 0.0)
 
 
 def sizes(problem: Problem, r: np.ndarray, floor: float) -> np.ndarray:
-    """Size (n_trials,) [rad] of each trial's residuals: the scale of Student's distribution, by its fixed point."""
-    trial, known, n = problem.data.trial, np.isfinite(r), len(problem.data.trial_ids)
-    square = np.where(known, r, 0.0) ** 2
-    count = np.maximum(np.bincount(trial, known, n), 1.0)
-    s = np.maximum(np.sqrt(np.bincount(trial, square, n) / count), floor)
+    """Size (n_groups,) [rad] of each group's residuals: the scale of Student's distribution, by its fixed point."""
+    data, n = problem.data, problem.data.n_groups
+    square = np.where(data.known, r, 0.0) ** 2
+    count = np.maximum(np.bincount(data.group, data.known, n), 1.0)
+    s = np.maximum(np.sqrt(np.bincount(data.group, square, n) / count), floor)
     for _ in range(12):
-        s = np.maximum(np.sqrt(s**2 * np.bincount(trial, weights(problem, r, s) * square, n) / count), floor)
+        total = np.bincount(data.group, weights(problem, r, s) * square, n)
+        s = np.maximum(np.sqrt(s**2 * total / count), floor)
     return s
 
 
 def cost(problem: Problem, theta: np.ndarray, difference: np.ndarray, gamma: np.ndarray, scales: np.ndarray) -> float:
     """What is minimised, at theta with y - delta = `difference` (k,)."""
-    r, prior = _left(problem, difference, gamma), problem.prior
-    s = scales[problem.data.trial] ** 2 / problem.data.weight
-    data = 0.5 * (_NU + 1.0) * float(np.nansum(np.log1p(r**2 / (_NU * s))))
-    believed = (((theta - prior.nominal) / prior.width) ** 2).sum() + (GAMMA_INFORMATION * gamma**2).sum()
-    return data / problem.correlated + 0.5 * float(believed)
+    r, prior, data = _left(problem, difference, gamma), problem.prior, problem.data
+    square = data.weight * np.where(data.known, r, 0.0) ** 2 / (NU * scales[data.group] ** 2)
+    off = prior.off(theta, gamma)
+    return 0.5 * (NU + 1.0) * float(np.log1p(square).sum()) / problem.correlated + 0.5 * float(off @ prior.information @ off)
 
 
 def derivatives(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> np.ndarray:
@@ -207,7 +232,7 @@ def derivatives(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> np.nd
         moved[j] += step
         columns.append((problem.deltas(moved, gamma) - here) / step)
     J = np.column_stack([*columns, problem.data.terms])
-    return np.where(np.isfinite(problem.data.y)[:, None], J, 0.0)
+    return np.where(problem.data.known[:, None], J, 0.0)
 
 
 def _left(problem: Problem, difference: np.ndarray, gamma: np.ndarray) -> np.ndarray:
@@ -221,7 +246,8 @@ def _linear(problem: Problem, difference: np.ndarray, floor: float) -> np.ndarra
     for _ in range(4):
         r = _left(problem, difference, gamma)
         w = weights(problem, r, sizes(problem, r, floor)) / problem.correlated
-        gamma = np.linalg.solve((A.T * w) @ A + np.diag(GAMMA_INFORMATION), A.T @ (w * known))
+        believed = problem.prior.information[-5:, -5:]
+        gamma = np.linalg.solve((A.T * w) @ A + believed, A.T @ (w * known) + believed @ problem.prior.gamma)
     return gamma
 
 
@@ -236,9 +262,8 @@ def _improved(problem: Problem, quick: Problem, state: _State, scales: np.ndarra
     A = derivatives(quick, theta, state.gamma)
     r = _left(problem, state.difference, state.gamma)
     w = weights(problem, r, scales) / problem.correlated
-    H = (A.T * w) @ A + np.diag(np.append(prior.width**-2.0, GAMMA_INFORMATION))
-    pull = np.append((theta - prior.nominal) / prior.width**2, GAMMA_INFORMATION * state.gamma)
-    b = A.T @ (w * np.where(np.isfinite(r), r, 0.0)) - pull
+    H = (A.T * w) @ A + prior.information
+    b = A.T @ (w * np.where(np.isfinite(r), r, 0.0)) - prior.information @ prior.off(theta, state.gamma)
     free = np.flatnonzero(~np.append((theta <= prior.least) & (b[:n] < 0.0), np.zeros(5, dtype=bool)))
     D, damping = H[np.ix_(free, free)], state.damping
     for _ in range(7):

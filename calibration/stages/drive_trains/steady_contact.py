@@ -1,0 +1,115 @@
+"""Drive train from steady contact: while the motor slides and the mesh lies on one side, its model is linear.
+
+    y = terms gamma + g s + c (tau + modes z + I a) + c f_c sign(v) + c f_v v              s = -1, 1  the side
+    x = (gamma, g, c, c f_c, c f_v, c I, c z)           theta = (g, c, f_c, f_v, I, z)
+
+The sides are those of a simulation with the theta of the round before. Windows beside a change of side, in which either
+is on no side or they disagree, starts, stops and rests do not count: where friction holds a link at rest within
++-c f_c is settled by jolts that no model of one joint has. What is linear has one minimum, and is free of the kinks
+that a change of side puts into a simulation's cost.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, NU, Problem
+
+_ROUNDS, _WEIGHTED = 4, 8
+_CLEAR = 2  # windows beside a change of side
+_APART = 3e-4  # [rad] y and the simulation may differ on a side, half of the gap apart
+_FLOOR, _ROUGH = 1.5e-5, 1e-4  # [rad] least size of residuals; size to begin with
+_FEWEST = 60  # windows
+_ZERO = 1.0  # [rad] prior of the zero
+
+
+@dataclass(frozen=True)
+class SteadyContact:
+    """Theta and gamma of steady contact.
+
+    Attributes:
+        theta: (p,).
+        gamma: (5,) [rad].
+        used: (k,) windows.
+        J: (k, p + 5) derivatives of y by theta, gamma.
+        residuals: (k,) [rad].
+        weights: (k,) of them [1/rad2], 0 where not used.
+        believed: (p + 5, p + 5) information of the priors.
+        information: (p + 5, p + 5) of all; windows that hang together count as one.
+    """
+
+    theta: np.ndarray
+    gamma: np.ndarray
+    used: np.ndarray
+    J: np.ndarray
+    residuals: np.ndarray
+    weights: np.ndarray
+    believed: np.ndarray
+    information: np.ndarray
+
+    def without(self, problem: Problem) -> np.ndarray:
+        """Theta and gamma (n_trials, p + 5) of the windows beside each trial's."""
+        found, least = [], np.append(problem.prior.least, np.full(len(self.gamma), -np.inf))
+        for i in range(len(problem.data.trial_ids)):
+            own = self.used & (problem.data.trial == i)
+            A, w = self.J[own], self.weights[own] / problem.correlated
+            step = -np.linalg.solve(self.information - (A.T * w) @ A, A.T @ (w * self.residuals[own]))
+            found.append(np.maximum(np.append(self.theta, self.gamma) + step, least))
+        return np.array(found)
+
+    def continued(self, problem: Problem) -> Problem:
+        """The problem of the other windows, with what is known now as its prior."""
+        prior = replace(problem.prior, nominal=self.theta, gamma=self.gamma, information=self.information)
+        return replace(problem, prior=prior, data=problem.data.counting(~self.used))
+
+
+def steady_contact(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> SteadyContact | None:
+    """Theta (p,) and gamma (5,) of a dead zone, begun with others; None where steady contact is too rare."""
+    found = None
+    for _ in range(_ROUNDS):
+        side = _sides(problem, theta, gamma)
+        if (side != 0.0).sum() < _FEWEST:
+            return None
+        found = _regressed(problem, side, theta[1])
+        theta, gamma = found.theta, found.gamma
+    return found
+
+
+def _sides(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+    """(k,) 1 or -1 where a window counts, 0 where not."""
+    data = problem.data
+    delta = problem.deltas(theta, gamma)
+    agree = np.abs(data.y - data.terms @ gamma - delta) < 0.5 * theta[0] + _APART
+    side = np.where(data.known & agree & (np.abs(delta) > theta[0]), np.sign(delta), 0.0)
+    alone = np.ones(len(side), dtype=bool)
+    for shift in range(-_CLEAR, _CLEAR + 1):
+        alone &= np.roll(side, shift) == side
+    return np.where((data.regime == 0) & alone, side, 0.0)
+
+
+def _regressed(problem: Problem, side: np.ndarray, compliance: float) -> SteadyContact:
+    data, motion, prior = problem.data, problem.data.motion, problem.prior
+    used, c = side != 0.0, max(compliance, 0.02 * prior.width[1])
+    v, modes = data.means(motion.v), data.means(data.modes)
+    A = np.column_stack([side, data.means(motion.torque), np.sign(v), v, data.means(motion.a), modes, data.terms])
+    by_c = np.append([1.0, 1.0], np.full(A.shape[1] - 7, c))
+    p = len(by_c)
+    information = np.append((by_c * prior.width) ** -2.0, np.append(_ZERO**-2.0, GAMMA_INFORMATION[1:]))
+    nominal = np.append(by_c * prior.nominal, np.zeros(5))
+    y, size, r = np.where(used, data.y, 0.0), np.full(data.n_groups, _ROUGH), np.zeros(len(side))
+    count = np.maximum(np.bincount(data.group, used, data.n_groups), 1.0)
+    for i in range(_WEIGHTED):
+        w = np.where(used, data.weight * (NU + 1.0) / (NU * size[data.group] ** 2 + data.weight * r**2), 0.0)
+        H = (A.T * w) @ A / problem.correlated + np.diag(information)
+        x = np.linalg.solve(H, A.T @ (w * y) / problem.correlated + information * nominal)
+        r = np.where(used, y - A @ x, 0.0)
+        for _ in range(4 if i else 12):
+            w = np.where(used, data.weight * (NU + 1.0) / (NU * size[data.group] ** 2 + data.weight * r**2), 0.0)
+            size = np.maximum(size * np.sqrt(np.bincount(data.group, w * r**2, data.n_groups) / count), _FLOOR)
+    c = max(x[1], 0.02 * prior.width[1])
+    theta = np.maximum(np.append([x[0], c], x[2:p] / c), prior.least)
+    J = A.copy()  # by theta
+    J[:, 2:p] *= c
+    J[:, 1] += A[:, 2:p] @ theta[2:]
+    own = np.diag(np.append(prior.width**-2.0, np.append(_ZERO**-2.0, GAMMA_INFORMATION[1:])))
+    return SteadyContact(theta, x[p:], used, J, r, w, own, (J.T * w) @ J / problem.correlated + own)
