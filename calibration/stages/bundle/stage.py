@@ -90,7 +90,7 @@ def fit_bundle(
         geometry, bending, trains = refitted.model, refitted.bending, refitted.trains
         hand = refitted.hand(chain)
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
-        quantities = (*quantities, *bending.parameters(_carried_link(lab, link)))
+        quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link)))
     base = None
     if suspension is not None:
         sources = WrenchSources(lab, robot, plate, from_vector(hand.base))

@@ -22,6 +22,7 @@ from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
+from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -88,7 +89,22 @@ def refit_geometry(
     fitted = hand_of(model, chain, nominal_frames(chain, description))
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset
-    return RefittedGeometry(model, bending, trains.with_offset(offset))
+    referred = tuple(_referred(train, model, trains) for train in trains.trains)
+    return RefittedGeometry(model, bending, replace(trains, trains=referred).with_offset(offset))
+
+
+def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:
+    """The drive train with its link encoder's offset beside the geometry's zero of the motor, and as uncertain."""
+    own = {p.name: p for p in geometry.parameters}
+    motor, name = own.get(f"encoder.{train.joint}.motor.offset"), f"encoder.{train.joint}.link.offset"
+    if motor is None:
+        return train
+    moved = motor.value - float(trains.dynamics.offset[trains.joints.index(train.joint)])
+    parameters = tuple(
+        replace(q, value=q.value + moved, sigma=float(np.hypot(q.sigma, motor.sigma))) if q.name == name else q
+        for q in train.parameters
+    )
+    return replace(train, parameters=parameters)
 
 
 def corrected_trial(trains: DriveTrains, trial: Trial, robot: Clock | None, hand: HandModel) -> CorrectedTrial:

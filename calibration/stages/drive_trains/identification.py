@@ -21,7 +21,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB
 from calibration.stages.drive_trains.quantities import covariance_of, reported
-from calibration.stages.drive_trains.steady_contact import steady_contact
+from calibration.stages.drive_trains.steady_contact import SteadyContact, steady_contact
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.drive_trains.train_fit import (
     FLOORS,
@@ -141,12 +141,19 @@ def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
     if steady is None:
         slides = fit_train(replace(moving, data=problem.data.sliding), rough.theta, FLOORS[1:])
         found = [judged(fit_train(of, slides.theta, _FINE)) for of in (moving, still)]
-    elif problem.believes(steady.information, COULOMB):  # whose friction steady contact does not show
-        found = [judged(fit_train(steady.continued(of), steady.theta, _FINE), of) for of in (moving, still)]
+    elif problem.believes(steady.information, COULOMB):
+        found = [_continued(steady, of) for of in (moving, still)]
     else:
         fits = [evaluated(of, steady.theta, steady.gamma) for of in (moving, still)]
-        found = [_predicting(fit, steady.without(fit.problem), np.linalg.inv(steady.information)) for fit in fits]
+        found = [_predicting(fit, steady.without(fit.problem), steady.covariance) for fit in fits]
     return found[1] if found[1].score < found[0].score - _BETTER else found[0]
+
+
+def _continued(steady: SteadyContact, problem: Problem) -> Candidate:
+    """Where steady contact does not tell friction from the gap: other windows, too, and how far they move it."""
+    fit = fit_train(steady.continued(problem), steady.theta, _FINE)
+    moved = np.append(fit.theta - steady.theta, fit.gamma - steady.gamma)
+    return replace(judged(fit, problem), covariance=steady.covariance + np.outer(moved, moved))
 
 
 def judged(fit: TrainFit, whole: Problem | None = None) -> Candidate:

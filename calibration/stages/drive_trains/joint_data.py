@@ -109,11 +109,14 @@ class JointData:
         """The data of one trial alone."""
         start, stop = self.motion.begins[trial : trial + 2]
         rows = np.flatnonzero(self.trial == trial)
-        own = [getattr(self.motion, name)[start:stop] for name in ("t", "q", "v", "a", "torque", "inertia")]
+        m, own = self.motion, slice(start, stop)
+        motion = DriveMotion(
+            m.t[own], m.q[own], m.v[own], m.a[own], m.torque[own], m.inertia[own], np.array([0, stop - start])
+        )
         return JointData(
-            self.trial_ids[trial : trial + 1], DriveMotion(*own, np.array([0, stop - start])), self.modes[start:stop],
-            self.first[rows] - start, np.zeros(len(rows), dtype=int), self.regime[rows], self.y[rows], self.terms[rows], self.weight[rows],
-            self.window,
+            self.trial_ids[trial : trial + 1], motion, self.modes[own],
+            self.first[rows] - start, np.zeros(len(rows), dtype=int), self.regime[rows], self.y[rows],
+            self.terms[rows], self.weight[rows], self.window,
         )  # fmt: skip
 
 
@@ -136,7 +139,8 @@ def joint_data(
     bare = JointData(
         tuple(of_trial.trial_id for of_trial in loads), motion,
         np.concatenate([of_trial.regressor[:, column] for of_trial in loads]) @ modes,
-        np.concatenate(first), np.concatenate(trial), _regimes(motion, np.concatenate(first)), np.zeros(0), np.zeros((0, 5)), np.ones(n), window,
+        np.concatenate(first), np.concatenate(trial), _regimes(motion, np.concatenate(first)), np.zeros(0),
+        np.zeros((0, 5)), np.ones(n), window,
     )  # fmt: skip
     angle = bare.means(np.concatenate([of_trial.angle[:, column] for of_trial in loads]))
     terms = np.column_stack([np.ones(len(angle)), harmonic_terms(angle)])

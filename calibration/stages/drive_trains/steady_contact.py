@@ -19,6 +19,7 @@ _ROUNDS, _WEIGHTED = 4, 8
 _CLEAR = 2  # windows beside a change of side
 _APART = 3e-4  # [rad] y and the simulation may differ on a side, half of the gap apart
 _FLOOR, _ROUGH = 1.5e-5, 1e-4  # [rad] least size of residuals; size to begin with
+_SIDE = 1e-5  # [rad] by which all of a side is off, of what no term holds
 _FEWEST = 60  # windows
 _ZERO = 1.0  # [rad] prior of the zero
 
@@ -34,7 +35,6 @@ class SteadyContact:
         J: (k, p + 5) derivatives of y by theta, gamma.
         residuals: (k,) [rad].
         weights: (k,) of them [1/rad2], 0 where not used.
-        believed: (p + 5, p + 5) information of the priors.
         information: (p + 5, p + 5) of all; windows that hang together count as one.
     """
 
@@ -44,8 +44,14 @@ class SteadyContact:
     J: np.ndarray
     residuals: np.ndarray
     weights: np.ndarray
-    believed: np.ndarray
     information: np.ndarray
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(p + 5, p + 5) of theta and gamma."""
+        C = np.linalg.inv(self.information)
+        C[0, 0] += _SIDE**2
+        return np.asarray(C)
 
     def without(self, problem: Problem) -> np.ndarray:
         """Theta and gamma (n_trials, p + 5) of the windows beside each trial's."""
@@ -112,4 +118,4 @@ def _regressed(problem: Problem, side: np.ndarray, compliance: float) -> SteadyC
     J[:, 2:p] *= c
     J[:, 1] += A[:, 2:p] @ theta[2:]
     own = np.diag(np.append(prior.width**-2.0, np.append(_ZERO**-2.0, GAMMA_INFORMATION[1:])))
-    return SteadyContact(theta, x[p:], used, J, r, w, own, (J.T * w) @ J / problem.correlated + own)
+    return SteadyContact(theta, x[p:], used, J, r, w, (J.T * w) @ J / problem.correlated + own)

@@ -221,7 +221,9 @@ def cost(problem: Problem, theta: np.ndarray, difference: np.ndarray, gamma: np.
     r, prior, data = _left(problem, difference, gamma), problem.prior, problem.data
     square = data.weight * np.where(data.known, r, 0.0) ** 2 / (NU * scales[data.group] ** 2)
     off = prior.off(theta, gamma)
-    return 0.5 * (NU + 1.0) * float(np.log1p(square).sum()) / problem.correlated + 0.5 * float(off @ prior.information @ off)
+    return 0.5 * (NU + 1.0) * float(np.log1p(square).sum()) / problem.correlated + 0.5 * float(
+        off @ prior.information @ off
+    )
 
 
 def derivatives(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> np.ndarray:

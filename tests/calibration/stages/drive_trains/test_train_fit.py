@@ -7,7 +7,8 @@ import pytest
 
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.joint_data import JointData
-from calibration.stages.drive_trains.quantities import reported, reverses, uncertainty
+from calibration.stages.drive_trains.quantities import covariance_of, reported, reverses
+from calibration.stages.drive_trains.steady_contact import steady_contact
 from calibration.stages.drive_trains.train_fit import FLOORS, Problem, derivatives, fit_train, prior_of
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
@@ -25,8 +26,8 @@ def data(of: DriveTrain = TRUTH, load: float = 1.2, noise: float = 2e-5, seed: i
     first = np.arange(0, len(q), 10)
     n = len(first)
     bare = JointData(
-        ("a", "b", "c"), motion, np.zeros((len(q), 0)), first, np.repeat(np.arange(3), n // 3), np.zeros(n),
-        np.zeros((n, 5)), np.ones(n),
+        ("a", "b", "c"), motion, np.zeros((len(q), 0)), first, np.repeat(np.arange(3), n // 3),
+        np.zeros(n, dtype=int), np.zeros(n), np.zeros((n, 5)), np.ones(n),
     )  # fmt: skip
     terms = np.column_stack([np.ones(n), harmonic_terms(bare.means(q))])
     low, high = of.ends(torque[begins[:-1]])
@@ -42,19 +43,41 @@ START = np.array([2e-3, 5e-4, 0.3, 0.02, 0.0])
 
 
 def test_a_drive_train_is_recovered_from_its_own_data() -> None:
-    fit = fit_train(problem(data()), START)
-    assert fit.theta[0] == pytest.approx(3e-3, rel=0.02)
-    assert fit.theta[1] == pytest.approx(8e-4, rel=0.1)
-    assert fit.theta[2] == pytest.approx(0.15, rel=0.4)  # exchanged for viscous friction in part
-    assert np.abs(fit.gamma - ECCENTRICITY).max() < 2e-4
-    assert np.nanmedian(np.abs(fit.residuals)) < 3e-5
+    of = problem(data())
+    rough = fit_train(of, START, FLOORS[:2])
+    found = steady_contact(of, rough.theta, rough.gamma)
+    assert found is not None
+    assert found.theta[0] == pytest.approx(3e-3, rel=0.005)
+    assert found.theta[1] == pytest.approx(8e-4, rel=0.02)
+    assert found.theta[2] == pytest.approx(0.15, rel=0.1)
+    assert found.theta[3] == pytest.approx(0.05, abs=0.01)
+    assert np.abs(found.gamma - ECCENTRICITY).max() < 1e-4
+    sigma = np.sqrt(np.diag(found.covariance))
+    off = np.append(found.theta[:4] - TRUTH.values[:4], found.gamma - ECCENTRICITY)
+    assert (np.abs(off) < 1.96 * np.delete(sigma, 4)).all()
+
+
+def test_windows_beside_a_change_of_side_do_not_count() -> None:
+    of = problem(data())
+    found = steady_contact(of, np.append(TRUTH.values[:4], 0.0), ECCENTRICITY)
+    assert found is not None
+    open_ = np.abs(of.deltas(found.theta, found.gamma)) < 0.8 * found.theta[0]
+    assert open_.any()
+    for shift in (-1, 0, 1):
+        assert not found.used[np.roll(open_, shift)].any()
+
+
+def test_a_joint_that_rests_has_no_steady_contact() -> None:
+    of_data = data()
+    still = replace(of_data, regime=np.full(len(of_data.y), 2))
+    assert steady_contact(problem(still), START, ECCENTRICITY) is None
 
 
 def test_no_gap_is_estimated_as_none() -> None:
     none = replace(TRUTH, values=np.array([0.0, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]))
     of_data = data(none)
     fit = fit_train(problem(of_data), START)
-    train = reported(fit.problem.train(fit.theta), fit, uncertainty(fit), 0.0)
+    train = reported(fit.problem.train(fit.theta), fit, covariance_of(fit), 0.0)
     gap = next(p for p in train.parameters if p.name == "backlash.joint.gap")
     assert gap.status == "estimated" and gap.value - 1.96 * gap.sigma <= 0.0 < 5e-4
     assert gap.value < 2e-4
@@ -65,7 +88,7 @@ def test_a_gap_that_is_never_crossed_is_not_identifiable_and_says_what_would() -
     loaded = replace(of_data.motion, torque=of_data.motion.torque + 8.0)
     constant = replace(of_data, motion=loaded, y=of_data.terms @ ECCENTRICITY)
     fit = fit_train(problem(constant), START, FLOORS[:1])
-    train = reported(fit.problem.train(fit.theta), fit, uncertainty(fit), 0.0)
+    train = reported(fit.problem.train(fit.theta), fit, covariance_of(fit), 0.0)
     gap = next(p for p in train.parameters if p.name == "backlash.joint.gap")
     assert gap.status == "not_identifiable" and gap.sigma > 1e-3
     assert "changes sign" in gap.remedy
