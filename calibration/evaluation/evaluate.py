@@ -111,7 +111,7 @@ def evaluate(
         traces=tuple(errors),
         regimes=(*estimate.regimes, *joints) if predict.joints is not None else (),
         confirmation=tuple(ladder(confirmed, "mocap")),
-        verdicts=(*remarks, *moved_in_trials(scored)),
+        verdicts=(*remarks, *moved_in_trials(scored), *not_predictable(one.predicted for one in scored)),
         points=point_rows(estimate, dataset.description, means),
         predicted=tuple(one.predicted for one in scored),
         main=estimate.main if submitted is None else submitted.name,
@@ -184,6 +184,19 @@ def _means_errors(p: Prediction, body: Body, means: PostureMeans) -> PoseErrors:
         return pose_errors(p.T_lab_hand, poses_of_means(body, means).T)
     e = places(p.T_lab_hand, body.point) - point_of_means(body, means)[0]
     return PoseErrors(e, np.full(e.shape, np.nan))
+
+
+def not_predictable(trials: Iterable[PredictedTrial]) -> Iterator[Verdict]:
+    """A warning that names the trials in which the base slips as nobody can predict."""
+    moved = [(p.trial_id, p.base.slipping) for p in trials if p.base is not None and p.base.slipping is not None]
+    found = [(name, 1e3 * float(np.sqrt(m.variance[:, 5].mean()))) for name, m in moved if not m.predictable]
+    if found:
+        how = ", ".join(f"{name} ({sigma:.1f} mrad)" for name, sigma in found)
+        message = (
+            f"yaw of the base cannot be predicted in {how}: its standard deviation exceeds its predicted motion; "
+            "measure the base, or move more softly"
+        )
+        yield Verdict(STAGE, "warning", message)
 
 
 def moved_in_trials(scored: Iterable[_Scored]) -> Iterator[Verdict]:

@@ -79,7 +79,7 @@ class SlippingBase:
         still = own.held_out.variance(np.zeros(3, dtype=bool))
         plane = np.where(own.held_out.moves, plane, still)
         found[list(PLANE)] = np.where(own.linear, own.linear_variance, plane)
-        found[list(HEAVE)] = self.model.heave_variance
+        found[list(HEAVE)] = own.heave_variance
         return found
 
     def _driven(self, T_lab_0: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:

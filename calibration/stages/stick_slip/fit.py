@@ -71,17 +71,15 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
     path = np.concatenate([slid_path(x[a:b], share[a:b]) for a, b in trials.spans])
     error, seen = trials.measured - block_means(trials, x), np.concatenate([m.valid for m in trials.motions])
     masked = np.where(seen[:, None], error, np.nan)
-    spread, preloaded, path = (block_means(trials, v) for v in (spread, preloaded, path))
-    rows = LeftOut(masked, spread, preloaded, path, _weights(trials))
-    band = fitted_band(rows, trials.noise)
+    parts = (_over_trials(trials, block_means(trials, v)) for v in (spread, preloaded, path**2))
+    band = fitted_band(LeftOut(_over_trials(trials, masked**2), *parts), trials.noise, trials.corrected)
     return Direction(source, found.logarithms, found.covariance, ensemble, band, _held_out(trials, masked))
 
 
-def _weights(trials: Trials) -> np.ndarray:
-    """(b,) of blocks: every trial counts alike, and tours of postures, which are few, like all others together."""
-    tours = sum(m.postures for m in trials.motions)
-    alike = {True: max(tours, 1), False: max(len(trials.motions) - tours, 1)}
-    return np.concatenate([np.full(len(m.valid), 1.0 / (len(m.valid) * alike[m.postures])) for m in trials.motions])
+def _over_trials(trials: Trials, x: np.ndarray) -> np.ndarray:
+    """Means (k, 3) over the blocks (b, 3) of each trial that are not NaN."""
+    ends = np.cumsum([len(m.valid) for m in trials.motions])[:-1]
+    return np.array([np.nanmean(part, axis=0) if np.isfinite(part).any() else part[0] for part in np.split(x, ends)])
 
 
 def _preloaded(trials: Trials, p: SlipParameters, x: np.ndarray) -> np.ndarray:

@@ -32,13 +32,11 @@ class PlanarMotion:
         x: (b, 3) x, y, yaw [m, rad] since the first second, frame 0.
         valid: (b,) False where markers are missing.
         noise: (3,) standard deviation of a block, from the first second.
-        postures: Whether it is a tour of postures at rest.
     """
 
     x: np.ndarray
     valid: np.ndarray
     noise: np.ndarray
-    postures: bool = False
 
 
 def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: PlanarForcing) -> PlanarMotion:
@@ -63,9 +61,7 @@ def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: P
     plane = plane - plane[early].mean(axis=0)
     noise = plane[early].std(axis=0) / np.sqrt(BLOCK)
     b = n // BLOCK
-    return PlanarMotion(
-        blocks(plane), seen[: b * BLOCK].reshape(b, BLOCK).all(axis=1), noise, len(trial.dwell_start) > 0
-    )
+    return PlanarMotion(blocks(plane), seen[: b * BLOCK].reshape(b, BLOCK).all(axis=1), noise)
 
 
 def blocks(x: np.ndarray) -> np.ndarray:

@@ -44,6 +44,7 @@ class Direction:
         held_out: Trials left out, (k, 3) for x, y, yaw.
         linear: (3,) axes that the compliance predicts better.
         linear_variance: (3,) what it left of trials it had not seen [m2, rad2].
+        heave_variance: (3,) the same of z, rx, ry.
     """
 
     source: Source
@@ -54,6 +55,7 @@ class Direction:
     held_out: HeldOut
     linear: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=bool))
     linear_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    heave_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def parameters(self) -> SlipParameters:
@@ -68,13 +70,11 @@ class StickSlip:
     Attributes:
         wheels: Of the robot.
         tilting: Compliance of heave and tilt.
-        heave_variance: (3,) of z, rx, ry: what the compliance left of trials it had not seen.
         directions: One for each source.
     """
 
     wheels: WheelSet
     tilting: Tilting
-    heave_variance: np.ndarray
     directions: tuple[Direction, ...]
 
     def direction(self, source: Source) -> Direction:
@@ -127,7 +127,7 @@ class StickSlip:
         plane = self.predict(forcing)
         x, variance = np.empty((len(plane.x), 6)), np.empty((len(plane.x), 6))
         x[:, PLANE], variance[:, PLANE] = plane.x, plane.variance
-        x[:, HEAVE], variance[:, HEAVE] = forcing.heave, self.heave_variance
+        x[:, HEAVE], variance[:, HEAVE] = forcing.heave, self.direction(forcing.source).heave_variance
         return x, variance
 
 

@@ -36,6 +36,11 @@ class SlippingMotion:
     use: np.ndarray
     wheels: tuple[str, ...]
 
+    @property
+    def predictable(self) -> bool:
+        """Whether yaw, which moves the hand most, is predicted to move by more than its standard deviation."""
+        return bool((self.variance[:, 5]).sum() <= (self.x[:, 5] ** 2).sum())
+
 
 @dataclass(frozen=True)
 class BasePrediction:

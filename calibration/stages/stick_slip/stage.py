@@ -71,7 +71,7 @@ def fit_stick_slip(
     if not directions:
         message = "no stick-slip base: it takes two trials that show the base and its wrench"
         return None, (Verdict(STAGE, "missing", message),)
-    model = StickSlip(wheels, tilting, _heave_variance(suspension), tuple(directions))
+    model = StickSlip(wheels, tilting, tuple(directions))
     names = [one.trial.id for one in read]
     return model, (*(_judged(d) for d in directions), *_doubted(directions), *_moved(directions[0], names))
 
@@ -102,19 +102,15 @@ def _rows(
 
 def _linear(direction: Direction, suspension: Suspension) -> Direction:
     """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off."""
-    tried = dict(suspension.held_out).get(direction.source)
-    if tried is None:
-        return direction
-    plane, moved = list(PLANE), np.ones(6, dtype=bool)
-    variance = tried.variance(moved)[plane]
+    held_out = dict(suspension.held_out)
+    tried = held_out.get(direction.source, suspension.held_out[0][1])
+    variance = tried.variance(np.ones(6, dtype=bool))
+    plane, heave = variance[list(PLANE)], variance[list(HEAVE)]
+    if direction.source not in held_out:
+        return replace(direction, heave_variance=heave)
     own = direction.held_out.variance(np.asarray(direction.held_out.moves))
-    return replace(direction, linear=tried.moves[plane] & (variance < _BETTER * own), linear_variance=variance)
-
-
-def _heave_variance(suspension: Suspension) -> np.ndarray:
-    """(3,) of z, rx, ry."""
-    tried = suspension.held_out[0][1]
-    return np.asarray(tried.variance(np.ones(6, dtype=bool))[list(HEAVE)])
+    linear = tried.moves[list(PLANE)] & (plane < _BETTER * own)
+    return replace(direction, linear=linear, linear_variance=plane, heave_variance=heave)
 
 
 def _doubted(directions: Sequence[Direction]) -> Iterator[Verdict]:

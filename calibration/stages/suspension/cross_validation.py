@@ -19,6 +19,7 @@ from calibration.stages.suspension.modal_response import predicted
 _WORTH = 0.05  # R2 below which an axis is left still [-]
 _NOISE = 1.25  # how much more than expected the noise may be, known from one second a trial [-]
 _SLIP = 0.1  # share of the motion [-]
+_UNKNOWN = 0.05  # of what is left, noise included [-]
 _VISIBLE = 1.5  # motion over noise, mean squares, below which its share cannot be told [-]
 
 
@@ -44,9 +45,12 @@ class HeldOut:
         return 1.0 - self.error.sum(axis=0) / np.maximum(self.motion.sum(axis=0), np.finfo(float).tiny)
 
     def variance(self, moves: np.ndarray) -> np.ndarray:
-        """(6,) mean square of what is left of the displacement where an axis moves, of all of it where it stays."""
+        """(6,) mean square of what is left of the displacement where an axis moves, of all of it where it stays.
+
+        Noise is taken off, but not more than 95 % of it: what is hidden by noise is not known to be nothing.
+        """
         left = np.where(moves, np.minimum(self.error, np.finfo(float).max), self.motion).sum(axis=0)
-        return np.maximum(left - self.noise.sum(axis=0), 0.0) / max(float(self.count.sum()), 1.0)
+        return np.maximum(left - self.noise.sum(axis=0), _UNKNOWN * left) / max(float(self.count.sum()), 1.0)
 
     @property
     def explained(self) -> np.ndarray:

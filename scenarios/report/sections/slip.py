@@ -56,6 +56,7 @@ class SlipLine:
         left: Rms (3,) that the prediction leaves.
         inside: (3,) share of the samples in the 95 % band, the markers' noise at rest added [%].
         slides: Share of the time in which a wheel slides [%].
+        predictable: Whether yaw is predicted to move by more than its standard deviation.
     """
 
     trial: str
@@ -63,6 +64,7 @@ class SlipLine:
     left: np.ndarray
     inside: np.ndarray
     slides: float
+    predictable: bool
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,14 @@ def line(one: Slipped) -> SlipLine:
     noise = np.array([np.nanstd(a.measured[~rows]) for a in axes])
     inside = np.abs(error) <= _TWO_SIDED * np.hypot(np.stack([a.sigma[seen] for a in axes], axis=1), noise)
     slides = (one.motion.use[rows] > _SLIDES).any(axis=1).mean()
-    return SlipLine(one.trial, _rms(measured), _rms(error), 100.0 * inside.mean(axis=0), 100.0 * float(slides))
+    return SlipLine(
+        one.trial,
+        _rms(measured),
+        _rms(error),
+        100.0 * inside.mean(axis=0),
+        100.0 * float(slides),
+        one.motion.predictable,
+    )
 
 
 def drawn(one: Slipped) -> Figure:

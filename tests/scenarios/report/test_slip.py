@@ -1,7 +1,10 @@
 """The section of the slipping base: what it counts, and that what a trial's file holds is what was predicted."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from calibration.evaluation.evaluate import not_predictable
 from calibration.prediction import BaseMotion, PredictedTrial, read_predicted
 from calibration.stages.stick_slip import SlippingMotion
 from scenarios.report.sections.slip import Slipped, line
@@ -34,3 +37,11 @@ def test_a_trial_is_read_as_it_was_saved(tmp_path):
     assert found.wheels == ("left", "right")
     for name in ("x", "variance", "moment", "use"):
         np.testing.assert_allclose(getattr(found, name), getattr(motion(), name), rtol=1e-6)
+
+
+def test_a_trial_whose_band_is_wider_than_its_motion_is_named():
+    wide = replace(motion(), variance=np.full((400, 6), 1e-5))
+    trials = [PredictedTrial(name, "swing", T, base=BaseMotion(m.x, (), None, m)) for name, m in
+              (("good", motion()), ("bad", wide))]  # fmt: skip
+    (said,) = not_predictable(trials)
+    assert said.verdict == "warning" and "bad (3.2 mrad)" in said.message and "good" not in said.message

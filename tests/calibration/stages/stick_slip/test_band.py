@@ -1,6 +1,7 @@
 import numpy as np
+import pytest
 
-from calibration.stages.stick_slip.band import Band, LeftOut, ensemble_of, fitted_band, slid_path
+from calibration.stages.stick_slip.band import PRIOR, Band, LeftOut, ensemble_of, fitted_band, slid_path
 from calibration.stages.stick_slip.model import believed
 from calibration.stages.stick_slip.wheels import NAMES
 from tests.calibration.stages.stick_slip import slipping
@@ -9,25 +10,28 @@ from tests.calibration.stages.stick_slip.slipping import TRUTH
 NOISE = np.array([1e-6, 1e-6, 1e-6])
 
 
-def rows(rng, n=6000):
-    """Errors whose variances are known, that grow with the path and the members' spread."""
-    ensemble = rng.gamma(1.0, 1e-9, (n, 3))
-    preloaded, path = rng.gamma(1.0, 1e-10, (n, 3)), np.cumsum(rng.gamma(0.1, 1e-5, (n, 3)), axis=0)
-    V = (2e-5) ** 2 + 4.0 * ensemble + 1.0 * preloaded + 3e-7 * path
-    return LeftOut(np.sqrt(V) * rng.normal(size=(n, 3)), ensemble, preloaded, path, np.ones(n)), V
+def rows(rng, n, size=1.0):
+    """Trials whose errors, one each, grow with the path and the members' spread `size` times as robots' do."""
+    ensemble, preloaded = rng.gamma(1.0, 1e-11, (n, 3)), rng.gamma(1.0, 1e-9, (n, 3))
+    path = rng.gamma(1.0, 1e-6, (n, 3))
+    s, r, p, slip = size * np.exp(PRIOR).T
+    V = s**2 + r**2 * ensemble + p**2 * preloaded + slip**2 * path
+    return LeftOut(V * rng.normal(size=(n, 3)) ** 2, ensemble, preloaded, path)
 
 
-def test_the_band_holds_its_share_of_what_it_has_not_seen():
+@pytest.mark.parametrize(("size", "low", "high"), [(0.5, 0.93, 0.99), (1.0, 0.90, 0.98), (2.0, 0.87, 0.98)])
+def test_the_band_holds_its_share_of_what_it_has_not_seen(size, low, high):
     rng = np.random.default_rng(1)
-    band = fitted_band(rows(rng)[0], NOISE)
-    new, _ = rows(rng)
-    V = band.variance(new.ensemble, new.preloaded, new.path)
-    share = (np.abs(new.errors) < 1.96 * np.sqrt(V)).mean(axis=0)
-    assert np.all(share > 0.90) and np.all(share < 0.98)
+    share = []
+    for _ in range(40):
+        band, new = fitted_band(rows(rng, 13, size), NOISE), rows(rng, 100, size)
+        V = band.variance(new.ensemble, new.preloaded, np.sqrt(new.path))
+        share.append((new.square < 1.96**2 * V).mean(axis=0))
+    assert np.all(np.mean(share, axis=0) > low) and np.all(np.mean(share, axis=0) < high)
 
 
 def test_the_band_grows_with_what_slid_and_never_shrinks_below_its_floor():
-    band = Band(*(np.full(3, v) for v in (2e-5, 1.0, 1.0, 1e-7)))
+    band = Band(*(np.full(3, v) for v in (2e-5, 1.0, 1.0, 1e-2)))
     x = np.cumsum(np.full((100, 3), 1e-4), axis=0)
     share = np.repeat([0.0, 0.5], 50)
     path = slid_path(x, share)

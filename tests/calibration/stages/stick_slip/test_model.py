@@ -18,7 +18,7 @@ from tests.calibration.stages.stick_slip.slipping import MASS, TRUTH, WEIGHT, WH
 @pytest.fixture(scope="module")
 def model():
     direction = fit_direction("plate", slipping.campaign(3, seed=21), TRUTH.logarithms)
-    return StickSlip(WHEELS, Tilting(np.eye(6), np.eye(6)), np.full(3, 1e-10), (direction,))
+    return StickSlip(WHEELS, Tilting(np.eye(6), np.eye(6)), (direction,))
 
 
 @pytest.fixture(scope="module")
