@@ -20,6 +20,10 @@ def design(  # noqa: PLR0913  an option each
     campaign: Annotated[
         Path | None, typer.Option(metavar="YAML", help="Write the scenario that records them, too.")
     ] = None,
+    play: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write the tour as play_motion and JointTrajectory YAML and as CSV, too."),
+    ] = None,
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
@@ -32,7 +36,7 @@ def design(  # noqa: PLR0913  an option each
         raise ScenarioError(f"{path}: is a folder; name a file")
     with console.progress() as progress:
         progress("design", "", 0.0)
-        found = designed(steps.load(scenario, overriding(overrides, seed)), n, criterion, out, campaign)
+        found = designed(steps.load(scenario, overriding(overrides, seed)), n, criterion, out, campaign, play)
     plan, against = found.plan, found.comparison
     typer.echo(
         f"{n} postures, {plan.design.prospect.B.shape[2]} identifiable combinations; predicted error of the hand at "
@@ -45,4 +49,6 @@ def design(  # noqa: PLR0913  an option each
     )
     if plan.tour.contact:
         typer.echo(f"Not reached by a straight move clear of the robot: postures {list(plan.tour.contact)} (from 0)")
-    typer.echo(f"Postures: {out}" + (f"\nScenario: {campaign}" if campaign else ""))
+    typer.echo(
+        f"Postures: {out}" + (f"\nScenario: {campaign}" if campaign else "") + (f"\nTour: {play}" if play else "")
+    )

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
 
 
+PLAYED = ("tour.csv", "tour_rests.csv", "tour_play_motion.yaml", "tour_trajectory.yaml")
+
+
 @dataclass(frozen=True)
 class Designed:
     """A design that was written, and how it compares."""
@@ -26,8 +29,17 @@ class Designed:
     comparison: "Comparison"
 
 
-def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, campaign: Path | None = None) -> Designed:
-    """Choose n postures and write them to the file `out`, and to `campaign` the scenario that records them.
+def design(  # noqa: PLR0913  a file each
+    scenario: "Scenario",
+    n: int,
+    criterion: "Criterion",
+    out: Path,
+    campaign: Path | None = None,
+    play: Path | None = None,
+) -> Designed:
+    """Choose n postures and write them to the file `out`.
+
+    Into the file `campaign` goes the scenario that records them, into the folder `play` what a robot plays.
 
     Raises:
         NotEnoughData: The robot has hardly any posture clear of itself and in sight.
@@ -35,7 +47,7 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
     """
     import calibration.design
     import mjcf
-    from calibration.design import compared, nominal_task
+    from calibration.design import compared, nominal_task, played
     from calibration.recording import plans_text
     from scenarios.files import yaml_file
     from twin.campaign import describe_dataset
@@ -56,6 +68,12 @@ def design(scenario: "Scenario", n: int, criterion: "Criterion", out: Path, camp
     if campaign is not None:
         with output_folder.one_file(campaign) as new:
             yaml_file.write(new, recording(scenario, found))
+    if play is not None:
+        chain = found.task.model.nominal
+        slides = [chain.is_prismatic(joint) for joint in description.joint_names]
+        tour = played(description.joint_names, found.postures, chain.limits(), slides)
+        with output_folder.updating(play, PLAYED) as new:
+            tour.write(new)
     return Designed(found, against)
 
 

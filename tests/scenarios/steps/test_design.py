@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 import pytest
+from ruamel.yaml import YAML
 
 import mjcf
 from calibration.design.candidates import in_sight, visible
@@ -14,18 +15,24 @@ from calibration.design.exchange import choose
 from calibration.design.information import prospect
 from calibration.design.plan import compared, nominal_task, plan
 from calibration.design.sequence import clear, sides
+from calibration.design.tour_file import played
 from calibration.errors import InputError
 from calibration.recording.experiment import plans_text, read_plans
 from calibration.stages.geometry.parameters import geometry_parameters
 from scenarios import load
 from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
-from scenarios.steps.design import design, recording, recording_too
+from scenarios.steps.design import PLAYED, design, recording, recording_too
 from tests.doubles import rigid_robot
 from twin.campaign import describe_dataset
 from twin.motions import RATE, schedule
+from twin.motions.csv_trajectory import read_trajectory
 
 DESCRIBED = describe_dataset(load("humanoids2024").twin, ())
+
+
+def yaml_text(path):
+    return YAML(typ="safe").load(path.read_text())
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +61,31 @@ def test_thirty_designed_postures_beat_random_ones_where_the_robot_departs_from_
     assert len(found.design.chosen) == 30 and len(against.random) == 100
     assert against.gain >= 0.30
     assert against.designed < against.random.min()
+
+
+def test_a_robot_plays_the_tour(found, tmp_path):
+    chain = found.task.model.nominal
+    slides = [chain.is_prismatic(j) for j in chain.measured]
+    tour = played(chain.measured, found.postures, chain.limits(), slides)
+    paths = {path.name: path for path in tour.write(tmp_path)}
+    assert tuple(paths) == PLAYED
+    motion = read_trajectory(paths["tour.csv"], "tour", "calibration", rest=1.0)  # limits and speeds of the twin
+    assert len(motion.command) > RATE * tour.t[-1]
+    for posture, (start, stop) in zip(found.postures, tour.rests, strict=True):
+        at = [np.array([np.interp(t, tour.t, column) for column in tour.q.T]) for t in (start - 0.01, start, stop)]
+        np.testing.assert_allclose(at[1:], [posture.q] * 2, atol=1e-9)
+        asked = np.array(posture.approach)
+        low, high = chain.limits()
+        free = (asked != 0) & (np.abs(np.array(posture.q) - np.where(asked > 0, low, high)) > 1e-3)
+        np.testing.assert_array_equal(np.sign(at[1] - at[0])[free], asked[free])
+        assert stop - start == pytest.approx(2.0)
+    play, trajectory = (yaml_text(paths[f"tour_{name}.yaml"]) for name in ("play_motion", "trajectory"))
+    points = play["play_motion"]["motions"]["calibration_postures"]["points"]
+    assert [p["positions"] for p in points] == [p["positions"] for p in trajectory["points"]]
+    stamps = [p["time_from_start"]["secs"] + 1e-9 * p["time_from_start"]["nsecs"] for p in trajectory["points"]]
+    np.testing.assert_allclose(stamps, tour.t, atol=1e-3)
+    np.testing.assert_allclose([p["time_from_start"] for p in points], tour.t, atol=1e-3)
+    assert trajectory["joint_names"] == list(chain.measured) and (np.diff(stamps) > 0.0).all()
 
 
 def test_without_departures_they_beat_random_ones_by_thirty_percent(task):
