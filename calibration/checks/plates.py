@@ -27,6 +27,7 @@ _LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or it
 _SLOW = 2.5  # [Hz] below the base's resonance, where plate and dynamics agree
 _OUTSIDE = 0.03  # [m] the centre of pressure may be outside the wheels
 _WEIGHT = 1.4  # believable ratio of measured to nominal weight, or its inverse [-]
+_NEAR = 0.07  # [m] between a wheel and the centre of pressure of what a plate misses
 _SURE = 2.5  # standard deviations of the nominal weight
 _TURNED, _WRONG = np.radians(4.0), np.radians(20.0)  # plate to lab: doubtful, not usable [rad]
 _MIRRORED = -0.5  # correlation [-]
@@ -101,6 +102,9 @@ def _against_dynamics(
             f"plate scale: it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} +- "
             f"{weight * spread:.0f} N: springs would be off by as much; see its gain, or a load nobody declared"
         )
+        missing = rest - np.median([f.rest for f in dynamics], axis=0)
+        if off := _off_plate(lab.description, missing):
+            message += f"; what is missing is as if {off} stood off the plate"
         yield Verdict(STAGE, "warning", message)
     pairs = _slow(plate, dynamics)
     p, d = (np.concatenate(a) for a in zip(*pairs, strict=True))
@@ -126,6 +130,15 @@ def weight_spread(lab: Laboratory) -> float:
     payload = lab.description.payload
     known = payload.tolerance if payload is not None else 0.0
     return float(np.hypot(lab.description.tolerances.link_mass * np.linalg.norm(masses), known) / masses.sum())
+
+
+def _off_plate(description: Description, missing: np.ndarray) -> str:
+    """The wheel that bears a missing wrench (6,), Fz > 0; empty where none is near its centre of pressure."""
+    if not description.wheels or missing[2] <= 0.0:
+        return ""
+    cop = np.array([-missing[4], missing[3]]) / missing[2]
+    far = [float(np.linalg.norm(np.array(w.contact[:2]) - cop)) for w in description.wheels]
+    return description.wheels[int(np.argmin(far))].name if min(far) < _NEAR else ""
 
 
 def _misplaced(outside: float) -> str:

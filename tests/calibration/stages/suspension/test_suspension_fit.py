@@ -128,10 +128,11 @@ def test_without_a_plate_the_dynamics_take_its_place(trials):
     [
         (lambda w: -w, "plate sign: Fz"),
         (lambda w: w * [1, 1, 1, -1, 1, 1], "Mx mirror"),
+        (lambda w: w * [1, -1, 1, 1, 1, 1], "Fy mirror"),
         (lambda w: w[:, [1, 0, 2, 4, 3, 5]] * [-1, 1, 1, -1, 1, 1], "rotated by"),
         (lambda w: 0.001 * w, "scale"),
     ],
-    ids=["sign", "one axis", "rotated", "unit"],
+    ids=["sign", "one axis", "Fy", "rotated", "unit"],
 )
 def test_a_wrong_plate_is_refused_by_name(trials, change, told):
     suspension, verdicts = fit([plated(t, change(t.plate_wrench[:, 0])) for t in trials])
@@ -146,7 +147,22 @@ def turned(trial, degrees):
 
 
 def test_a_slightly_turned_plate_is_told(trials):
-    assert "rotated by 8" in said(fit([turned(t, 8.0) for t in trials])[1], "warning")
+    for degrees in (5.0, 8.0):
+        assert f"rotated by {degrees:.0f}" in said(fit([turned(t, degrees) for t in trials])[1], "warning")
+
+
+@pytest.mark.parametrize("wheel", [0, 2, 5])
+def test_a_wheel_off_the_plate_is_named(trials, wheel):
+    place = pin.SE3(T_LAB_BASE).act(np.array(WHEELS[wheel].contact))
+    arm = place - np.array(DESCRIPTION.plates[0].centre)
+
+    def without(w):
+        force = np.zeros((len(w), 3))
+        force[:, 2] = w[:, 2] / len(WHEELS)
+        return w - np.hstack([force, np.cross(arm, force)])
+
+    _, verdicts = fit([plated(t, without(t.plate_wrench[:, 0])) for t in trials])
+    assert f"as if {WHEELS[wheel].name} stood off the plate" in said(verdicts, "warning")
 
 
 @pytest.mark.parametrize("which", [0, 1, 2])
