@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help demo test test-fast check slow claims docs pictures bench bench-peer peer clean
+.PHONY: help demo test test-fast check slow fuzz reliability claims docs pictures bench bench-peer peer clean
 
 help:
 	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
@@ -13,6 +13,8 @@ help:
 	@echo "make test-fast   the fast tests of one folder while working: make test-fast FOLDER=twin"
 	@echo "make check       format, lint, types"
 	@echo "make slow        the tests that take minutes"
+	@echo "make fuzz        random damage to every kind of file, 30 minutes, or FUZZ_SECONDS=N"
+	@echo "make reliability try every hostile case into docs/reliability.md"
 	@echo "make claims      measure the claims on ten fixed and ten sampled robots into docs/claims.md (half an hour)"
 	@echo "make docs        the documentation site into docs/_site, offline once its tools are installed"
 	@echo "make pictures    the pictures of the README and the documents from runs/demo; needs Chromium"
@@ -39,6 +41,12 @@ check: $(READY)
 
 slow: $(READY)
 	$(BIN)/python -m pytest -q -m slow -n 2 --dist loadfile
+
+fuzz: $(READY)
+	FUZZ_SECONDS=$${FUZZ_SECONDS:-1800} $(BIN)/python -m tests.hostile.fuzz
+
+reliability: $(READY)
+	$(BIN)/python -m tests.hostile.page
 
 claims: $(READY)
 	$(BIN)/python -m pytest -q -m slow tests/acceptance/test_ladder.py

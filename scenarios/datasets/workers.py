@@ -35,6 +35,7 @@ _QUIET = {
     "distributed.scheduler.work-stealing-interval": "2s",
     "distributed.worker.memory.monitor-interval": "1s",
 }
+_LOOPBACK = "127.0.0.1"  # whoever reaches a scheduler may run code there
 _PATIENCE = "20s"  # for a scheduler to answer
 
 
@@ -160,8 +161,11 @@ def _client(workers: Workers) -> Iterator["Client"]:
         ) from error
     with dask.config.set({"distributed.scheduler.allowed-failures": _TRIES - 1}):
         if workers.scheduler is None:
-            options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-            with LocalCluster(n_workers=workers.number, **options) as cluster, Client(cluster) as client:
+            options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+            with (
+                LocalCluster(n_workers=workers.number, host=_LOOPBACK, **options) as cluster,
+                Client(cluster) as client,
+            ):
                 yield client
             return
         try:

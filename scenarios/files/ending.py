@@ -14,7 +14,17 @@ import typer
 from scenarios.files.errors import ScenarioError
 
 FAILED, WRONG_INPUT = 1, 2
-_MACHINE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EPIPE}
+_MACHINE = {
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EFBIG,
+    errno.EROFS,
+    errno.EIO,
+    errno.EMFILE,
+    errno.ENFILE,
+    errno.ENOMEM,
+    errno.EPIPE,
+}
 OUR_MISTAKE = "This is a mistake of tiago-twin, not of your input: please report it with the command and these lines."
 
 

@@ -38,8 +38,29 @@ def make(folder: Path, n_postures: int = 4) -> Path:
     shutil.copytree(folder / "data", folder / "one")
     _only(folder / "one", ("swing",))
     import_export.export_files("csv", folder / "one", folder / "csv")
-    shutil.rmtree(folder / "one")
     (folder / "scenario.yaml").write_text("name: mine\ndescription: one\nextends: short\nset: {seed: 4}\n")
+    return folder
+
+
+def make_formats(folder: Path) -> Path:
+    """Add c3d/, bag/, an estimate of data/ and a plan of experiments, for fuzzing."""
+    import calibration
+    from calibration.formats.c3d.write import write_c3d
+    from scenarios.files import registry
+    from scenarios.steps import run_steps
+    from tests.doubles import c3d_data
+
+    (folder / "c3d").mkdir()
+    write_c3d(folder / "c3d/log.c3d", c3d_data.trial(), c3d_data.described(), c3d_data.DEPTH)
+    (folder / "c3d/mapping.yaml").write_text(json.dumps(c3d_data.mapping()))
+    import_export.export_files("bag", folder / "one", folder / "bag")
+    rigid_robot.campaign(folder / "more", rigid_robot.defects(1))
+    run_steps.calibrate(folder / "more", folder / "estimate", plan_next=True)
+    shutil.rmtree(folder / "more")
+    plan = folder / "estimate/record_next.yaml"
+    shutil.copy(plan, folder / "plan.yaml")
+    shutil.copy(registry.HERE / "humanoids2024.yaml", folder / "humanoids2024.yaml")
+    assert calibration.load_estimate(folder / "estimate").calibrated
     return folder
 
 

@@ -4,15 +4,14 @@ import shutil
 
 import pytest
 
-from tests.hostile import files, folders
 from tests.hostile.case import Case, judged
 from tests.hostile.laboratory import copied, make
+from tests.hostile.page import tables
 
 ROWS = [
-    pytest.param(case, id=f"{group}: {case.name}", marks=[pytest.mark.slow] if case.slow else [])
-    for table in (files.GROUPS, folders.GROUPS)
-    for group, cases in table.items()
-    for case in cases
+    pytest.param(case, id=f"{group}: {case.name}", marks=[pytest.mark.slow] if case.slow or k % 2 else [])
+    for group, cases in tables()
+    for k, case in enumerate(cases)
 ]
 
 
