@@ -71,11 +71,11 @@ def _figure(folder: Path, name: str) -> float:
     else:
         row, _, metric = name.rpartition(".")
         key = _SHORT.get(metric, metric)
-        entry = _row(_json(score if score.is_file() else folder / "evaluation.json")["rows"], row)
-        if key not in entry or isinstance(entry[key], (str, dict)):
+        entry = _row(_json(score if score.is_file() else folder / "evaluation.json").get("rows", []), row)
+        if key not in entry or not isinstance(entry[key], float | int | None):
             raise ScenarioError(f"check: {name}: no metric {metric!r}; there are {', '.join(_SHORT)} and coverage")
         found = entry[key]
-    if found is None:
+    if not isinstance(found, float | int):
         raise ScenarioError(f"check: {name} is not known in {folder}")
     return float(found)
 
@@ -97,6 +97,11 @@ def _json(path: Path) -> dict[str, Any]:
     from calibration.untrusted import read_json
 
     content = read_json(path, "make it with tiago-twin evaluate")
-    if not isinstance(content, dict):
+    rows = content.get("rows", []) if isinstance(content, dict) else None
+    if not isinstance(rows, list) or not all(_is_row(row) for row in rows):
         raise ScenarioError(f"{path}: holds no results; make it with tiago-twin evaluate")
     return content
+
+
+def _is_row(row: Any) -> bool:
+    return isinstance(row, dict) and all(isinstance(row.get(k), str) for k in ("model", "base", "encoder", "trials"))

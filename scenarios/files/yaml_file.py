@@ -128,7 +128,7 @@ def _plain(node: Any, place: str) -> Any:
 
 
 def _kind(node: Any) -> str:
-    return "a list" if isinstance(node, CommentedSeq) else f"the single value {node!r}"
+    return "a list" if isinstance(node, CommentedSeq) else f"the single value {str(node)[:40]!r}"
 
 
 def _override(text: str) -> Override:

@@ -73,7 +73,10 @@ def read_mapping(path: Path) -> "Mapping":
         setup = values.get("setup")
         if isinstance(setup, dict) and setup.get("wheels") == PACKAGED:
             values["setup"] = setup | {"wheels": _wheels()}
-        return written_out(values)
+        try:
+            return written_out(values)
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError):
+            return values  # not even the short form's; the validation says what is wrong
 
     return yaml_file.read(path, Mapping, prepare=prepared)
 

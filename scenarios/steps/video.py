@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from calibration.untrusted import read_json
 from scenarios.files.errors import ScenarioError
 from scenarios.files.output_folder import one_file
 
@@ -34,13 +35,12 @@ def film(run_folder: Path | str, trial_id: str, out: Path | str, options: "ClipO
 
 def _role(run_folder: Path, trial_id: str) -> str:
     """The session a trial belongs to."""
-    import calibration.recording
-
     for name in ("scenario.yaml", "dataset/dataset.json", "truth/trials"):
         if not (run_folder / name).exists():
             raise ScenarioError(f"{run_folder}: holds no {name}; a picture is made of a run that was simulated here")
-    trials = calibration.recording.load(run_folder / "dataset").description.trials
-    roles = {trial.id: str(trial.role) for trial in trials}
+    content = read_json(run_folder / "dataset" / "dataset.json")
+    trials = content.get("trials") if isinstance(content, dict) else None
+    roles = {str(t.get("id")): str(t.get("role")) for t in trials or () if isinstance(t, dict)}
     if trial_id not in roles:
         raise ScenarioError(f"{run_folder}: no trial {trial_id!r}; its trials are {', '.join(roles)}")
     return roles[trial_id]

@@ -270,6 +270,18 @@ RESULTS = [
     ),
     Case("evaluation.nc damaged", text("run/evaluation.nc", b"\x89HDF\r\n\x1a\nx"), REPORT, "netCDF4"),
     Case("check of results []", text("run/score.json", "[]"), "check run --max model_2.mm=2", "no results"),
+    Case(
+        "check of results without rows",
+        put("run/score.json", "rows", 0, value=[1]),
+        "check run --max model_2.mm=2",
+        "no results",
+    ),
+    Case(
+        "check of a figure that is a list",
+        put("run/score.json", "coverage_95", value=[1]),
+        "check run --max coverage=2",
+        "not known",
+    ),
     Case("collection {", text("run/collection.json", "{"), "dataset short -n 1 --out run", "not a collection"),
 ]
 

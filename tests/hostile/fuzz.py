@@ -76,7 +76,7 @@ TARGETS = {
     "marker CSV": Target(
         "csv/swing.mocap.csv",
         mutation.of_csv,
-        (_IMPORT.format("csv csv/swing.mocap.csv", "csv"), "import --init map.yaml csv/swing.mocap.csv"),
+        (_IMPORT.format("csv csv/swing.mocap.csv", "csv"), "import --init out/map.yaml csv/swing.mocap.csv"),
     ),
     "C3D": Target("c3d/log.c3d", mutation.of_bytes, (_IMPORT.format("c3d c3d/log.c3d", "c3d"),)),
     "bag": Target("bag/swing.bag", mutation.of_bytes, (_IMPORT.format("bag bag/swing.bag", "bag"),)),

@@ -42,7 +42,7 @@ def test_the_truth_is_preferred_and_coverage_is_a_figure(run, tiago_twin):
         (("--max", "model_9.mm=1"), "there are model_2:fixed:motor:dynamic"),
         (("--max", "model_2.inches=1"), "no metric 'inches'; there are mm, norm"),
         (("--max", "model_2.per_axis_mm=1"), "no metric"),
-        (("--max", "coverage=1"), "score.json: cannot be read"),
+        (("--max", "coverage=1"), "score.json: no such file"),
     ],
 )
 def test_wrong_limits_are_named(run, tiago_twin, arguments, message):
