@@ -77,7 +77,7 @@ class Engines:
 
     def load_estimate(self, path, dataset=None):
         verdict = SimpleNamespace(stage="clocks", verdict="ok", message="0.1 ms")
-        return SimpleNamespace(calibrated=self.calibrated, verdicts=[verdict])
+        return SimpleNamespace(calibrated=self.calibrated, verdicts=[verdict], extent="calibrated")
 
     def save_estimate(self, estimate, folder):
         self.saves("estimate.json", {"main": "model_2"})(folder)
