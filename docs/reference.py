@@ -2,6 +2,7 @@
 
 import importlib
 import inspect
+import itertools
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -42,11 +43,17 @@ def table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def configuration() -> str:
-    """Every value of the default scenario that `--set` reaches."""
-    found = value_paths(load(DEFAULT))
-    rows = ((f"`{v.path}`", f"`{v.value}`", v.unit, v.range, v.default, v.meaning) for v in found)
-    text = "Every value `--set PATH=VALUE` reaches, as in the default scenario; `tiago-twin show SCENARIO` for another."
-    return f"# Configuration\n\n{text}\n\n{table(('path', 'value', 'unit', 'range', 'default', 'meaning'), rows)}\n"
+    """Every value of the default scenario that `--set` reaches, grouped by what holds it."""
+    parts = [
+        "# Configuration\n\nEvery value `--set PATH=VALUE` reaches, as in the default scenario; another's: "
+        "`tiago-twin show SCENARIO`. A path is the heading, a dot and the name.\n"
+    ]
+    for holder, values in itertools.groupby(value_paths(load(DEFAULT)), lambda v: v.path.rpartition(".")[0]):
+        rows = (
+            (f"`{v.path.rpartition('.')[2]}`", f"{v.value} {v.unit}", v.range, v.default, v.meaning) for v in values
+        )
+        parts.append(f"## {holder or 'scenario'}\n\n{table(('name', 'value', 'range', 'default', 'meaning'), rows)}\n")
+    return "\n".join(parts)
 
 
 def parameters() -> str:

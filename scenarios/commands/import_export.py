@@ -28,6 +28,7 @@ def import_(
     urdf: Annotated[Path | None, typer.Option(metavar="URDF", help="Your robot, with --init.")] = None,
 ) -> None:
     """Write a dataset from laboratory files, or draft the mapping that reads them (--init)."""
+    from scenarios.commands import console
     from scenarios.steps import import_export
 
     given = list(files or [])
@@ -38,7 +39,10 @@ def import_(
         return
     if mapping is None or out is None:
         raise ScenarioError("import: name a mapping with --map and a folder with --out; --init drafts a mapping")
-    for note in import_export.import_files(kind, given, mapping, out, add_to):
+    with console.progress() as progress:
+        progress("import", "", 0.0)
+        notes = import_export.import_files(kind, given, mapping, out, add_to)
+    for note in notes:
         typer.echo(note)
     typer.echo(f"Dataset: {out}")
 
@@ -50,9 +54,12 @@ def export(
     ros: Annotated[int, typer.Option(min=1, max=2, metavar="1|2", help="Bags of ROS 1, or of ROS 2 (mcap).")] = 1,
 ) -> None:
     """Write laboratory files from a dataset, or the calibrated URDF of an estimate."""
+    from scenarios.commands import console
     from scenarios.steps import import_export
 
-    notes = () if kind == "urdf" else import_export.export_files(kind, source, out, ros)
+    with console.progress() as progress:
+        progress("export", "", 0.0)
+        notes = () if kind == "urdf" else import_export.export_files(kind, source, out, ros)
     if kind == "urdf":
         import_export.export_urdf(source, out)
     for note in notes:

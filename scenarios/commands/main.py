@@ -24,10 +24,14 @@ from scenarios.commands.many import benchmark as command_benchmark
 from scenarios.commands.many import dataset as command_dataset
 from scenarios.commands.many import reality as command_reality
 from scenarios.commands.many import study as command_study
-from scenarios.commands.options import Out, Overrides, Quick, ScenarioName, Seed, overriding
+from scenarios.commands.options import Grouped, Out, Overrides, Quick, ScenarioName, Seed, overriding
 from scenarios.files.ending import FAILED, Ending
 
 TERMINATED = 128 + signal.SIGTERM
+
+
+_SIMULATE, _CALIBRATE, _RECORD = "Simulate", "Calibrate and evaluate", "Laboratory recordings"
+_LOOK, _MANY, _TEST = "Look at results", "Many robots", "Test a calibration program"
 
 
 def _example(arguments: str) -> str:
@@ -36,7 +40,7 @@ def _example(arguments: str) -> str:
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
+    cls=Grouped,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Simulate a TIAGo with known errors, calibrate it from its recordings, evaluate the result on unseen motion.",
@@ -65,7 +69,7 @@ def options(
     logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
 
 
-@app.command("list", epilog=_example("list"))
+@app.command("list", epilog=_example("list"), rich_help_panel=_SIMULATE)
 def list_scenarios() -> None:
     """List the scenarios."""
     from scenarios import steps
@@ -76,7 +80,9 @@ def list_scenarios() -> None:
         typer.echo(f"{name:{width}}  {steps.load(name).description}")
 
 
-@app.command(epilog=_example("run humanoids2024 --seed 7 --set twin.arm.arm_6_joint.gap=0.012"))
+@app.command(
+    epilog=_example("run humanoids2024 --seed 7 --set twin.arm.arm_6_joint.gap=0.012"), rich_help_panel=_SIMULATE
+)
 def run(
     scenario: ScenarioName,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="The run folder; runs/NAME unless given.")] = None,
@@ -100,7 +106,7 @@ def run(
         typer.echo(line)
 
 
-@app.command(epilog=_example("simulate short --quick --out runs/short"))
+@app.command(epilog=_example("simulate short --quick --out runs/short"), rich_help_panel=_SIMULATE)
 def simulate(
     scenario: ScenarioName,
     out: Out,
@@ -125,7 +131,7 @@ def simulate(
     typer.echo(f"Dataset: {out / 'dataset'}\nTruth: {out / 'truth'}")
 
 
-@app.command(epilog=_example("calibrate runs/short/dataset --out runs/short/estimate"))
+@app.command(epilog=_example("calibrate runs/short/dataset --out runs/short/estimate"), rich_help_panel=_CALIBRATE)
 def calibrate(
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder, the twin's or a real one.")],
     out: Out,
@@ -155,7 +161,9 @@ def calibrate(
         raise typer.Exit(FAILED)
 
 
-@app.command(epilog=_example("evaluate runs/short/estimate runs/short/dataset --out runs/evaluation"))
+@app.command(
+    epilog=_example("evaluate runs/short/estimate runs/short/dataset --out runs/evaluation"), rich_help_panel=_CALIBRATE
+)
 def evaluate(
     estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE", help="An estimate folder or file.")],
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="A dataset folder.")],
@@ -179,7 +187,7 @@ def evaluate(
     console.show(console.confirmation(out))
 
 
-@app.command(epilog=_example("report runs/short"))
+@app.command(epilog=_example("report runs/short"), rich_help_panel=_LOOK)
 def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, or an estimate.")]) -> None:
     """Write report.html from what a run folder or an estimate holds."""
     from scenarios import steps
@@ -190,26 +198,50 @@ def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
     typer.echo(f"Report: {page}")
 
 
-import_ = app.command("import", epilog=_example("import csv lab/*.csv --map lab.yaml --out dataset"))(
-    import_export.import_
+import_ = app.command(
+    "import", epilog=_example("import csv lab/*.csv --map lab.yaml --out dataset"), rich_help_panel=_RECORD
+)(import_export.import_)
+export = app.command(epilog=_example("export urdf runs/short/estimate --out tiago.urdf"), rich_help_panel=_RECORD)(
+    import_export.export
 )
-export = app.command(epilog=_example("export urdf runs/short/estimate --out tiago.urdf"))(import_export.export)
-dataset = app.command(epilog=_example("dataset swing20 -n 10 --out runs/swing20"))(command_dataset.dataset)
-design = app.command(epilog=_example("design short -n 30 --out postures.yaml"))(command_design.design)
-study = app.command(epilog=_example("study coverage short -n 20 --out runs/coverage"))(command_study.study)
-process = app.command(epilog=_example("process lab.yaml --out runs/lab"))(command_process.process)
-base = app.command(epilog=_example("base log.csv --map log.yaml --fit 28 --out runs/base"))(command_process.base)
-predict = app.command(epilog=_example("predict runs/lab/estimate day2/*.csv --map lab.yaml --out runs/day2"))(
-    command_predict.predict
+dataset = app.command(epilog=_example("dataset swing20 -n 10 --out runs/swing20"), rich_help_panel=_MANY)(
+    command_dataset.dataset
 )
-look = app.command(epilog=_example("look runs/short/dataset --out runs/look"))(quicklook.look)
-picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"))(video.picture)
-view = app.command(epilog=_example("view runs/short --trial xyz --magnify 50"))(command_view.view)
-reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"))(command_reality.reality)
-show = app.command(epilog=_example("show humanoids2024 gap"))(command_show.show)
-benchmark = app.command(epilog=_example("benchmark make --out runs/bench"))(command_benchmark.benchmark)
-peer = app.command(epilog=_example("peer runs/short/dataset --out runs/peer"))(command_benchmark.peer)
-check = app.command(epilog=_example("check runs/short --max model_2.mm=2.5"))(command_check.check)
+design = app.command(epilog=_example("design short -n 30 --out postures.yaml"), rich_help_panel=_RECORD)(
+    command_design.design
+)
+study = app.command(epilog=_example("study coverage short -n 20 --out runs/coverage"), rich_help_panel=_MANY)(
+    command_study.study
+)
+process = app.command(epilog=_example("process lab.yaml --out runs/lab"), rich_help_panel=_CALIBRATE)(
+    command_process.process
+)
+base = app.command(epilog=_example("base log.csv --map log.yaml --fit 28 --out runs/base"), rich_help_panel=_CALIBRATE)(
+    command_process.base
+)
+predict = app.command(
+    epilog=_example("predict runs/lab/estimate day2/*.csv --map lab.yaml --out runs/day2"), rich_help_panel=_CALIBRATE
+)(command_predict.predict)
+look = app.command(epilog=_example("look runs/short/dataset --out runs/look"), rich_help_panel=_LOOK)(quicklook.look)
+picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"), rich_help_panel=_LOOK)(
+    video.picture
+)
+view = app.command(epilog=_example("view runs/short --trial xyz --magnify 50"), rich_help_panel=_LOOK)(
+    command_view.view
+)
+reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"), rich_help_panel=_MANY)(
+    command_reality.reality
+)
+show = app.command(epilog=_example("show humanoids2024 gap"), rich_help_panel=_SIMULATE)(command_show.show)
+benchmark = app.command(epilog=_example("benchmark make --out runs/bench"), rich_help_panel=_TEST)(
+    command_benchmark.benchmark
+)
+peer = app.command(epilog=_example("peer runs/short/dataset --out runs/peer"), rich_help_panel=_TEST)(
+    command_benchmark.peer
+)
+check = app.command(epilog=_example("check runs/short --max model_2.mm=2.5"), rich_help_panel=_TEST)(
+    command_check.check
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

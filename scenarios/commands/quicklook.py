@@ -14,9 +14,12 @@ def look(
     trial: Annotated[list[str] | None, typer.Option(metavar="ID", help="Only this trial; repeatable.")] = None,
 ) -> None:
     """Plot recordings, a page a trial: markers and gaps, wrench, encoder differences."""
+    from scenarios.commands import console
     from scenarios.quicklook.page import look as draw
 
-    for one in draw(dataset, out, trial or ()):
+    with console.progress() as progress:
+        found = draw(dataset, out, trial or (), progress)
+    for one in found:
         typer.echo(f"{one.entry.id}: {one.entry.role}, {one.entry.kind}")
         for line in one.findings:
             typer.echo(f"  {line}")

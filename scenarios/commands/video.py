@@ -1,6 +1,7 @@
 """The command `tiago-twin picture`."""
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -42,11 +43,13 @@ def picture(  # noqa: PLR0913  an option each
     if wrong:
         raise ScenarioError("\n".join(wrong))
 
+    from scenarios.commands import console
     from scenarios.steps.video import film
     from twin.rendering import ClipOptions
 
     for path, seconds in ((still, 0.0), (clip, duration)):
         if path is not None:
             options = ClipOptions(magnify=magnify, start=start, duration=seconds, renderer=renderer.value, ghost=ghost)
-            n = film(run_folder, trial, path, options)
+            with console.progress() as progress:
+                n = film(run_folder, trial, path, options, partial(progress, "picture", path.name))
             typer.echo(f"{path}: {n} picture{'s' if n > 1 else ''} of {trial}")

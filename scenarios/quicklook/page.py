@@ -4,7 +4,7 @@ Each instrument is drawn on its own clock from its own first sample; nothing is 
 centres of pressure of plates that are not loaded.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +26,16 @@ _LINEAR = 10.0  # [mm] below which distances are drawn to a linear scale: a base
 _AXES = ("x", "y", "z")
 
 
-def look(dataset: Path, out: Path, trials: Sequence[str] = ()) -> tuple[Looked, ...]:
+def look(
+    dataset: Path, out: Path, trials: Sequence[str] = (), progress: Callable[[str, str, float], None] | None = None
+) -> tuple[Looked, ...]:
     """Write a picture of each trial as OUT/<trial>.png, and say what it holds.
 
     Args:
         dataset: A dataset folder.
         out: The folder to write; what else is in it stays.
         trials: Only these; all where none is named.
+        progress: Called with "look", the trial and the share that is done.
 
     Raises:
         ScenarioError: There is no such trial, or `out` cannot be written.
@@ -45,7 +48,10 @@ def look(dataset: Path, out: Path, trials: Sequence[str] = ()) -> tuple[Looked, 
         raise ScenarioError(f"{dataset}: no trial {unknown[0]!r}; its trials are {', '.join(known)}")
     found = []
     with output_folder.updating(out, []) as new:
-        for name in trials or known:
+        names = tuple(trials or known)
+        for k, name in enumerate(names):
+            if progress is not None:
+                progress("look", name, k / len(names))
             one = looked_at(source, known[name])
             with drawing():
                 page(source, one).savefig(new / f"{name}.png", dpi=_DPI, metadata={"Software": None})

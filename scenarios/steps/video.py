@@ -1,5 +1,6 @@
 """Stills and clips of the trials of a simulated run, from its scenario and its truth."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,13 @@ if TYPE_CHECKING:
     from twin.rendering import ClipOptions
 
 
-def film(run_folder: Path | str, trial_id: str, out: Path | str, options: "ClipOptions") -> int:
+def film(
+    run_folder: Path | str,
+    trial_id: str,
+    out: Path | str,
+    options: "ClipOptions",
+    progress: Callable[[float], None] = lambda _: None,
+) -> int:
     """Write a GIF of a trial, or a PNG of one instant where the duration is 0; return the number of pictures.
 
     Raises:
@@ -30,7 +37,8 @@ def film(run_folder: Path | str, trial_id: str, out: Path | str, options: "ClipO
     lab = laboratory(scenario.twin, scenario.seed)
     lab = second_session(lab) if role == "confirmation" else lab
     with one_file(out) as part:
-        return clip(lab, truth.read_trial(run_folder / "truth" / "trials" / f"{trial_id}.nc"), part, options)
+        true = truth.read_trial(run_folder / "truth" / "trials" / f"{trial_id}.nc")
+        return clip(lab, true, part, options, progress)
 
 
 def _role(run_folder: Path, trial_id: str) -> str:

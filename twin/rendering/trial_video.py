@@ -8,7 +8,7 @@ Arm and torso are drawn at their true angles; the bending of links and wheels be
 drawn. A GIF runs at the speed of the recording.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,7 +59,13 @@ class ClipOptions:
     ghost: float = 0.0
 
 
-def clip(lab: Laboratory, trial: TruthTrial, path: Path, options: ClipOptions) -> int:
+def clip(
+    lab: Laboratory,
+    trial: TruthTrial,
+    path: Path,
+    options: ClipOptions,
+    progress: Callable[[float], None] = lambda _: None,
+) -> int:
     """Write a GIF of a trial, or a PNG of one instant; return the number of pictures.
 
     Args:
@@ -67,6 +73,7 @@ def clip(lab: Laboratory, trial: TruthTrial, path: Path, options: ClipOptions) -
         trial: What was true in it.
         path: The file: a GIF, or a PNG where the duration is 0.
         options: How.
+        progress: Called with the share of the pictures that is drawn.
 
     Raises:
         NothingToShow: The trial has no sample in the time asked for.
@@ -82,7 +89,11 @@ def clip(lab: Laboratory, trial: TruthTrial, path: Path, options: ClipOptions) -
     poses = magnified(trial.base_pose, options.magnify)
     q = trial.q_link_true
     with Frames(model, view, options.renderer) as frames:
-        images = [frames.draw(posed(model, poses[k], trial.joint, q[k])) for k in shown]
+        part = 0.5 if options.ghost else 1.0
+        images = []
+        for i, k in enumerate(shown):
+            images.append(frames.draw(posed(model, poses[k], trial.joint, q[k])))
+            progress(part * (i + 1) / len(shown))
     if options.ghost:
         images = _with_ghosts(images, view, trial, shown, options)
     pictures = [annotated(image, view, trial, int(k), centre, options) for image, k in zip(images, shown, strict=True)]

@@ -121,3 +121,9 @@ def test_report_is_made_from_a_run_folder(engines, tiago_twin):
     tiago_twin("run", "small", "--out", "x")
     Path("x/report.html").unlink()
     assert tiago_twin("report", "x")[:2] == (0, "Report: x/report.html\n")
+
+
+def test_help_lists_every_command_in_a_group_and_offers_completion(tiago_twin):
+    text = tiago_twin("-h")[1]
+    assert "Calibrate and evaluate:" in text and "--install-completion" in text
+    assert "\nCommands:" not in text
