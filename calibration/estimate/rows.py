@@ -123,6 +123,7 @@ LADDER = (
         "geometry, physical drive trains and stick-slip base; of posture means geometry with compliance and backlash",
         "full",
         bundle=True,
+        encoders=("motor", "link"),
         means=True,
     ),
 )

@@ -45,7 +45,7 @@ from calibration.stages.suspension.rest_frame import Rest
 
 REFERENCE = 1.0  # [s] of rest at the start of every trial
 T = TypeVar("T")
-Side = Literal["motor", "corrected", "bundled", "link"]  # readings the geometry is evaluated at
+Side = Literal["motor", "corrected", "bundled", "bundled link", "link"]  # readings the geometry is evaluated at
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,13 @@ class Predictor:
         theirs = [row_of(name) for name in self.models if all(name != row.name for row in LADDER)]
         for row in (*ours, *theirs):
             for encoder in row.encoders:
-                yield row, self.models[row.name], encoder
+                if encoder == "motor" or not row.bundle or self._link_encoders:
+                    yield row, self.models[row.name], encoder
+
+    @property
+    def _link_encoders(self) -> bool:
+        """Whether errors of link encoders were identified with the drive trains."""
+        return self.bundled is not None and any(np.isfinite(train.link).all() for train in self.bundled.trains.trains)
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times."""
@@ -130,7 +136,7 @@ class Predictor:
     def side(self, row: LadderRow, encoder: Encoder) -> Side:
         """Which readings the geometry of a row is evaluated at."""
         if row.bundle and self.bundled is not None and self.bundled.trains.trains:
-            return "bundled"
+            return "bundled" if encoder == "motor" else "bundled link"
         if self.joints is None or (encoder == "motor" and not row.joints):
             return "motor"
         return "link" if encoder == "link" else "corrected"
@@ -142,8 +148,8 @@ class Predictor:
         readings = trial.q_motor
         if side == "link" and self.joints is not None:
             readings = aligned_link_readings(trial, self.joints.zero)
-        elif side == "bundled" and self.bundled is not None:
-            readings = self.bundled.link_readings(trial)
+        elif side in ("bundled", "bundled link") and self.bundled is not None:
+            readings = self.bundled.link_readings(trial, "motor" if side == "bundled" else "link")
         elif side == "corrected" and corrected is not None:
             readings = corrected.q
         return readings_at(trial, self.robot, trial.t_mocap, readings)
@@ -249,8 +255,8 @@ class TrialPoses:
 
     def _in_base(self, hand: HandModel, side: Side) -> np.ndarray:
         p = self.predictor
-        if side == "bundled" and p.bundled is not None and p.robot is not None:
-            return p.bundled.hand_in_base(self.trial, p.robot)
+        if side in ("bundled", "bundled link") and p.bundled is not None and p.robot is not None:
+            return p.bundled.hand_in_base(self.trial, p.robot, "motor" if side == "bundled" else "link")
         q = p.readings(side, self.trial, self.corrected)
         T, known = np.full((len(q), 4, 4), np.nan), np.isfinite(q).all(axis=1)
         T[known] = hand.carrying(self.entry.payload).poses(q[known])

@@ -23,6 +23,13 @@ def test_it_predicts_unseen_motions_better_than_the_printed_joint_model(score, b
     assert angle[0] < 0.5 * angle[1]
 
 
+def test_link_encoders_less_their_identified_errors_are_better_still(score):
+    rows = {
+        r["encoder"]: r for r in score["rows"] if (r["model"], r["base"], r["trials"]) == ("full", "plate", "static")
+    }
+    assert rows["link"]["position_rmse_component_mm"] < 0.6 * rows["motor"]["position_rmse_component_mm"]
+
+
 def test_the_base_it_predicts_is_better_than_one_that_stays(score):
     assert figure(score, "full", "plate") < 0.5 * figure(score, "full", "fixed")
 

@@ -6,6 +6,7 @@ T_lab_B(t)  marker body of the base that sticks and slips, from its first second
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -17,12 +18,14 @@ from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.geometry_refit import corrected_trial, hand_poses
+from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, corrected_trial, hand_poses
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import BasePrediction, slipping_base_poses
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source
+
+Encoder = Literal["motor", "link"]
 
 
 @dataclass(frozen=True)
@@ -66,16 +69,20 @@ class BundledRobot:
         trains = DriveTrains(loads, parts.trains, zero, urdf, description)
         return cls(hand, trains, parts.bending, parts.stick_slip)
 
-    def hand_in_base(self, trial: Trial, robot: Clock) -> np.ndarray:
-        """T_B_H (n, 4, 4) at a trial's mocap times by its motor readings, NaN where one is missing.
+    def hand_in_base(self, trial: Trial, robot: Clock, encoder: Encoder = "motor") -> np.ndarray:
+        """T_B_H (n, 4, 4) at a trial's mocap times by one side's encoders, NaN where a reading is missing.
 
         The base is taken to be level and at rest: none of its markers is read.
         """
-        return hand_poses(self.hand, self.bending, corrected_trial(self.trains, trial, None, self.hand), robot)
+        return hand_poses(self.hand, self.bending, self._corrected(trial, encoder), robot)
 
-    def link_readings(self, trial: Trial) -> np.ndarray:
+    def link_readings(self, trial: Trial, encoder: Encoder = "motor") -> np.ndarray:
         """(n, k) link angles in place of a trial's motor readings, NaN where one is missing [rad, m]."""
-        return corrected_trial(self.trains, trial, None, self.hand).trial.q_motor
+        return self._corrected(trial, encoder).trial.q_motor
+
+    def _corrected(self, trial: Trial, encoder: Encoder) -> CorrectedTrial:
+        found = corrected_trial(self.trains, trial, None, self.hand)
+        return found if encoder == "motor" else by_link_encoders(self.trains, found)
 
     def knows(self, source: Source) -> bool:
         """Whether the base's motion was identified from that source."""

@@ -22,7 +22,7 @@ from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
-from calibration.stages.drive_trains.drive_train import DriveTrain
+from calibration.stages.drive_trains.drive_train import DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -104,7 +104,7 @@ def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveT
         replace(q, value=q.value + moved, sigma=float(np.hypot(q.sigma, motor.sigma))) if q.name == name else q
         for q in train.parameters
     )
-    return replace(train, parameters=parameters)
+    return replace(train, link=train.link + np.array([moved, 0.0, 0.0, 0.0, 0.0]), parameters=parameters)
 
 
 def corrected_trial(trains: DriveTrains, trial: Trial, robot: Clock | None, hand: HandModel) -> CorrectedTrial:
@@ -114,6 +114,21 @@ def corrected_trial(trains: DriveTrains, trial: Trial, robot: Clock | None, hand
     q = np.full(trial.q_motor.shape, np.nan)
     q[np.isfinite(trial.q_motor).all(axis=1)] = angles.q
     return CorrectedTrial(replace(trial, q_motor=q), loads, angles)
+
+
+def by_link_encoders(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:
+    """The trial with link angles read by the link encoders where they have one and were identified.
+
+    q = q_link + offset - offset_l - e_l(theta)            offset the zero of the motor's readings
+    """
+    rows, q = np.isfinite(corrected.trial.q_link), corrected.trial.q_motor.copy()
+    known = np.isfinite(q).all(axis=1)
+    for train in (train for train in trains.trains if np.isfinite(train.link).all()):
+        j = trains.joints.index(train.joint)
+        read = known & rows[:, j]
+        angle = corrected.trial.q_link[read, j] - train.link[0]
+        q[read, j] = angle + trains.dynamics.offset[j] - harmonic_terms(angle) @ train.link[1:]
+    return replace(corrected, trial=replace(corrected.trial, q_motor=q))
 
 
 def hand_poses(hand: HandModel, bending: ColumnBending, corrected: CorrectedTrial, robot: Clock) -> np.ndarray:
