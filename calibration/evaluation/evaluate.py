@@ -93,8 +93,9 @@ def evaluate(
     remarks += tuple(departures(estimate, dataset, predict.robot, read)) if role == "validation" else ()
     scored = tuple(_each(predict, dataset, read, report, submitted))
     if submitted is not None:
-        rows = [p for one in scored for p in one.predicted.rows if p.base == "submitted"]
-        remarks += tuple(submitted.remarks(dataset, role, rows))
+        pairs = (zip(one.predicted.rows, one.errors, strict=True) for one in scored)
+        own = [(p, e.errors.position) for of_trial in pairs for p, e in of_trial if p.base == "submitted"]
+        remarks += tuple(submitted.remarks(dataset, role, own))
     if not estimate.robot:
         remarks += estimate.verdicts
     registering = registration_trials(dataset) if role == "validation" else ()

@@ -27,6 +27,7 @@ from calibration.verdict import Verdict
 _GAP = 0.1  # [s] between neighbours that are interpolated
 _UNIT = 1e-3  # [-] departure of a quaternion's norm from 1
 _FAR, _TURNED = 0.3, 1.0  # [m], [rad] median errors that are no prediction's
+_SMALL, _EXPLAINED = 5e-3, 0.8  # [m], [-] errors, and share of their squares, of which a constant offset is warned
 _ALIKE = 0.1  # [-] share of the error that a constant transform may leave
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
@@ -72,8 +73,10 @@ class Submission:
         _check_poses(self.path, entry.id, T, T_measured)
         return Prediction(self.name, "submitted", "motor", entry.id, entry.kind, t, T)
 
-    def remarks(self, dataset: Dataset, role: Role, rows: Sequence[Prediction]) -> Iterator[Verdict]:
-        """Warnings of missing trials and poses.
+    def remarks(
+        self, dataset: Dataset, role: Role, scored: Sequence[tuple[Prediction, np.ndarray]]
+    ) -> Iterator[Verdict]:
+        """Warnings of missing trials and poses, and of poses of another point; `scored` with errors (n, 3) [m].
 
         Raises:
             InputError: It has trials that the dataset does not have.
@@ -85,7 +88,12 @@ class Submission:
         missing = sorted(known - self.trials.keys())
         if missing:
             yield Verdict("evaluation", "warning", f"{self.name}: no prediction of trial {', '.join(missing)}")
-        for row in rows:
+        for row, error in scored:
+            if offset := _offset(row.T_lab_hand, error):
+                message = (
+                    f"{self.name}: {row.trial_id}: {offset}; are they of the marker body that dataset.json declares?"
+                )
+                yield Verdict("evaluation", "warning", message)
             share = float(np.isnan(row.T_lab_hand[:, 0, 0]).mean())
             if share > 0.0:
                 message = f"{self.name}: {100.0 * share:.1f} % of {row.trial_id} is without a prediction and not scored"
@@ -100,8 +108,8 @@ def read_submission(path: Path | str) -> Submission:
     """
     path = Path(path)
     found = dict(_read_csv(path) if path.suffix.lower() == ".csv" else _read_netcdf(path))
-    if not found:
-        raise InputError(path, "no trial in it")
+    if not any(np.isfinite(one.T).all(axis=(1, 2)).any() for one in found.values()):
+        raise InputError(path, "no trial in it, or no pose that is not NaN")
     for trial, one in found.items():
         if len(one.t) > 1 and not (np.diff(one.t) > 0.0).all():
             raise InputError(path, f"{trial}: times do not increase")
@@ -210,6 +218,20 @@ def _check_poses(path: Path, trial: str, T: np.ndarray, T_measured: np.ndarray) 
     raise InputError(
         path, f"{trial}: median errors of {far:.2f} m and {np.degrees(turned):.0f} deg are no prediction's"
     )
+
+
+def _offset(T: np.ndarray, error: np.ndarray) -> str:
+    """What to say where one vector explains nearly all position errors (n, 3) [m] of poses T (n, 4, 4); else empty."""
+    good = np.isfinite(error).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
+    total = float((error[good] ** 2).sum(axis=1).mean()) if good.any() else 0.0
+    for axes, e in (
+        ("lab", error[good]),
+        ("hand", (np.swapaxes(T[good, :3, :3], 1, 2) @ error[good][..., None])[..., 0]),
+    ):
+        if total > _SMALL**2 and (e.mean(axis=0) ** 2).sum() > _EXPLAINED * total:
+            found = ", ".join(f"{1e3 * x:.1f}" for x in e.mean(axis=0))
+            return f"a constant offset ({found}) mm in the axes of the {axes} explains most of the error"
+    return ""
 
 
 def _explanations(T: np.ndarray, true: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

@@ -42,6 +42,7 @@ _FREE = re.compile(  # of the contract, without effect on the hand's place
 )
 _JOINT = re.compile(r"(geometry|encoder|gear|backlash|friction|sigmoid)\.(\w+)\.")
 _STATIC = ("encoder", "gear", "backlash")
+_LARGEST = {"m": 0.5, "rad": 1.6}  # a value beyond it is of another unit
 
 
 def places_hand(model: Model, chain: Chain) -> bool:
@@ -79,6 +80,8 @@ def _faults(p: Parameter, units: dict[str, str], joints: tuple[str, ...]) -> Ite
         yield f"{p.name}: no such parameter{_nearest(p.name, tuple(units))}"
     elif p.unit and p.unit != units.get(p.name, p.unit):
         yield f"{p.name}: unit {p.unit!r}; it must be {units[p.name]!r}"
+    elif abs(p.value) > _LARGEST.get(units.get(p.name, ""), np.inf):
+        yield f"{p.name}: {p.value:g} {units[p.name]} is no calibration's; values are in m and rad, not mm or degrees"
 
 
 def _nearest(name: str, known: tuple[str, ...]) -> str:

@@ -108,11 +108,12 @@ class _Seen:
 
 def _look(trial: "Trial") -> _Seen:
     base = trial.marker_position[:, trial.markers_of("base")]
+    wrench = trial.plate_wrench[:, :1].reshape(-1, 6)
     return _Seen(
         duration=float(np.ptp(trial.t_mocap)),
         base=_span(base.reshape(len(base), -1)),
-        force=_span(trial.plate_wrench[:, 0, :3]),
-        moment=_span(trial.plate_wrench[:, 0, 3:]),
+        force=_span(wrench[:, :3]),
+        moment=_span(wrench[:, 3:]),
         drive=float(np.nanmax(np.nanstd(trial.q_motor[:, 1:] - trial.q_link[:, 1:], axis=0))),
     )
 
@@ -129,5 +130,7 @@ def _magnitudes(seen: list[_Seen]) -> tuple[Magnitude, ...]:
 
 
 def _span(x: np.ndarray) -> float:
-    """Largest peak-to-peak of the columns of x (n, k)."""
+    """Largest peak-to-peak of the columns of x (n, k); NaN where nothing was recorded."""
+    if not x.size:
+        return float("nan")
     return float(np.nanmax(np.nanmax(x, axis=0) - np.nanmin(x, axis=0)))

@@ -90,6 +90,9 @@ def test_another_program_s_models_become_rows_and_agree_with_ours(saved, dataset
         ({"name": "geometry.arm_1_jont.x", "value": 0.0}, "no joint 'arm_1_jont'; the nearest known is 'arm_1_joint'"),
         ({"name": "geometry.arm_1_joint.xx", "value": 0.0}, "nearest known is 'geometry.arm_1_joint.x'"),
         ({"name": "geometry.arm_1_joint.x", "value": 0.1, "unit": "mm"}, "unit 'mm'; it must be 'm'"),
+        ({"name": "geometry.arm_1_joint.x", "value": 1.2}, "1.2 m is no calibration's; values are in m and rad"),
+        ({"name": "encoder.arm_5_joint.motor.offset", "value": 6.9}, "6.9 rad is no calibration's"),
+        ({"name": "encoder.arm_5_joint.motor.offset", "value": float("nan")}, "finite number"),
     ],
 )
 def test_unknown_joints_names_and_units_are_rejected(dataset, tmp_path, parameter, message):
@@ -168,6 +171,26 @@ def test_poses_in_other_units_or_frames_are_rejected_by_what_explains_them(poses
     path = write_netcdf(tmp_path / "mine.nc", changed(poses, change))
     with pytest.raises(InputError, match=message):
         evaluate(read_submission(path), dataset)
+
+
+def of_another_point(T):
+    tool = np.eye(4)
+    tool[:3, 3] = [0.0, 0.03, -0.05]
+    return T @ tool
+
+
+def test_a_small_constant_offset_is_warned_of_with_its_axes(poses, dataset, tmp_path):
+    path = write_netcdf(tmp_path / "mine.nc", changed(poses, of_another_point))
+    messages = [v.message for v in evaluate(read_submission(path), dataset).verdicts]
+    assert any("in the axes of the hand explains most of the error" in text for text in messages)
+    good = evaluate(read_submission(write_netcdf(tmp_path / "good.nc", poses)), dataset)
+    assert not any("constant offset" in v.message for v in good.verdicts)
+
+
+def test_poses_that_are_all_missing_are_rejected(poses, tmp_path):
+    path = write_netcdf(tmp_path / "none.nc", changed(poses, lambda T: np.full_like(T, np.nan)))
+    with pytest.raises(InputError, match="no pose that is not NaN"):
+        read_submission(path)
 
 
 def test_a_mixed_order_of_the_quaternion_another_clock_and_other_trials_are_rejected(poses, dataset, tmp_path):
