@@ -34,6 +34,7 @@ from calibration.stages.geometry.parameters import (
     compliance_parameters,
     full_parameters,
     hand_model,
+    reading_floor,
     reading_sigma,
 )
 from calibration.stages.geometry.stage import STAGE, fit_robustly, left_out
@@ -49,7 +50,8 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
     tau = chain.gravity_torques(postures.q)
     parameters, more = (make(chain, description, tau) for make in (compliance_parameters, full_parameters))
     hand, reading = hand_model(chain, nominal_frames(chain, description)), reading_sigma(chain, description)
-    errors = NoiseModel(reading, 1e-2 * reading, _HAND[: postures.components // 3])
+    floor = reading_floor(chain, description)
+    errors = NoiseModel(np.maximum(reading, floor), floor, _HAND[: postures.components // 3])
     found = fit_gears(hand, parameters, more, postures, errors)
     model = model_of("full", chain, found.parameters, found.fit)
     if found.rejected:
