@@ -55,7 +55,7 @@ def robot(seed, n):
 
 
 def judged(seed, n, description):
-    """Cross-validated errors of registration and full [m], and share of components of new poses in their 95 % interval."""
+    """Cross-validated errors of registration and full [m], share of components of new poses in their 95 % interval."""
     postures, q, true = robot(seed, n)
     rows = {f.model: f.rmse for f in left_out_errors(CHAIN, description, postures, ("registration", "full"))}
     model, _ = calibrate_gears(CHAIN, description, postures)
