@@ -89,6 +89,7 @@ def fit_bundle(
         refitted = refit_geometry(chain, description, trials, robot, hand, trains)
         geometry, bending, trains = refitted.model, refitted.bending, refitted.trains
         hand = refitted.hand(chain)
+        found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link)))
     base = None

@@ -26,6 +26,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain, harmonic_ter
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
+from calibration.stages.geometry.departures import with_departures
 from calibration.stages.geometry.hand_residual import NoiseModel
 from calibration.stages.geometry.model_of_fit import hand_of, model_of
 from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
@@ -60,11 +61,13 @@ class RefittedGeometry:
         model: Parameters of the geometry.
         bending: Of the column.
         trains: The drive trains; `dynamics.offset` are the new zeros.
+        shown: Effects that the residuals show and the model leaves out, as messages.
     """
 
     model: Model
     bending: ColumnBending
     trains: DriveTrains
+    shown: tuple[str, ...] = ()
 
     def hand(self, chain: Chain) -> HandModel:
         """The robot with this geometry."""
@@ -84,13 +87,15 @@ def refit_geometry(
     parameters = geometry_parameters(chain, description)
     play, floor = _READING * reading_sigma(chain, description), reading_floor(chain, description)
     errors = NoiseModel(np.maximum(play, floor), floor, _HAND[: postures.components // 3])
-    found = fit_robustly(hand_model(chain, nominal_frames(chain, description)), parameters, postures, errors)
-    model = model_of("full", chain, parameters, found.fit)
+    robot_hand = hand_model(chain, nominal_frames(chain, description))
+    found = fit_robustly(robot_hand, parameters, postures, errors)
+    wider, shown = with_departures(robot_hand, parameters, found.fit, postures.rows(found.kept))
+    model = model_of("full", chain, parameters, wider)
     fitted = hand_of(model, chain, nominal_frames(chain, description))
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset
     referred = tuple(_referred(train, model, trains) for train in trains.trains)
-    return RefittedGeometry(model, bending, replace(trains, trains=referred).with_offset(offset))
+    return RefittedGeometry(model, bending, replace(trains, trains=referred).with_offset(offset), shown)
 
 
 def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:

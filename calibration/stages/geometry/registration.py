@@ -29,9 +29,10 @@ from calibration.recording.schema import Description
 from calibration.robot.blocks import Frames
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel, nominal_hand
+from calibration.stages.geometry.departures import with_departures
 from calibration.stages.geometry.hand_residual import fit_weighted, linearised
 from calibration.stages.geometry.model_of_fit import model_of
-from calibration.stages.geometry.parameters import registration_parameters
+from calibration.stages.geometry.parameters import hand_model, registration_parameters
 from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
@@ -61,10 +62,13 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
             "so a turn of both frames about it is not identifiable; move another joint"
         )
         return model, (Verdict(STAGE, "warning", message),)
-    model = model_of(STAGE, chain, parameters, _in_time(found, parameters, postures.motion[kept]))
+    used = postures.rows(kept)
+    in_time = _in_time(found, parameters, used.motion)
+    wider, shown = with_departures(hand_model(chain, parameters.nominal), parameters, in_time, used)
+    model = model_of(STAGE, chain, parameters, wider)
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
     message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from nominal"
-    said = [Verdict(STAGE, "ok", message)]
+    said = [Verdict(STAGE, "ok", "; ".join((message, *shown)))]
     if not kept.all():
         outliers = np.flatnonzero(~kept)
         names = ", ".join(postures.label[outliers] if len(postures.label) else outliers.astype(str))

@@ -22,6 +22,7 @@ from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
+from calibration.stages.geometry.departures import with_departures
 from calibration.stages.geometry.guards import (
     APART,
     CONDITION,
@@ -71,7 +72,9 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     if not oriented:
         message = "a point of the hand was seen: hand orientation is not observable and fixed at nominal"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
-    return model_of("model_2", chain, parameters, found), tuple(verdicts)
+    wider, shown = with_departures(hand, parameters, found, postures.rows(robust.kept))
+    verdicts += [Verdict(STAGE, "ok", message) for message in shown]
+    return model_of("model_2", chain, parameters, wider), tuple(verdicts)
 
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:

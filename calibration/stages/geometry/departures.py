@@ -1,0 +1,75 @@
+"""How robots depart from a rigid chain with constant zeros, as far as a hand model leaves it out; see `misfit`.
+
+    load         dq_j = s tau_j / max |tau_j|                       gears that give under gravity
+    side         dq_j = s tanh(10 tau_j / max |tau_j|)              backlash and friction on the side of the load
+    bending      frame j turned by s M_j / max |M|                  links, by gravity's moments across their joints
+    wobble       frame j turned by s (1, cos q_j, sin q_j)          bearings and encoders out of centre
+    eccentric    frame j moved by s (1, cos q_j, sin q_j)           the same, and lengths
+
+about or along each axis; sizes s [rad, a tenth of it in m for joints that slide; m for `eccentric`].
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calibration.inference.map_estimate import Fit
+from calibration.inference.misfit import Departures, misfit
+from calibration.inference.parameters import ParameterSet
+from calibration.mocap.postures import Postures
+from calibration.numerics.lie import inverse, jlog6, log6, moved
+from calibration.robot.hand import HandModel
+from calibration.robot.parameter_block import joint_lengths
+
+NAMES = ("load", "side", "bending", "wobble", "eccentric")
+_LOADED = 1e-3  # of the largest torque, below which a joint that turns bears none
+_SHARP = 10.0
+
+
+def with_departures(
+    hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures
+) -> tuple[Fit, tuple[str, ...]]:
+    """The fit of `parameters` of `hand` to postures, departures counted in its covariance, and which are seen."""
+    found = misfit(fit, parameters, departures(hand.with_theta(fit.theta, parameters.names), postures))
+    seen = ", ".join(f"{name} {1e3 * size:.2g} m{'m' if name == NAMES[-1] else 'rad'}" for name, size in found.seen)
+    wider = replace(fit, covariance=found.covariance)
+    if not found.size.any():
+        return wider, ()
+    what = f"effects that the model leaves out, {seen or 'none by itself'}"
+    return wider, (f"residuals show {what}; intervals are widened by them",)
+
+
+def departures(hand: HandModel, postures: Postures) -> Departures:
+    """Of the hand at postures, as the residuals of a fit of `hand` have it."""
+    chain = hand.nominal
+    tau, M = chain.gravity_torques(postures.q), chain.gravity_moments(postures.q)
+    at = hand.kinematics(postures.q, tau)
+    by_joint, by_frame = at.J_joint * joint_lengths(chain), at.J_frame[:, :, 1:]
+    slides = np.array([chain.is_prismatic(name) for name in chain.joints])
+    most = np.abs(tau).max(axis=0)
+    loaded = slides | (most > _LOADED * np.abs(tau[:, ~slides]).max(initial=0.0))
+    share = (tau / np.maximum(most, np.finfo(float).tiny))[:, loaded]
+    bent = M / max(float(np.abs(M[:, ~slides]).max(initial=0.0)), np.finfo(float).tiny)
+    waves = np.stack([np.ones_like(at.q), np.cos(at.q), np.sin(at.q)], axis=2)[:, ~slides]
+    n, d = by_joint.shape[:2]
+    found = (
+        by_joint[:, :, loaded] * share[:, None],
+        by_joint[:, :, loaded] * np.tanh(_SHARP * share)[:, None],
+        (by_frame[..., 3:] * bent[:, None]).reshape(n, d, -1),
+        _waved(by_frame[:, :, ~slides, 3:], waves),
+        _waved(by_frame[:, :, ~slides, :3], waves),
+    )
+    group = np.repeat(np.arange(len(found)), [part.shape[2] for part in found])
+    return Departures(_as_residuals(np.concatenate(found, axis=2), at.T, postures), group, NAMES)
+
+
+def _waved(J: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    """(n, 6, k * 3 * 3) of J (n, 6, k, 3) times each of waves (n, k, 3)."""
+    return np.asarray((J[..., None] * waves[:, None, :, None]).reshape(*J.shape[:2], -1))
+
+
+def _as_residuals(J: np.ndarray, T: np.ndarray, postures: Postures) -> np.ndarray:
+    """Local twists J (n, 6, m) of the hand at T (n, 4, 4) as changes of the residual (n, d, m)."""
+    if postures.components == 3:
+        return moved(T[:, :3, :3], J, postures.point)
+    return np.asarray(jlog6(log6(inverse(postures.T_base_hand) @ T)) @ J)
