@@ -19,6 +19,7 @@ from calibration.estimate.json_stage_models import (
     suspension_of,
 )
 from calibration.estimate.plain_values import plain, restored
+from calibration.inference.absorption import Absorption
 from calibration.inference.parameters import Combination, Model, Parameter, Status
 from calibration.options import Options
 from calibration.recording.clock import Clock
@@ -71,6 +72,7 @@ class ModelEntry(Entry):
     rank: int = 0
     condition: float = 0.0
     hand_error: tuple[float, ...] = ()
+    absorption: dict[str, Any] | None = None
 
     @field_validator("parameters")
     @classmethod
@@ -217,6 +219,7 @@ def _model_entry(model: Model) -> ModelEntry:
         rank=model.rank,
         condition=model.condition,
         hand_error=tuple(map(float, model.hand_error)),
+        absorption=plain(model.absorption),
     )
 
 
@@ -236,4 +239,5 @@ def _model(name: str, entry: ModelEntry, covariance: np.ndarray | None) -> Model
         entry.rank,
         entry.condition,
         np.array(entry.hand_error),
+        None if entry.absorption is None else restored(Absorption, entry.absorption, f"estimate.json: {name}"),
     )

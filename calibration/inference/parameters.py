@@ -6,6 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from calibration.inference.absorption import Absorption
+
 Status = Literal["estimated", "combined", "not_identifiable"]
 
 
@@ -61,6 +63,7 @@ class Model:
         rank: Number of identifiable combinations; 0 where not known.
         condition: Condition number of the scaled whitened Jacobian [-]; 0 where not known.
         hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
+        absorption: How much of each class of defect its parameters swallow; None where not computed.
     """
 
     name: str
@@ -72,6 +75,7 @@ class Model:
     rank: int = 0
     condition: float = 0.0
     hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    absorption: Absorption | None = None
 
     def value(self, name: str, default: float) -> float:
         """Estimate of a parameter, `default` where the model has none of that name."""

@@ -89,13 +89,13 @@ def refit_geometry(
     errors = NoiseModel(np.maximum(play, floor), floor, _HAND[: postures.components // 3])
     robot_hand = hand_model(chain, nominal_frames(chain, description))
     found = fit_robustly(robot_hand, parameters, postures, errors)
-    wider, shown = with_departures(robot_hand, parameters, found.fit, postures.rows(found.kept))
-    model = model_of("full", chain, parameters, wider)
+    departed = with_departures(robot_hand, parameters, found.fit, postures.rows(found.kept))
+    model = replace(model_of("full", chain, parameters, departed.fit), absorption=departed.absorbed)
     fitted = hand_of(model, chain, nominal_frames(chain, description))
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset
     referred = tuple(_referred(train, model, trains) for train in trains.trains)
-    return RefittedGeometry(model, bending, replace(trains, trains=referred).with_offset(offset), shown)
+    return RefittedGeometry(model, bending, replace(trains, trains=referred).with_offset(offset), departed.shown)
 
 
 def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:

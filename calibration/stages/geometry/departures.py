@@ -9,10 +9,11 @@
 about or along each axis; sizes s [rad, a tenth of it in m for joints that slide; m for `eccentric`].
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.inference.absorption import Absorption, absorption
 from calibration.inference.map_estimate import Fit
 from calibration.inference.misfit import Departures, misfit
 from calibration.inference.parameters import ParameterSet
@@ -22,21 +23,49 @@ from calibration.robot.hand import HandModel
 from calibration.robot.parameter_block import joint_lengths
 
 NAMES = ("load", "side", "bending", "wobble", "eccentric")
+_CLASSES = {"base body": "frame.base.", "hand body": "frame.tool.", "placements": "geometry.", "zeros": "encoder."}
 _LOADED = 1e-3  # of the largest torque, below which a joint that turns bears none
 _SHARP = 10.0
 
 
-def with_departures(
-    hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures
-) -> tuple[Fit, tuple[str, ...]]:
-    """The fit of `parameters` of `hand` to postures, departures counted in its covariance, and which are seen."""
-    found = misfit(fit, parameters, departures(hand.with_theta(fit.theta, parameters.names), postures))
+@dataclass(frozen=True)
+class Departed:
+    """A fit and what its residuals show.
+
+    Attributes:
+        fit: With departures counted in its covariance.
+        shown: What the residuals show, as messages.
+        absorbed: How much of each class of defect the parameters swallow.
+    """
+
+    fit: Fit
+    shown: tuple[str, ...]
+    absorbed: Absorption
+
+
+def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures) -> Departed:
+    """The fit of `parameters` of `hand` to postures, and the departures that are seen."""
+    possible = departures(hand.with_theta(fit.theta, parameters.names), postures)
+    found, absorbed = misfit(fit, parameters, possible), _absorbed(fit, parameters, possible)
     seen = ", ".join(f"{name} {1e3 * size:.2g} m{'m' if name == NAMES[-1] else 'rad'}" for name, size in found.seen)
     wider = replace(fit, covariance=found.covariance)
     if not found.size.any():
-        return wider, ()
+        return Departed(wider, (), absorbed)
     what = f"effects that the model leaves out, {seen or 'none by itself'}"
-    return wider, (f"residuals show {what}; intervals are widened by them",)
+    return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed)
+
+
+def _absorbed(fit: Fit, parameters: ParameterSet, possible: Departures) -> Absorption:
+    """By classes of parameters, in units of their priors."""
+    scale, precision = parameters.prior.scale, parameters.prior.precision(fit.widths.prior)
+    J = fit.J_white * scale
+    N = (fit.whitener @ possible.N).reshape(len(J), -1)
+    starts = np.array(parameters.names, dtype=str)
+    of = {name: np.flatnonzero(np.char.startswith(starts, start)) for name, start in _CLASSES.items()}
+    of = {name: columns for name, columns in of.items() if len(columns)}
+    own = {name: J[:, columns] for name, columns in of.items()}
+    others = {name: N[:, possible.group == g] for g, name in enumerate(possible.names)}
+    return absorption(own | others, of, precision * scale**2)
 
 
 def departures(hand: HandModel, postures: Postures) -> Departures:

@@ -64,11 +64,11 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
         return model, (Verdict(STAGE, "warning", message),)
     used = postures.rows(kept)
     in_time = _in_time(found, parameters, used.motion)
-    wider, shown = with_departures(hand_model(chain, parameters.nominal), parameters, in_time, used)
-    model = model_of(STAGE, chain, parameters, wider)
+    departed = with_departures(hand_model(chain, parameters.nominal), parameters, in_time, used)
+    model = model_of(STAGE, chain, parameters, departed.fit)
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
     message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from nominal"
-    said = [Verdict(STAGE, "ok", "; ".join((message, *shown)))]
+    said = [Verdict(STAGE, "ok", "; ".join((message, *departed.shown)))]
     if not kept.all():
         outliers = np.flatnonzero(~kept)
         names = ", ".join(postures.label[outliers] if len(postures.label) else outliers.astype(str))

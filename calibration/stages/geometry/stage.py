@@ -9,6 +9,7 @@ Compliance and preloaded backlash of the gears are those of row `full`, see `gea
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -72,9 +73,10 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     if not oriented:
         message = "a point of the hand was seen: hand orientation is not observable and fixed at nominal"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
-    wider, shown = with_departures(hand, parameters, found, postures.rows(robust.kept))
-    verdicts += [Verdict(STAGE, "ok", message) for message in shown]
-    return model_of("model_2", chain, parameters, wider), tuple(verdicts)
+    departed = with_departures(hand, parameters, found, postures.rows(robust.kept))
+    verdicts += [Verdict(STAGE, "ok", message) for message in departed.shown]
+    model = model_of("model_2", chain, parameters, departed.fit)
+    return replace(model, absorption=departed.absorbed), tuple(verdicts)
 
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:
