@@ -239,5 +239,7 @@ def _model(name: str, entry: ModelEntry, covariance: np.ndarray | None) -> Model
         entry.rank,
         entry.condition,
         np.array(entry.hand_error),
-        None if entry.absorption is None else restored(Absorption, entry.absorption, f"estimate.json: {name}"),
+        absorption=None
+        if entry.absorption is None
+        else restored(Absorption, entry.absorption, f"estimate.json: {name}"),
     )

@@ -63,6 +63,7 @@ class Model:
         rank: Number of identifiable combinations; 0 where not known.
         condition: Condition number of the scaled whitened Jacobian [-]; 0 where not known.
         hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
+        random: (p, p) covariance by random errors alone; empty where `covariance` counts nothing else.
         absorption: How much of each class of defect its parameters swallow; None where not computed.
     """
 
@@ -75,6 +76,7 @@ class Model:
     rank: int = 0
     condition: float = 0.0
     hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    random: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     absorption: Absorption | None = None
 
     def value(self, name: str, default: float) -> float:

@@ -51,7 +51,7 @@ def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, posture
     wider = replace(fit, covariance=found.covariance)
     if not found.size.any():
         return Departed(wider, (), absorbed)
-    what = f"effects that the model leaves out, {seen or 'none by itself'}"
+    what = f"effects that the model leaves out ({seen or 'not clear which'})"
     return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed)
 
 

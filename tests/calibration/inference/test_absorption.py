@@ -5,7 +5,7 @@ from calibration.inference.absorption import absorption
 
 
 def test_shares_of_what_is_hidden_seen_and_half_seen():
-    """Zeros span x and y; a load along x is hidden, along z seen, along both half hidden; a stiff prior hides nothing."""
+    """Zeros span x and y; x is hidden, z seen, both half; stiff priors hide nothing."""
     x, y, z = np.eye(3)[:, :, None]
     own = {"zeros": np.hstack([x, y]), "lengths": np.hstack([y])}
     others = {"hidden": x, "seen": z, "half": (x + z) / np.sqrt(2.0), "known": y}
