@@ -34,11 +34,12 @@ _STEP = 0.02  # [s] either side, for velocities
 _BLOCK = 4.0  # [s] of samples that hang together
 _CORRELATED = 0.25  # share of a block's samples that count as one, at least: a few blocks do not tell their scatter
 _FEWEST = 30  # samples
-_TIMES = 9  # at which something may have changed
+_TIMES = 15  # at which something may have changed
 _CHANCE, _CLEAR = 5.7e-7, 1.5  # five standard deviations; times the square of them
 _SURE = 5.0  # standard deviations
+_FAR_OFF = 4.0  # tolerances of a body of markers the hand may be off throughout
 _MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
-_LATE = 3e-3  # [s]
+_LATE, _SLOW = 3e-3, 0.02  # [s]; [rad/s, m/s] below which backlash is not on one side
 _HALF, _TOLD = 0.3, 0.08  # of a difference between sides that moves the hand; its standard deviation [-]
 _PLAY = 1e-2  # [rad, rad/(N.m)] width of what gears do under gravity
 _WRONG = 3.0  # times what is explained beyond which the effect is not bounded
@@ -71,7 +72,7 @@ class Change:
 
     Attributes:
         text: What it is called.
-        columns: (n, 6, g) what a unit of it adds to the residuals.
+        columns: (n, 6, m) what a unit of it adds to the residuals, m > g where something else is fitted as well.
         limit: (g,) sizes that are explained otherwise.
         unit: In which a single one is written.
         factor: Of that unit.
@@ -116,6 +117,7 @@ class Unexplained:
         J: (n, 6, k) derivatives by joint position.
         r: (6 n,) residuals over their size, what errors of the geometry and of gears explain taken out.
         keep: Takes the same out of columns (n, 6, g), in the same units, (6 n, g).
+        rms: Of the hand's position, before anything is taken out [m].
     """
 
     hand: HandModel
@@ -123,12 +125,18 @@ class Unexplained:
     J: np.ndarray
     r: np.ndarray
     keep: Callable[[np.ndarray], np.ndarray]
+    rms: float
 
-    def fitted(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Sizes (g,) of columns (n, 6, g), their covariance (g, g), and how much of the residuals they explain."""
+    def fitted(self, columns: np.ndarray, tested: int | None = None) -> tuple[np.ndarray, np.ndarray, float]:
+        """Sizes (g,) of the first `tested` of columns, all where None, their covariance (g, g), and what they explain.
+
+        Columns (n, 6, m); the other ones are fitted as well.
+        """
         C = self.keep(columns)
-        value, S = _fitted(C, self.r, _blocks(self.x))
-        return value, S, float(self.r @ self.r) - float(((self.r - C @ value) ** 2).sum())
+        g = C.shape[1] if tested is None else tested
+        value, S, H_inv = _fitted(C, self.r, _blocks(self.x))
+        value = value[:g]
+        return value, S[:g, :g], float(value @ np.linalg.solve(H_inv[:g, :g], value))
 
 
 def unexplained(hand: HandModel, model: Model, x: Passed) -> Unexplained:
@@ -144,7 +152,12 @@ def unexplained(hand: HandModel, model: Model, x: Passed) -> Unexplained:
     B = np.concatenate([at.J[:, :, :p] @ _root(covariance), _PLAY * at.J[:, :, p:]], axis=2) / size[:, None]
     without = _without(_stacked(B))
     return Unexplained(
-        hand, x, at.J_joint, without((r / size).ravel()), lambda columns: without(_stacked(columns / size[:, None]))
+        hand,
+        x,
+        at.J_joint,
+        without((r / size).ravel()),
+        lambda columns: without(_stacked(columns / size[:, None])),
+        float(np.sqrt((r[:, :3] ** 2).sum(axis=1).mean())),
     )
 
 
@@ -156,6 +169,9 @@ def changes(left: Unexplained, description: Description, ids: Sequence[str]) -> 
 
 def constants(left: Unexplained, description: Description, trial: str) -> Iterator[Verdict]:
     """The one thing that is otherwise in a trial than in the calibration, if anything is."""
+    if left.rms > _FAR_OFF * description.tolerances.body_translation:
+        message = f"{trial}: the hand is {1e3 * left.rms:.0f} mm (rms) from where the calibrated robot has it"
+        yield Verdict(STAGE, "warning", f"{message}: labels, base markers, clocks, or another robot or session?")
     always = [("", np.ones(len(left.x.t)))]
     for message, _ in _best(left, _otherwise(left, description, always)):
         yield Verdict(STAGE, "warning", f"{trial}: against the calibration, {message}; its errors are not the model's")
@@ -167,7 +183,7 @@ def _best(left: Unexplained, possible: Iterable[Change]) -> Iterator[tuple[str, 
         return
     best, found = 0.0, ("", 0.0)
     for change in possible:
-        value, S, gain = left.fitted(change.columns)
+        value, S, gain = left.fitted(change.columns, len(change.limit))
         square = float(value @ np.linalg.solve(S, value))
         over = float(np.abs(value / change.limit).max())
         if square > _CLEAR * chi2.isf(_CHANCE, len(value)) and over > 1.0 and gain > best:
@@ -227,8 +243,6 @@ def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -
             limit = np.array([play / spread])
             yield Change(f"readings of {name} are off in scale", J[:, :, j, None] * centred, limit, "%", 100.0)
         yield Change(f"readings of {name} drift", J[:, :, j, None] * ago[:, None, None], np.array([2.0 * play]), unit)
-    for k, trial in enumerate(ids):
-        yield _late(left, f" in {trial}", (x.trial == k).astype(float))
     yield from _otherwise(left, description, [(_when(x, ids, m), (x.t >= m).astype(float)) for m in moments])
 
 
@@ -250,8 +264,10 @@ def _otherwise(
 
 
 def _late(left: Unexplained, when: str, step: np.ndarray) -> Change:
-    late = -(left.J * left.x.v[:, None, left.hand.nominal.columns]).sum(axis=2)
-    return Change(f"readings are late{when}", (late * step[:, None])[..., None], np.array([_LATE]), "ms")
+    """Readings that come late; a link behind backlash does so as well, by a constant angle against the motion."""
+    v = left.x.v[:, None, left.hand.nominal.columns]
+    late, behind = -(left.J * v).sum(axis=2, keepdims=True) * step[:, None, None], left.J * np.tanh(v / _SLOW)
+    return Change(f"readings are late{when}", np.concatenate([late, behind], axis=2), np.array([_LATE]), "ms")
 
 
 def _play(left: Unexplained, description: Description, j: int) -> tuple[float, str]:
@@ -286,8 +302,8 @@ def _blocks(x: Passed) -> np.ndarray:
     return np.unique(np.stack([x.trial, (x.t // _BLOCK).astype(int)], axis=1), axis=0, return_inverse=True)[1].ravel()
 
 
-def _fitted(C: np.ndarray, y: np.ndarray, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes (g,) of columns C (6 n, g) and their covariance (g, g), residuals of a block hanging together."""
+def _fitted(C: np.ndarray, y: np.ndarray, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sizes (g,) of columns C (6 n, g), their covariance (g, g), residuals of a block hanging together, (C'C)^-1."""
     H = C.T @ C + 1e-12 * np.trace(C.T @ C) * np.eye(C.shape[1])
     value = np.linalg.solve(H, C.T @ y)
     each = (C * (y - C @ value)[:, None]).reshape(len(blocks), 6, -1).sum(axis=1)
@@ -295,4 +311,4 @@ def _fitted(C: np.ndarray, y: np.ndarray, blocks: np.ndarray) -> tuple[np.ndarra
     np.add.at(summed, blocks, each)
     H_inv = np.linalg.inv(H)
     least = _CORRELATED * len(blocks) / len(summed) * float(((y - C @ value) ** 2).mean())
-    return value, H_inv @ (summed.T @ summed) @ H_inv + least * H_inv
+    return value, H_inv @ (summed.T @ summed) @ H_inv + least * H_inv, H_inv
