@@ -24,6 +24,8 @@ from twin.truth import Parameter, TruthTrial
 
 FLOOR = "floor"
 
+_SAME_TIME, _SAME_PLACE = 1e-3, 2e-3  # [s]; [m] drilling and noise of a body of markers are a tenth of it
+
 
 @dataclass(frozen=True)
 class Score(ParameterScore):
@@ -75,7 +77,9 @@ def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path)
     estimated = {p.name for p in estimate.parameters}
     parameters, models = judge_estimate(estimate, _read_parameters(truth_folder / "truth.json", estimated))
     pairs = [(p, _read_trial(truth_folder / "trials" / f"{p.trial_id}.nc")) for p in evaluation.predicted]
-    rows = tuple(calibration.evaluation.ladder(list(_errors(pairs, _derived(truth_folder)["T_base_base"])), "truth"))
+    T_base_body = _derived(truth_folder)["T_base_base"]
+    _check_same_run(pairs, T_base_body, truth_folder)
+    rows = tuple(calibration.evaluation.ladder(list(_errors(pairs, T_base_body)), "truth"))
     main = {f.name: getattr(models[0][1], f.name) for f in fields(ParameterScore)} | {"parameters": parameters}
     skill = tuple(_skill(row, rows) for row in rows)
     return Score(
@@ -129,6 +133,22 @@ def _read_trial(path: Path) -> TruthTrial:
     if not path.is_file():
         raise ScenarioError(f"{path}: no such file; --truth must be of the same run as the dataset")
     return truth.read_trial(path)
+
+
+def _check_same_run(
+    pairs: Iterable[tuple[PredictedTrial, TruthTrial]], T_base_body: np.ndarray, truth_folder: Path
+) -> None:
+    """Reject a truth with other times than the recordings, or whose base is not where its markers were measured."""
+    for trial, true in pairs:
+        same = len(trial.t) == len(true.t_mocap) and np.allclose(trial.t, true.t_mocap, rtol=0.0, atol=_SAME_TIME)
+        if same and len(trial.T_lab_B):
+            d = trial.T_lab_B[:, :3, 3] - (true.base_pose @ T_base_body)[:, :3, 3]
+            same = bool(np.nanmedian(np.linalg.norm(d, axis=1)) < _SAME_PLACE)
+        if not same:
+            raise ScenarioError(
+                f"{truth_folder}: trial {trial.trial_id!r} was not recorded in that run: its times or the place of its "
+                "base are others; --truth must be of the same run as the dataset"
+            )
 
 
 def _derived(truth_folder: Path) -> dict[str, np.ndarray]:
