@@ -39,12 +39,12 @@ class Shape:
 
     Attributes:
         trial: Its id.
-        t: (n,) [s], sample numbers where the file has no time.
+        t: (n,) [s]; None of posture means, whose odd ones are left out one by one.
         e: (n, m, 3) markers less their drawing [m, body], NaN where hidden; all of them are fitted together.
     """
 
     trial: str
-    t: np.ndarray
+    t: np.ndarray | None
     e: np.ndarray
 
 
@@ -87,7 +87,7 @@ def _shape(body: Body, trial: Trial | PostureMeans) -> Shape | None:
     found = body_poses(_drawn(body), trial.marker_position[rows][:, columns])
     if not np.isfinite(found.T).any():
         return None
-    t = np.arange(len(found.T), dtype=float) if isinstance(trial, PostureMeans) else trial.t_mocap[rows]
+    t = None if isinstance(trial, PostureMeans) else trial.t_mocap[rows]
     return Shape(trial.id, t, np.einsum("nji,nmj->nmi", found.T[:, :3, :3], found.residual))
 
 
@@ -160,6 +160,7 @@ def _moved(body: Body, shapes: Sequence[Shape], sigma: float, limit: float) -> I
     windows = [
         (f"{s.trial} at {start - s.t[0]:.0f} s", _median(s.e[(s.t >= start) & (s.t < start + _WINDOW)]))
         for s in shapes
+        if s.t is not None
         for start in np.arange(s.t[0], s.t[-1], _WINDOW)
     ]
     windows = [(name, e) for name, e in windows if np.isfinite(e).all()]
