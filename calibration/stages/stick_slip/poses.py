@@ -76,9 +76,10 @@ def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
         advance(state, now, drive, forcing.inertia[k], rows, settings, STEP)
         e[k] = now
     drive = forcing.drive[STEPS - 1 :: STEPS]
-    N = np.maximum(rows[:, 6] + drive[:, 3:6] @ rows[:, 7:].T, np.finfo(float).tiny)
+    N = np.maximum(rows[:, 6] + drive[:, 3:6] @ rows[:, 7:].T, 0.0)
     force = rows[:, 2:4] * e + N[..., None] * np.stack([-drive[:, 7], drive[:, 6]], axis=1)[:, None]
-    return np.minimum(np.linalg.norm(force, axis=2) / (rows[:, 5] * N), 1.0)
+    used, limit = np.linalg.norm(force, axis=2), rows[:, 5] * N
+    return np.minimum(np.divide(used, limit, out=np.ones_like(used), where=limit > 0.0), 1.0)
 
 
 def _at(t: np.ndarray, grid: np.ndarray, columns: np.ndarray) -> np.ndarray:
