@@ -143,13 +143,15 @@ def sweeps_next(models: Sequence[JointModel]) -> tuple[ExperimentPlan | None, tu
             beyond.append(model.joint)
     said = []
     if beyond:
-        message = f"rho of {', '.join(beyond)}: no sweep would tell, the flanks lie too near each other for the noise"
+        message = (
+            f"rho of {', '.join(beyond)}: no sweep identifies it, the flanks are too near each other for the noise"
+        )
         said.append(Verdict(_JOINTS, "warning", message))
     if not motions:
         return None, tuple(said)
     why = f"rho is not identifiable in {', '.join(m.joint for m in motions)}"
     told = ", ".join(f"{s.name} {s.before:.0f} -> {s.after:.2g} {s.unit}" for s in sigma)
-    said.append(Verdict(_JOINTS, "warning", f"{why}; sweeps that would tell, in record_next.yaml: {told}"))
+    said.append(Verdict(_JOINTS, "warning", f"{why}; to identify it, record the sweeps in record_next.yaml: {told}"))
     return ExperimentPlan(_JOINTS, why, motions=tuple(motions), sigma=tuple(sigma)), tuple(said)
 
 
@@ -197,12 +199,14 @@ def swings_next(suspension: Suspension) -> tuple[ExperimentPlan | None, tuple[Ve
     if slipping:
         axes = ", ".join(name for name, slip in zip(AXES, slips, strict=True) if slip)
         message = (
-            f"{len(slipping)} elements of K and C: no motion tells a spring along {axes}, which slip or hardly move"
+            f"{len(slipping)} elements of K and C: the motion excites no spring along {axes}: these slip or hardly move"
         )
         said.append(Verdict(_SUSPENSION, "warning", message))
     wheels = [name for name in open_ if name not in needed and name not in slipping]
     if wheels:
-        message = f"{', '.join(wheels)}: no motion tells wheels apart by their total wrench; a plate under each would"
+        message = (
+            f"{', '.join(wheels)}: the total wrench does not distinguish the wheels; a plate under each wheel would"
+        )
         said.append(Verdict(_SUSPENSION, "warning", message))
     within = {name: m for name, m in needed.items() if m <= _MOST * n}
     if not within:
@@ -212,7 +216,11 @@ def swings_next(suspension: Suspension) -> tuple[ExperimentPlan | None, tuple[Ve
     sigma = tuple(Sigma(x, open_[x].unit, open_[x].sigma, share * open_[x].sigma) for x in within)
     why = f"not identifiable: {', '.join(within)}"
     said.append(
-        Verdict(_SUSPENSION, "warning", f"{why}; {m} more swings like the {n} recorded would tell, in record_next.yaml")
+        Verdict(
+            _SUSPENSION,
+            "warning",
+            f"{why}; to identify it, record {m} more swings like the {n} recorded (record_next.yaml)",
+        )
     )
     motions = (Motion("swing", repeats=m, frequency=_HERTZ, seconds=_SECONDS),)
     return ExperimentPlan(_SUSPENSION, why, motions=motions, sigma=sigma), tuple(said)

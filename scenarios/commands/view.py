@@ -29,7 +29,7 @@ def view(
         except ModuleNotFoundError as error:
             if error.name not in ("trimesh", "viser"):
                 raise
-            typer.echo(f"{error}; install the extra: pip install 'tiago-twin[view]', in a clone '.[view]'", err=True)
+            typer.echo(f"{error}; install the extra in a clone of the repository: pip install '.[view]'", err=True)
             raise typer.Exit(FAILED) from error
         shown = write(run_folder, trial, page, magnify)
     typer.echo(f"View of {shown}: {page}")

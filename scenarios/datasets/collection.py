@@ -96,7 +96,7 @@ def _reported(
     done: Iterator[Done], plan: Plan, workers: Workers, progress: Progress, announce: Callable[[str], None]
 ) -> Iterator[Row]:
     """Pass the rows on; say from the first one what the others will cost, then the rate and the time that is left."""
-    progress("the first run tells the cost of the others", 0.0)
+    progress("timing the first run", 0.0)
     start, width = time.monotonic(), max(1, workers.number)
     for k, one in enumerate(done, 1):
         yield one.row
@@ -104,7 +104,7 @@ def _reported(
         if k == 1:
             _check_room(plan.folder, one.row.bytes * left)
             size = f"{_bytes(one.row.bytes * plan.n)} in all, {_hours(one.seconds * left / width)}"
-            announce(f"{size} to go with {width} at once")
+            announce(f"{size} left with {width} worker{'s' if width > 1 else ''}")
             start = time.monotonic()
         else:
             rate = (k - 1) / (time.monotonic() - start)

@@ -56,6 +56,8 @@ class Source:
         """
         placed = []
         details = error.errors(include_url=False)
+        wrong = {d["loc"][:-1] for d in details if d["loc"] and d["loc"][-1] == OF_KEY}
+        details = [d for d in details if d["type"] not in MISSING or d["loc"][:-1] not in wrong]
         for detail in details[:MOST_FINDINGS]:
             path = _path(self.values, (*above, *detail["loc"]), detail["type"])
             known = _fields(adapter, self.values, above, path[:-1]) if detail["type"] in UNKNOWN else []

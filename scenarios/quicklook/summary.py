@@ -115,7 +115,7 @@ def _shapes(trial: Trial, bodies: Sequence[schema.Body]) -> Iterator[str]:
         if d.size:
             found.append(f"{body.name} {1e3 * per_coordinate(d):.2g}")
     if found:
-        yield f"markers move against each other, mm a coordinate: {', '.join(found)}"
+        yield f"marker cluster noise [mm per axis]: {', '.join(found)}"
 
 
 def _plates(trial: Trial) -> Iterator[str]:
@@ -152,7 +152,7 @@ def _felt(trial: Trial) -> Iterator[str]:
         yield f"robot: motor currents of {known.sum()} joints, {trial.joint[k]} the most, {most:.3g} A"
     f = np.linalg.norm(trial.wrist_wrench[:, :3], axis=1)
     if np.isfinite(f).any():
-        yield f"wrist: force {np.nanmin(f):.1f}-{np.nanmax(f):.1f} N, zero included"
+        yield f"wrist: force {np.nanmin(f):.1f}-{np.nanmax(f):.1f} N (zero offset not removed)"
 
 
 def _encoders(trial: Trial) -> Iterator[str]:

@@ -133,7 +133,11 @@ def _at_limits(used: Sequence[JointModel]) -> Iterator[Verdict]:
     """What a search for rho that ended at a limit leaves open."""
     for limit, rho, meaning in (
         ("lowest", RHO[0], "the direction of motion hardly chooses a flank; no coefficient is identifiable"),
-        ("highest", RHO[1], "the flanks change faster than the readings show; rho is not identifiable, they are"),
+        (
+            "highest",
+            RHO[1],
+            "the flanks change faster than the readings show; rho cannot be identified, both flanks can",
+        ),
     ):
         found = [m.joint for m in used if limit_of(m.rho) == limit]
         if found:

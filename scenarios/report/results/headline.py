@@ -81,10 +81,11 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
     best = predictive(steps, model) or oracle_base(steps, model)
     budget = results.evaluation.budget
     shares = tuple(Share(s.cause, s.size_mm) for s in budget.shares if s.size_mm > 0.0) if budget else ()
-    shares = shares or (_shares(steps, best) if best else ())
+    coarse = _shares(steps, best) if best else ()
+    shares = shares or coarse
     gains = tuple(NextStep(s.remedy, s.gain_mm) for s in budget.next_steps) if budget else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
-    found_or_most = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, shares))
+    found_or_most = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, coarse))
     ranked = (*refused, *found_or_most)[:_STEPS]
     return Headline(badge, _sentence(steps, best), shares, ranked, found)
 

@@ -197,7 +197,7 @@ def test_a_rho_at_its_limit_is_asked_for_by_a_sweep_at_the_right_speed():
 
 def test_flanks_that_lie_together_are_not_asked_for():
     remedy, said = sweeps_next([flanks(RHO[1], 1e-5)])
-    assert remedy is None and "no sweep would tell" in said[0].message
+    assert remedy is None and "no sweep identifies it" in said[0].message
     assert sweeps_next([flanks(50.0)]) == (None, ())
 
 
@@ -238,7 +238,7 @@ def test_elements_that_scatter_ask_for_as_many_swings_as_would_tell_them():
 
 def test_elements_of_axes_that_slip_are_said_to_be_beyond_any_motion():
     remedy, said = swings_next(scattering(slip=True))
-    assert remedy is None and "1 elements of K and C: no motion tells a spring along y" in said[0].message
+    assert remedy is None and "1 elements of K and C: the motion excites no spring along y" in said[0].message
 
 
 def test_a_jackknife_falls_with_the_number_of_trials_as_is_predicted():
