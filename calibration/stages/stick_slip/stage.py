@@ -27,6 +27,7 @@ from calibration.stages.stick_slip.forcing import (
 from calibration.stages.stick_slip.likelihood import joined
 from calibration.stages.stick_slip.measured import PlanarMotion, planar_motion
 from calibration.stages.stick_slip.model import Direction, StickSlip
+from calibration.stages.stick_slip.search import displaced
 from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
@@ -39,6 +40,8 @@ _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _BETTER = 0.8  # mean square over that of the slipping base, below which the compliance takes an axis
 _WORTH, _LESS = 0.8, 0.1  # R2 of yaw; by which that of the plate may be less
+_WILD = 25.0  # mean square over the median of the trials
+_ELSEWHERE = 0.014  # [m] a wheel may seem off its place
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
 _log = logging.getLogger(__name__)
 
@@ -62,18 +65,23 @@ def fit_stick_slip(
     tilting = Tilting(suspension.K, suspension.C)
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     directions: list[Direction] = []
+    misplaced: tuple[Verdict, ...] = ()
     read = _read(sources, trials)
     for source in SOURCES:
         rows = _rows(description, read, tilting, source)
         if len(rows) >= _LEAST_TRIALS:
-            start = directions[0].logarithms if directions else None
-            directions.append(_linear(fit_direction(source, joined(wheels, rows), start), suspension))
+            start, campaign = directions[0].logarithms if directions else None, joined(wheels, rows)
+            directions.append(_linear(fit_direction(source, campaign, start), suspension))
+            if start is None:
+                calm = joined(wheels, [row for row, wild in zip(rows, _wild(directions[0]), strict=True) if not wild])
+                misplaced = tuple(_misplaced(wheels.names, displaced(calm, directions[0].logarithms)))
     if not directions:
         message = "no stick-slip base: it takes two trials that show the base and its wrench"
         return None, (Verdict(STAGE, "missing", message),)
     model = StickSlip(wheels, tilting, tuple(directions))
     names = [one.trial.id for one in read]
-    return model, (*(_judged(d) for d in directions), *_doubted(directions), *_moved(directions[0], names))
+    said = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
+    return model, said
 
 
 def _read(sources: WrenchSources, trials: Sequence[Trial]) -> list[Read]:
@@ -111,6 +119,25 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
     own = direction.held_out.variance(np.asarray(direction.held_out.moves))
     linear = tried.moves[list(PLANE)] & (plane < _BETTER * own)
     return replace(direction, linear=linear, linear_variance=plane, heave_variance=heave)
+
+
+def _wild(direction: Direction) -> np.ndarray:
+    """(k,) trials whose errors, when they were left out, are far beyond those of most: they slipped too far to tell."""
+    square = direction.held_out.error / np.maximum(direction.held_out.count, 1.0)[:, None]
+    return np.asarray((square > _WILD * np.median(square, axis=0)).any(axis=1))
+
+
+def _misplaced(names: Sequence[str], shift: np.ndarray) -> Iterator[Verdict]:
+    """The wheel that the trials put elsewhere, by shifts (m, 2) [m]."""
+    far = np.abs(shift).max(axis=1)
+    k = int(far.argmax())
+    if far[k] > _ELSEWHERE:
+        x, y = 1e3 * shift[k]
+        message = (
+            f"the base turns and slips as if {names[k]} stood {x:+.0f} mm along x, {y:+.0f} mm along y of its declared "
+            "place: check the wheels' places in dataset.json, and the plate's place and axes"
+        )
+        yield Verdict(STAGE, "warning", message)
 
 
 def _doubted(directions: Sequence[Direction]) -> Iterator[Verdict]:

@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from calibration.stages.stick_slip.fit import fit_direction, fitted, left_out
 from calibration.stages.stick_slip.likelihood import joined
-from calibration.stages.stick_slip.search import searched
+from calibration.stages.stick_slip.search import displaced, searched
 from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, SlipParameters
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import TRUTH
@@ -85,3 +87,14 @@ def test_a_window_that_slips_as_nobody_could_know_counts_little():
 def test_twice_the_same(trials):
     p = SlipParameters.of(PRIOR).logarithms
     np.testing.assert_array_equal(trials.errors(p), trials.errors(p))
+
+
+@pytest.mark.parametrize(("wheel", "axis"), [(0, 0), (3, 1)])
+def test_a_wheel_declared_in_a_wrong_place_is_found(trials, found, wheel, axis):
+    assert np.abs(displaced(trials, found.logarithms)).max() < 6e-3
+    position = trials.wheels.position.copy()
+    position[wheel, axis] += 0.03
+    wrong = replace(trials, wheels=replace(trials.wheels, position=position))
+    shift = displaced(wrong, found.logarithms)
+    assert np.unravel_index(np.abs(shift).argmax(), shift.shape) == (wheel, axis)
+    assert -0.036 < shift[wheel, axis] < -0.012
