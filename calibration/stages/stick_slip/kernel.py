@@ -220,3 +220,36 @@ def advance_members(
         for i in range(members):
             variance[a] += (states[i, a] - mean[a]) ** 2 / members
     return mean, variance, preloaded, share
+
+
+@njit(cache=True, error_model="numpy")
+def banded(
+    moved: np.ndarray,
+    before: np.ndarray,
+    share: float,
+    band: np.ndarray,
+    spread: np.ndarray,
+    preloaded: np.ndarray,
+    elastic: np.ndarray,
+) -> np.ndarray:
+    """Band and believed motion of one sample, see `band`: rows mean, path, largest square of a slip, x, variance.
+
+    Args:
+        moved: (3,) mean of the members.
+        before: (5, 3) as returned a sample ago.
+        share: That slid.
+        band: (4, 3) s, r, p, l.
+        spread: (3,) variance of the members.
+        preloaded: (3,) mean square by preload.
+        elastic: (3,) what springs alone do.
+    """
+    out = np.empty((5, 3))
+    for a in range(3):
+        path = before[1, a] + share * abs(moved[a] - before[0, a])
+        slip = moved[a] - elastic[a]
+        excess = band[1, a] ** 2 * spread[a] + band[2, a] ** 2 * preloaded[a] + (band[3, a] * path) ** 2
+        largest = max(before[2, a], slip * slip)
+        kept = 1.0 - min(excess / largest, 1.0) if largest > 0.0 else 0.0
+        out[0, a], out[1, a], out[2, a] = moved[a], path, largest
+        out[3, a], out[4, a] = elastic[a] + kept * slip, band[0, a] ** 2 + excess
+    return out

@@ -13,12 +13,11 @@ import numpy as np
 
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.forcing import STEPS, UNMOVED
-from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STATE, advance_members
+from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STATE, advance_members, banded
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
 
-_TINY = np.finfo(float).tiny
 _PARTS = (np.arange(STEPS)[:, None] + 1.0) / STEPS
 _LOADS = np.array([0.0] * 3 + [1.0] * 3 + [0.0] * 5)  # of a sample at rest: the vertical load alone
 
@@ -54,11 +53,8 @@ class SlipState:
         before: (11,) the last sample as the kernel takes it.
         states: (e, STATE) of the members, then of the preloaded optimum.
         deflections: (e, m, 2).
-        mean: (3,) of the members' positions.
-        path: (3,) slid so far.
-        largest: (3,) largest square of a predicted slip.
+        found: (5, 3) see `kernel.banded`.
         x: (3,) x, y, yaw [m, rad, frame 0].
-        variance: (3,).
     """
 
     start: float
@@ -68,11 +64,13 @@ class SlipState:
     before: np.ndarray
     states: np.ndarray
     deflections: np.ndarray
-    mean: np.ndarray
-    path: np.ndarray
-    largest: np.ndarray
+    found: np.ndarray
     x: np.ndarray
-    variance: np.ndarray
+
+    @property
+    def variance(self) -> np.ndarray:
+        """(3,) of x."""
+        return np.asarray(self.found[4])
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class SlipStream:
         bodies: (e, 5): as the kernel takes them, and whether it is a member.
         compliance: (3, 3) K_0^-1 of the optimum.
         moves: (3,) axes that are moved; linear ones are the compliance's, see `loaded_base`.
-        floor: (3,) least variance.
+        band: (4, 3) s, r, p, l.
     """
 
     direction: Direction
@@ -95,7 +93,7 @@ class SlipStream:
     bodies: np.ndarray
     compliance: np.ndarray
     moves: np.ndarray
-    floor: np.ndarray
+    band: np.ndarray
 
     def stepped(self, sample: Sample, before: SlipState | None) -> SlipState:
         """The base one sample on; without a state before, this sample is the first at rest."""
@@ -113,23 +111,16 @@ class SlipStream:
         drive = before.before + _PARTS * (row - before.before)
         arguments = states, e, drive, _inertia(sample), self.wheels, self.bodies, h
         mean, spread, preloaded, share = advance_members(*arguments)
-        path = before.path + share * np.abs(mean - before.mean)
-        variance = self.direction.band.variance(spread, preloaded, path)
         elastic = self.compliance @ row[PLATE:]
-        slip = mean - elastic
-        largest = np.maximum(before.largest, slip**2)
-        excess = variance - self.floor
-        kept = 1.0 - np.minimum(excess / np.maximum(largest, np.maximum(excess, _TINY)), 1.0)
-        x = (elastic + kept * slip) * self.moves
-        return SlipState(
-            before.start, sample.t, before.rest, before.n, row, states, e, mean, path, largest, x, variance
-        )
+        found = banded(mean, before.found, share, self.band, spread, preloaded, elastic)
+        return SlipState(before.start, sample.t, before.rest, before.n, row, states, e, found, found[3] * self.moves)
 
     def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
-        none, band = np.zeros(3), self.direction.band
+        none = np.zeros((5, 3))
+        none[4] = self.band[0] ** 2
         states, e = np.zeros((len(self.wheels), STATE)), np.zeros((*self.wheels.shape[:2], 2))
         e[len(self.direction.ensemble) :] = preloads(self.wheel_set, self.direction.parameters, row[3:6])
-        return SlipState(t, t, planar, 1, row * _LOADS, states, e, none, none, none, none, band.floor**2)
+        return SlipState(t, t, planar, 1, row * _LOADS, states, e, none, none[3])
 
 
 def slip_stream(model: StickSlip) -> SlipStream:
@@ -152,7 +143,7 @@ def slip_stream(model: StickSlip) -> SlipStream:
         bodies,
         compliance,
         found.held_out.moves & ~found.linear.astype(bool),
-        found.band.floor**2,
+        np.array([found.band.floor, found.band.spread, found.band.start, found.band.slip]),
     )
 
 
