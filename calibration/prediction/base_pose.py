@@ -20,10 +20,11 @@ from functools import cached_property
 import numpy as np
 
 from calibration.errors import NotEnoughData, ShapeError
-from calibration.numerics.lie import adjoint, inverse
+from calibration.mocap.cluster_pose import body_poses
+from calibration.numerics.lie import adjoint, from_vector, inverse, mean
 from calibration.numerics.signals import CUTOFF
 from calibration.numerics.wrench import in_frame
-from calibration.recording.schema import Description
+from calibration.recording.schema import Body, Description
 from calibration.recording.trial import REST, Trial
 from calibration.stages.stick_slip.stream import SlipState
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
@@ -211,3 +212,17 @@ def base_poses(suspension: Suspension, lab: WrenchSources, trial: Trial, source:
     rest = rest_of(lab.lab.description, trial, lab.T_base_B)
     base = BaseInTrial(suspension, lab, trial, rest.T_lab_0 @ rest.T_0_B)
     return rest.poses(base.displacement(source, rest))
+
+
+def base_at(body: Body | None, T_base_B: np.ndarray, markers: np.ndarray) -> np.ndarray:
+    """T_lab_base (4, 4) with its marker body at T_base_B (6,) [m, rad], from markers (n, m, 3) [m, lab].
+
+    Raises:
+        NotEnoughData: The body has no three markers, or no sample shows three.
+    """
+    if body is None or len(body.markers) < 3:
+        raise NotEnoughData("this estimate knows no three markers on the base: give T_lab_base_start")
+    T = body_poses(np.array([m.xyz for m in body.markers]), np.asarray(markers, dtype=float)).T
+    if not np.isfinite(T).all(axis=(1, 2)).any():
+        raise NotEnoughData("no sample shows three markers of the base")
+    return np.asarray(mean(T) @ inverse(from_vector(T_base_B)))

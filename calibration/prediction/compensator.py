@@ -12,29 +12,27 @@ The geometry is that of the estimate's main model, as in calibrated.urdf. Where 
 link angles and sigma theirs, the column bends, and the base sticks and slips (`bundled_arm`, `slipping_base`).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 
+from calibration.checks.joint_readings import implausible_readings
 from calibration.errors import InputError, NotCalibrated, NotEnoughData, ShapeError
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.files import load_estimate
 from calibration.estimate.rows import LADDER, row_of
-from calibration.inference.parameters import Model
 from calibration.numerics.lie import from_vector, inverse
-from calibration.prediction.base_pose import LoadedBase, loaded_base
+from calibration.prediction.base_pose import LoadedBase, base_at, loaded_base
 from calibration.prediction.bundled_arm import ArmPositions, BundledArm
-from calibration.prediction.hand_pose import HandPose, RobotState
+from calibration.prediction.hand_pose import HandPose, RobotState, in_lab, needed, uncertain
 from calibration.prediction.slipping_base import Motion, SlippingBase
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, points_of
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
@@ -108,7 +106,7 @@ class Compensator:
         if corrected and estimate.joint_models and laboratory is not None:
             inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
-        found = cls(hand, *_covariance(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)
+        found = cls(hand, *uncertain(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)
         return found._bundled(estimate, payload)
 
     def _bundled(self, estimate: Estimate, payload: float | None) -> "Compensator":
@@ -143,13 +141,15 @@ class Compensator:
 
         Raises:
             NotEnoughData: A wrench without a suspension or for less than a second.
+            InputError: Readings are far outside the joints' limits, as degrees are.
         """
         t, q = np.asarray(t, dtype=float), np.asarray(q_motor, dtype=float)
         if q.ndim != 2 or len(t) != len(q):
             raise ShapeError("q_motor", q.shape, (len(t), "n_joints"))
+        self._refuse_impossible(q)
         base, moved, variance = self._base(T_lab_base_start), None, None
         if wrench is not None:
-            w, there = np.asarray(wrench, dtype=float), _needed(base)
+            w, there = np.asarray(wrench, dtype=float), needed(base)
             if self.slipping is None:
                 moved = there.moved(t, w)
             else:
@@ -160,7 +160,22 @@ class Compensator:
             found = self._on_links(self.arm.along(t, q, velocity) if known else self.arm.at_rest(q))
         else:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
-        return _in_lab(found, base, moved, T_lab_base_start, variance)
+        return in_lab(found, base, moved, T_lab_base_start, variance)
+
+    def base_from_markers(self, markers: np.ndarray) -> np.ndarray:
+        """T_lab_base (4, 4) of the estimated base frame, for `predict`, from its markers at rest.
+
+        Args:
+            markers: (n, m, 3) [m, lab] in the order of dataset.json, NaN where not seen.
+
+        Raises:
+            NotEnoughData: The estimate knows no three markers on the base, or no sample shows three.
+        """
+        return base_at(None if self.laboratory is None else self.laboratory.base_body, self.hand.base, markers)
+
+    def tool(self, pose: HandPose) -> np.ndarray:
+        """Poses (n, 4, 4) of the URDF's tool frame, where `pose.T` is that of the hand's marker body."""
+        return np.asarray(pose.T @ inverse(from_vector(self.hand.hand)))
 
     def points(self, markers: np.ndarray, q_motor: np.ndarray, session: Session | None = None) -> Predicted:
         """Markers (m, 3) [m] of the hand's body, as the base's marker body sees them, with their band.
@@ -196,21 +211,31 @@ class Compensator:
         """
         q, base = np.asarray(q_motor, dtype=float)[None], self._base(T_lab_base_start)
         v = None if velocity is None else np.asarray(velocity, dtype=float)[None]
+        self._refuse_impossible(q)
         before, arm, motion = before or RobotState(), None, None
         if self.arm is not None:
             arm = self.arm.stepped(t, q[0], None if v is None else v[0], before.arm)
             motion = None if v is None else Motion(q[0], arm.v, arm.a)
         in_base = self._hand(np.array([t]), q, v) if arm is None else self._on_links(arm.positions)
         if wrench is None:
-            return replace(_in_lab(in_base, base, None, T_lab_base_start), state=RobotState(arm))
-        w, there, variance = np.asarray(wrench, dtype=float), _needed(base), None
+            return replace(in_lab(in_base, base, None, T_lab_base_start), state=RobotState(arm))
+        w, there, variance = np.asarray(wrench, dtype=float), needed(base), None
         if self.slipping is None:
             state = there.stepped(t, w, before.base)
         else:
             state = self.slipping.stepped(there, t, w, motion, before.base)
             variance = partial(self.slipping.variance, state)
-        found = _in_lab(in_base, base, state.moved, T_lab_base_start, variance)
+        found = in_lab(in_base, base, state.moved, T_lab_base_start, variance)
         return replace(found, state=RobotState(arm, state))
+
+    def _refuse_impossible(self, q: np.ndarray) -> None:
+        low, high = self._limits
+        if ((q < low) | (q > high)).any() and (wrong := list(implausible_readings(self.hand.nominal, q))):
+            raise InputError("q_motor", "; ".join(wrong))
+
+    @cached_property
+    def _limits(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.hand.nominal.limits()
 
     def _base(self, T_lab_base: np.ndarray | None) -> LoadedBase | None:
         """The base at its pose, None without a suspension or a laboratory."""
@@ -254,45 +279,6 @@ class Compensator:
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
         return np.asarray(covariance + np.diag(self.spread.hand_variances))
-
-
-def _needed(base: LoadedBase | None) -> LoadedBase:
-    if base is None:
-        raise NotEnoughData("this estimate has no suspension for a wrench to move: leave the wrench out")
-    return base
-
-
-def _in_lab(
-    in_base: HandPose,
-    base: LoadedBase | None,
-    moved: np.ndarray | None,
-    T_lab_base: np.ndarray | None,
-    variance: Callable[[], np.ndarray] | None = None,
-) -> HandPose:
-    """A pose in the base frame from where the base is, which may have moved (n, 4, 4), of variance (6,) or (n, 6)."""
-
-    def covariance() -> np.ndarray:
-        if base is not None and variance is not None:
-            return in_base.covariance + base.carried(variance(), in_base.T)
-        if base is not None and (moved is not None or T_lab_base is not None):
-            return in_base.covariance + base.covariance(in_base.T, moved is not None)
-        return in_base.covariance
-
-    T = in_base.T if T_lab_base is None else np.asarray(T_lab_base, dtype=float) @ in_base.T
-    return HandPose(T if moved is None else moved @ T, covariance)
-
-
-def _covariance(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarray]:
-    """Parameters of the hand that a model estimates, and their covariance (p, p)."""
-    known, chain = [p.name for p in model.parameters], hand.nominal
-    arm = [known.index(f"{PREFIX}.{axis}") for axis in AXES if f"{PREFIX}.x" in known]
-    placement = [f"geometry.{first_joint(chain)}.{axis}" for axis in AXES if arm]
-    names = tuple(name for name in hand.names if name in known or name in placement)
-    G = np.array([[float(name == other) for other in known] for name in names])
-    if arm:
-        vector = np.array([model.parameters[i].value for i in arm])
-        G[np.ix_([names.index(name) for name in placement], arm)] = placement_derivative(chain, vector)
-    return names, np.asarray(G @ model.covariance @ G.T)
 
 
 def _continuous(t: np.ndarray) -> bool:

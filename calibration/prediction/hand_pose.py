@@ -6,8 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from calibration.prediction.base_pose import BaseState
+from calibration.errors import NotEnoughData
+from calibration.inference.parameters import Model
+from calibration.prediction.base_pose import BaseState, LoadedBase
 from calibration.prediction.bundled_arm import ArmState
+from calibration.robot.hand import HandModel
+from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
 
 
 @dataclass(frozen=True)
@@ -41,3 +45,47 @@ class HandPose:
     def covariance(self) -> np.ndarray:
         """(n, 6, 6) of the local twist [m, rad], for a base frame located by its own markers; when first asked for."""
         return self.uncertainty()
+
+
+def needed(base: LoadedBase | None) -> LoadedBase:
+    """The base.
+
+    Raises:
+        NotEnoughData: There is none.
+    """
+    if base is None:
+        raise NotEnoughData("this estimate has no suspension for a wrench to move: leave the wrench out")
+    return base
+
+
+def in_lab(
+    in_base: HandPose,
+    base: LoadedBase | None,
+    moved: np.ndarray | None,
+    T_lab_base: np.ndarray | None,
+    variance: Callable[[], np.ndarray] | None = None,
+) -> HandPose:
+    """A pose in the base frame from where the base is, which may have moved (n, 4, 4), of variance (6,) or (n, 6)."""
+
+    def covariance() -> np.ndarray:
+        if base is not None and variance is not None:
+            return in_base.covariance + base.carried(variance(), in_base.T)
+        if base is not None and (moved is not None or T_lab_base is not None):
+            return in_base.covariance + base.covariance(in_base.T, moved is not None)
+        return in_base.covariance
+
+    T = in_base.T if T_lab_base is None else np.asarray(T_lab_base, dtype=float) @ in_base.T
+    return HandPose(T if moved is None else moved @ T, covariance)
+
+
+def uncertain(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarray]:
+    """Parameters of the hand that a model estimates, and their covariance (p, p)."""
+    known, chain = [p.name for p in model.parameters], hand.nominal
+    arm = [known.index(f"{PREFIX}.{axis}") for axis in AXES if f"{PREFIX}.x" in known]
+    placement = [f"geometry.{first_joint(chain)}.{axis}" for axis in AXES if arm]
+    names = tuple(name for name in hand.names if name in known or name in placement)
+    G = np.array([[float(name == other) for other in known] for name in names])
+    if arm:
+        vector = np.array([model.parameters[i].value for i in arm])
+        G[np.ix_([names.index(name) for name in placement], arm)] = placement_derivative(chain, vector)
+    return names, np.asarray(G @ model.covariance @ G.T)
