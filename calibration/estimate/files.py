@@ -95,7 +95,11 @@ def load_estimate(path: Path | str, zeros: Path | str | None = None) -> Estimate
     urdf = checked_urdf(read_text(nominal), nominal) if nominal.is_file() else None
     suggested = file.parent / NEXT
     remedies = read_plans(suggested)[1] if suggested.is_file() else ()
-    return replace(to_estimate(found, urdf, _read_covariances(file.parent / COVARIANCES)), remedies=remedies)
+    covariances = _read_covariances(file.parent / COVARIANCES)
+    try:
+        return replace(to_estimate(found, urdf, covariances), remedies=remedies)
+    except (ValueError, IndexError, KeyError, TypeError) as error:
+        raise InputError(file, f"its arrays do not fit each other ({error}); write the estimate again") from error
 
 
 def _replace_text(path: Path, text: str) -> None:

@@ -227,6 +227,7 @@ URDF = [
     Case("of another robot", replaced(URDF_PATH, "arm_4_joint", "elbow", 99), CALIBRATE, "no joint named"),
 ]
 
+_SUSPENSION = {"form": "static", "parameters": [], "C": [[1.0]], "tangent": [[1.0]], "gravity": [[1.0]], "held_out": []}
 _TWO = {"joints": ["turn"], "base_frame": "base", "tool_frame": "hand"}
 
 RESULTS = [
@@ -255,6 +256,12 @@ RESULTS = [
         edit(ESTIMATE, lambda e: e.update(link_zero=[0.0, 0.0, 0.0], robot=_TWO)),
         EVALUATE,
         "link_zero",
+    ),
+    Case(
+        "estimate whose stiffness is ragged",
+        put(ESTIMATE, "suspension", value=_SUSPENSION | {"K": [[1.0], [1.0, 2.0]]}),
+        EVALUATE,
+        "do not fit",
     ),
     Case("covariance file damaged", text("run/estimate/estimate.nc", b"CDF\x01aaaa"), EVALUATE, "netCDF4"),
     Case("plan that is a list", text("run/estimate/record_next.yaml", "[1]"), EVALUATE, "postures and motions"),
