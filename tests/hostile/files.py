@@ -227,7 +227,7 @@ URDF = [
     Case("of another robot", replaced(URDF_PATH, "arm_4_joint", "elbow", 99), CALIBRATE, "no joint named"),
 ]
 
-_SUSPENSION = {"form": "static", "parameters": [], "C": [[1.0]], "tangent": [[1.0]], "gravity": [[1.0]], "held_out": []}
+_SUSPENSION = {"form": "printed", "C": [[1.0]], "tangent": [[1.0]], "gravity": [[1.0]], "held_out": []}
 _TWO = {"joints": ["turn"], "base_frame": "base", "tool_frame": "hand"}
 
 RESULTS = [

@@ -1,6 +1,6 @@
 """Random damage until the time is over: `make fuzz`, FUZZ_SECONDS=1800 by default.
 
-Each example damages a file of the small laboratory and runs a command on it; `found.json` has those that ended in a
+Each example damages a file of the small laboratory and runs a command on it; `runs/fuzz.json` has those that ended in a
 traceback, a crash, beyond the bounds of time and memory, or with a file written elsewhere. Each cause is shown once,
 with the smallest damage hypothesis found.
 """
@@ -26,7 +26,7 @@ from tests.hostile import mutation
 from tests.hostile.case import Case, judged
 from tests.hostile.laboratory import make, make_formats, renew
 
-FOUND = Path(__file__).with_name("found.json")
+FOUND = Path(__file__).parents[2] / "runs/fuzz.json"
 ANY = (0, 1, 2)
 _EXAMPLES = 15  # of a target before the next one
 
@@ -184,6 +184,7 @@ def main() -> None:
         tally = search(laboratory, float(os.environ.get("FUZZ_SECONDS", "1800")))
     print(f"{sum(tally.tried.values())} examples: {dict(tally.tried)}; exit codes {dict(tally.codes)}")
     print(f"at most {tally.memory / 1e9:.2f} GB and {tally.seconds:.0f} s; {len(tally.causes)} causes")
+    FOUND.parent.mkdir(exist_ok=True)
     FOUND.write_text(json.dumps(tally.causes, indent=1) + "\n")
     sys.exit(bool(tally.causes))
 

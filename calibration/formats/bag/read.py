@@ -6,6 +6,7 @@ without any joint of the mapping are others' and passed over; one with some of t
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,7 @@ def _messages(path: Path, topics: Sequence[str]) -> dict[str, list[Any]]:
     found: dict[str, list[Any]] = {topic: [] for topic in topics}
     try:
         with AnyReader([path], default_typestore=store) as bag:
+            _bound_chunks(bag)
             total = 0
             for connection, _, raw in bag.messages([c for c in bag.connections if c.topic in found]):
                 total += len(raw)
@@ -77,6 +79,28 @@ def _messages(path: Path, topics: Sequence[str]) -> dict[str, list[Any]]:
     return found
 
 
+def _bound_chunks(bag: Any) -> None:
+    """Let no chunk of a ROS 1 bag grow beyond all bounds when it is decompressed."""
+    import bz2
+
+    import lz4.frame
+
+    known = {bz2.decompress: bz2.BZ2Decompressor, lz4.frame.decompress: lz4.frame.LZ4FrameDecompressor}
+
+    def bounded(decompressor: Any, data: bytes) -> bytes:
+        at_once = known[decompressor]()
+        found: bytes = at_once.decompress(data, max_length=_ALL_BYTES)
+        if not at_once.eof:
+            raise ValueError(f"a chunk of more than {_ALL_BYTES} bytes, or cut off")
+        return found
+
+    for reader in bag.readers:
+        chunks = getattr(reader, "chunks", {})
+        for place, chunk in chunks.items():
+            if chunk.decompressor in known:
+                chunks[place] = chunk._replace(decompressor=partial(bounded, chunk.decompressor))
+
+
 def topics_of(path: Path) -> dict[str, tuple[str, set[str]]]:
     """Message type and names of joints in the first messages of every topic of a bag.
 
@@ -88,6 +112,7 @@ def topics_of(path: Path) -> dict[str, tuple[str, set[str]]]:
 
     try:
         with AnyReader([path], default_typestore=store) as bag:
+            _bound_chunks(bag)
             kinds = {c.topic: c.msgtype for c in bag.connections}
             named = [c for c in bag.connections if c.msgtype in (JOINT_STATE, STATISTICS_NAMES)]
             names: dict[str, set[str]] = {c.topic: set() for c in bag.connections}

@@ -104,3 +104,11 @@ def test_a_compressed_bag_with_wrong_bytes_is_told(tmp_path, monkeypatch, name):
     file.write_bytes(bytes(content))
     with pytest.raises(InputError, match="cannot be read as a ROS bag"):
         read_bag([path], layout(**WRIST))
+
+
+@pytest.mark.parametrize("name", [name for name in WRITTEN if "ROS 1" in name])
+def test_a_bag_that_grows_beyond_bounds_is_refused_before_it_does(tmp_path, monkeypatch, name):
+    path = written(tmp_path, monkeypatch, name)
+    monkeypatch.setattr("calibration.formats.bag.read._ALL_BYTES", 10_000)
+    with pytest.raises(InputError, match="too large" if "none" in name else "a chunk of more than 10000 bytes"):
+        read_bag([path], layout(**WRIST))
