@@ -18,7 +18,7 @@ from calibration.errors import InputError
 MOST_BYTES = 64 * 2**20
 """Of a text file [B]; JSON of this size is read within some seconds."""
 
-_YAML_BYTES = 2**20  # [B]: ruamel.yaml reads some 50 kB a second
+_YAML_BYTES = 2**18  # [B]: ruamel.yaml reads some 50 kB a second
 _YAML_NODES = 100_000  # values, aliases written out
 _DEPTH = 60  # of lists and mappings within each other, and of elements
 _LINKS = 500  # of a robot
@@ -101,7 +101,7 @@ def yaml_of(text: str, path: Path | str, load: Callable[[str], Any] | None = Non
 
     try:
         if len(text) > _YAML_BYTES:
-            raise InputError(path, f"has {len(text) / 2**20:.3g} MB of YAML; at most 1 MB is read")
+            raise InputError(path, f"has {len(text) / 2**20:.3g} MB of YAML; at most 0.25 MB is read")
         _check_size(text, path)
         return (load or YAML(typ="safe", pure=True).load)(text)
     except MarkedYAMLError as error:

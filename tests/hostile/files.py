@@ -366,7 +366,7 @@ YAML = [
         "50,000 unknown keys",
         text("scenario.yaml", "".join(f"k{k}: 1\n" for k in range(50_000))),
         SCENARIO,
-        "more",
+        "MB",
         slow=True,
     ),
     Case(

@@ -41,7 +41,7 @@ def averaged(t: np.ndarray, grid: np.ndarray, values: np.ndarray, width: float) 
 def windows(t: np.ndarray, per_minute: float, duration: float, rng: np.random.Generator) -> np.ndarray:
     """Start and stop (k, 2) [s] of events within t (n,) [s]; none while an earlier one lasts."""
     n = int(rng.poisson(per_minute * (t[-1] - t[0]) / 60.0))
-    starts = np.sort(rng.uniform(t[0], t[-1] - duration, n))
+    starts = np.sort(rng.uniform(t[0], max(t[0], t[-1] - duration), n))
     kept = [start for k, start in enumerate(starts) if k == 0 or start - starts[k - 1] > 2.0 * duration]
     return np.array([(start, start + duration) for start in kept]).reshape(-1, 2)
 
