@@ -76,7 +76,7 @@ def test_a_marker_that_moves_on_its_body_is_told(tmp_path):
     position[200:, trial.marker_body.index("base")] += [2e-3, 0.0, 0.0]
     trial = replace(trial, marker_position=position)
     dataset = load(rigid_robot.write(tmp_path / "dataset", [("sweep", "calibration", "sweep", trial)]))
-    (said,) = (line for line in looked_at(dataset, dataset.description.trials[0]).findings if "each other" in line)
+    (said,) = (line for line in looked_at(dataset, dataset.description.trials[0]).findings if "cluster noise" in line)
     moved = dict(part.split() for part in said.split(": ")[1].split(", "))
     assert float(moved["base"]) > 0.3 and float(moved["gripper"]) < 0.1
 
