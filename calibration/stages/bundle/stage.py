@@ -22,7 +22,7 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.drive_trains.column_bending import rigid
 from calibration.stages.drive_trains.drive_train import Quantity
-from calibration.stages.drive_trains.geometry_refit import refit_geometry
+from calibration.stages.drive_trains.from_markers import completed
 from calibration.stages.drive_trains.stage import fit_drive_trains
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
@@ -86,10 +86,10 @@ def fit_bundle(
     bending, quantities, found = rigid(chain.joints[0]), trains.parameters, list(findings)
     geometry = replace(geometry, name="full")
     if trains.trains:
-        refitted = refit_geometry(chain, description, trials, robot, hand, trains)
+        refitted, more = completed(chain, description, trials, robot, hand, trains)
         geometry, bending, trains = refitted.model, refitted.bending, refitted.trains
         hand = refitted.hand(chain)
-        found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
+        found += [*more, *(Verdict(STAGE, "warning", message) for message in refitted.shown)]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link)))
     base = None

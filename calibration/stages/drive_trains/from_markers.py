@@ -3,6 +3,7 @@
     r(t) = log6( (Q^-1 T_measured)^-1 T_B_H(q) ) = J_j delta_j(t) + geometry, noise         q of other joints corrected
     y_j = (J_j' W J_j)^-1 J_j' W r        W^-1  covariance of the two marker bodies' poses
 
+The geometry is one fitted to link angles of the joints that have an encoder, its column bent as `column_bending` says.
 y_j takes the place of motor minus link reading: the same fit, windows weighted by what the markers say of this joint
 there. The zero and the eccentricity that it finds are the motor encoder's beside the geometry.
 """
@@ -16,14 +17,19 @@ from calibration.errors import NotEnoughData
 from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import adjoint, inverse, log6
 from calibration.recording.clock import Clock
+from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
+from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
+from calibration.stages.drive_trains.column_bending import ColumnBending, bent
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.geometry_refit import RefittedGeometry, refit_geometry
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
-from calibration.stages.drive_trains.stage import DEFLECTION, loads_of_trial
+from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances
+from calibration.verdict import Verdict
 
 _FLOOR = 1e-4  # [rad] a joint's angle is known to through the chain, however long its levers
 
@@ -41,15 +47,51 @@ class SeenJoint:
     variance: np.ndarray
 
 
+def completed(
+    chain: Chain, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, trains: DriveTrains
+) -> tuple[RefittedGeometry, tuple[Verdict, ...]]:
+    """Geometry on link angles, with the drive trains of joints without a link encoder, and which those are.
+
+    Their geometry is fitted with those there are, and again with all; arguments as of `refit_geometry`.
+    """
+    first = refit_geometry(chain, description, trials, robot, hand, trains)
+    have = [train.joint for train in trains.trains]
+    if all(joint in have or chain.is_prismatic(joint) for joint in chain.joints):
+        return first, ()
+    more = with_hand_markers(first.trains, trials, robot, first.hand(chain), first.bending)
+    new = [train.joint for train in more.trains if train.joint not in have]
+    if not new:
+        return first, ()
+    message = f"without a link encoder, from the hand's markers: {', '.join(new)}"
+    again = refit_geometry(chain, description, trials, robot, first.hand(chain), more)
+    return again, (Verdict(STAGE, "ok", message),)
+
+
 def with_hand_markers(
-    trains: DriveTrains, trials: Sequence[Trial], robot: Clock, hand: HandModel, joints: Sequence[str] | None = None
+    trains: DriveTrains,
+    trials: Sequence[Trial],
+    robot: Clock,
+    hand: HandModel,
+    bending: ColumnBending,
+    joints: Sequence[str] | None = None,
 ) -> DriveTrains:
-    """The drive trains with those of further joints (of all revolute ones that have none), by the hand's markers."""
+    """The drive trains with those of further joints (of all revolute ones that have none), by the hand's markers.
+
+    Joints that the hand's markers do not show are left out.
+    """
     have = [train.joint for train in trains.trains]
     others = [j for j in hand.chain.joints if not hand.chain.is_prismatic(j) and j not in have]
+    wanted = others if joints is None else joints
     found = trains
-    for joint in others if joints is None else joints:
-        train = identified_by_markers(found, joint, trials, robot, hand)
+    if not wanted:
+        return found
+    loads = [loads_of_trial(trains, trial, robot, hand) for trial in trials if is_long(trial)]
+    used = [trial for trial in trials if is_long(trial)]
+    for joint in wanted:
+        try:
+            train = identified_by_markers(found, joint, used, loads, robot, hand, bending)
+        except NotEnoughData:
+            continue
         kept = [t for t in found.trains if t.joint != joint]
         order = sorted([*kept, train], key=lambda t: trains.joints.index(t.joint))
         found = replace(found, trains=tuple(order))
@@ -57,7 +99,13 @@ def with_hand_markers(
 
 
 def identified_by_markers(
-    trains: DriveTrains, joint: str, trials: Sequence[Trial], robot: Clock, hand: HandModel
+    trains: DriveTrains,
+    joint: str,
+    trials: Sequence[Trial],
+    loads: Sequence[LinkLoads],
+    robot: Clock,
+    hand: HandModel,
+    bending: ColumnBending,
 ) -> DriveTrain:
     """The drive train of one joint; the other joints are corrected by those there are.
 
@@ -66,27 +114,32 @@ def identified_by_markers(
     """
     bare = replace(trains, trains=tuple(t for t in trains.trains if t.joint != joint))
     j = trains.joints.index(joint)
-    loads, seen = [], []
-    for trial in trials:
-        load = loads_of_trial(bare, trial, robot, hand)
+    own, seen = [], []
+    for trial, load in zip(trials, loads, strict=True):
         try:
-            seen.append(seen_joint(bare, load, trial, robot, hand, joint))
+            seen.append(seen_joint(bare, load, trial, robot, hand, bending, joint))
         except NotEnoughData:
             continue
-        loads.append(load)
-    if not loads:
+        own.append(load)
+    if not own:
         raise NotEnoughData(f"no calibration trial shows base and hand: {joint} has neither link encoder nor markers")
     tolerances = trains.description.tolerances
     C = inertial_tolerances(trains.dynamics, tolerances.link_mass, tolerances.link_com)
-    modes = load_modes(loads, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
-    data, coarse = (_data(loads, seen, j, modes, window) for window in (WINDOW, COARSE))
+    modes = load_modes(own, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
+    data, coarse = (_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
     found = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))
     names = [q for q in found.parameters if ".link." not in q.name]
     return replace(found, link=np.full(5, np.nan), parameters=tuple(names))
 
 
 def seen_joint(
-    trains: DriveTrains, loads: LinkLoads, trial: Trial, robot: Clock, hand: HandModel, joint: str
+    trains: DriveTrains,
+    loads: LinkLoads,
+    trial: Trial,
+    robot: Clock,
+    hand: HandModel,
+    bending: ColumnBending,
+    joint: str,
 ) -> SeenJoint:
     """Motor reading less joint angle of a joint as the hand's markers show it, other joints as `trains` has them."""
     bodies = trains.description.base_body, trains.description.hand_body
@@ -94,14 +147,14 @@ def seen_joint(
     T = inverse(base.T) @ other.T
     Ad = adjoint(inverse(T))
     C = (other.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)) * trains.description.sigmas.marker**2
-    have = np.isin(trains.joints, [train.joint for train in trains.trains])
-    q = trains.of_loads(loads).q + np.where(have, trains.zero, 0.0)  # as the geometry on bare readings has them
-    at = np.stack([np.interp(robot.from_mocap(trial.t_mocap), loads.t, column) for column in q.T], axis=1)
+    q = trains.of_loads(loads).q  # the geometry is of link angles
+    s = robot.from_mocap(trial.t_mocap)
+    at, moment = (np.stack([np.interp(s, loads.t, column) for column in x.T], axis=1) for x in (q, loads.moment))
     known = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2))
     if known.sum() < 2:
         raise NotEnoughData(f"{trial.id}: the hand is not seen")
     y, variance = np.full(len(T), np.nan), np.full(len(T), np.nan)
-    r = log6(inverse(T[known]) @ hand.poses(at[known]))
+    r = log6(inverse(T[known]) @ bent(hand, bending, at[known], moment[known]))
     J = hand.joint_jacobians(at[known])[:, :, hand.chain.joints.index(joint)]
     WJ = np.linalg.solve(C[known], J[..., None])[..., 0]
     information = (J * WJ).sum(axis=1)

@@ -57,7 +57,7 @@ def fit_drive_trains(
     refused = tuple(wrong_links(bare.joints, trials, zero))
     if refused:
         return bare, tuple(Verdict(STAGE, v.verdict, v.message) for v in refused)
-    used = [trial for trial in trials if _long(trial)]
+    used = [trial for trial in trials if is_long(trial)]
     loads = [loads_of_trial(bare, trial, robot, hand) for trial in used]
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
     trains = tuple(_identified(bare, loads, differences, hand))
@@ -94,7 +94,8 @@ def _complete(trial: Trial) -> np.ndarray:
     return np.flatnonzero(np.isfinite(trial.q_motor).all(axis=1))
 
 
-def _long(trial: Trial) -> bool:
+def is_long(trial: Trial) -> bool:
+    """Whether a trial has readings enough to derive velocities and accelerations from."""
     rows = _complete(trial)
     return len(rows) > 3 and bool(trial.t_robot[rows[-1]] - trial.t_robot[rows[0]] > _SHORTEST)
 
@@ -139,7 +140,7 @@ def _verdicts(found: DriveTrains, hand: HandModel) -> Iterator[Verdict]:
         j for j in hand.chain.joints if j not in [t.joint for t in found.trains] and not hand.chain.is_prismatic(j)
     ]
     if without:
-        yield Verdict(STAGE, "missing", f"no drive train without a link encoder: {', '.join(without)}")
+        yield Verdict(STAGE, "missing", f"no link encoder to see the drive train by: {', '.join(without)}")
     for train in found.trains:
         open_ = [q for q in train.parameters if q.status != "estimated" and ".motor." not in q.name]
         if open_:
