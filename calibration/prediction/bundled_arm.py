@@ -20,8 +20,7 @@ import numpy as np
 from calibration.numerics.lie import adjoint, inverse
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending, moved
-from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.streaming import Stream, StreamState, stream_of
+from calibration.stages.drive_trains.drive_trains import DriveTrains, Stream, StreamState, stream_of
 from calibration.stages.drive_trains.torques import LinkLoads
 
 

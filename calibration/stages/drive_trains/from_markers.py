@@ -28,6 +28,7 @@ from calibration.stages.drive_trains.geometry_refit import RefittedGeometry, ref
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
 from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial
+from calibration.stages.drive_trains.steady_contact import Slip
 from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances
 from calibration.verdict import Verdict
 
@@ -128,6 +129,10 @@ def identified_by_markers(
     modes = load_modes(own, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
     data, coarse = (_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
     found = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))
+    if isinstance(found, Slip):
+        raise NotEnoughData(
+            f"{joint}: the hand's markers show a step of {1e3 * found.size:.1f} mrad in {found.trial_id}"
+        )
     names = [q for q in found.parameters if ".link." not in q.name]
     return replace(found, link=np.full(5, np.nan), parameters=tuple(names))
 

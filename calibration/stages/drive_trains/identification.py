@@ -21,7 +21,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB
 from calibration.stages.drive_trains.quantities import covariance_of, reported
-from calibration.stages.drive_trains.steady_contact import SteadyContact, steady_contact
+from calibration.stages.drive_trains.steady_contact import Slip, SteadyContact, slipped_encoder, steady_contact
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.drive_trains.train_fit import (
     FLOORS,
@@ -84,11 +84,17 @@ def identify(
     backlash: float,
     deflection: float,
     motor_offset: float,
-) -> DriveTrain:
-    """The drive train of a joint; `modes` (p, z) as in its data, priors as `prior_of`, `coarse` as `best_train`."""
+) -> DriveTrain | Slip:
+    """The drive train of a joint, or where its encoder slipped.
+
+    `modes` (p, z) as in its data, priors as `prior_of`, `coarse` as `best_train`.
+    """
     prior = prior_of(data, "dead_zone", backlash, deflection)
     chosen = best_train(Problem(joint, data, prior), coarse, backlash, deflection)
     fit = chosen.fit
+    slip = slipped_encoder(fit)
+    if slip is not None:
+        return slip
     train = replace(
         fit.problem.train(fit.theta),
         link=np.append(motor_offset - fit.gamma[0], -fit.gamma[1:]),

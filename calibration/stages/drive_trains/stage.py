@@ -20,6 +20,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains, zeros_of
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, joint_data
+from calibration.stages.drive_trains.steady_contact import Slip
 from calibration.stages.drive_trains.torques import (
     Dynamics,
     LinkLoads,
@@ -60,11 +61,13 @@ def fit_drive_trains(
     used = [trial for trial in trials if is_long(trial)]
     loads = [loads_of_trial(bare, trial, robot, hand) for trial in used]
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
-    trains = tuple(_identified(bare, loads, differences, hand))
+    tried = dict(_identified(bare, loads, differences, hand))
+    trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))
+    slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
     found = DriveTrains(bare.dynamics, trains, bare.zero, urdf, description)
     deltas = [row for trial, load in zip(used, loads, strict=True) for row in _dwell_deltas(found, trial, robot, load)]
     found = DriveTrains(bare.dynamics, trains, zeros_of(found, deltas), urdf, description)
-    return found, tuple(_verdicts(found, hand))
+    return found, (*slips, *_verdicts(found, hand))
 
 
 def loads_of_trial(
@@ -102,7 +105,7 @@ def is_long(trial: Trial) -> bool:
 
 def _identified(
     bare: DriveTrains, loads: Sequence[LinkLoads], differences: Sequence[np.ndarray], hand: HandModel
-) -> Iterator[DriveTrain]:
+) -> Iterator[tuple[str, DriveTrain | Slip]]:
     tolerances = bare.description.tolerances
     C = inertial_tolerances(bare.dynamics, tolerances.link_mass, tolerances.link_com)
     root = np.linalg.cholesky(C + 1e-12 * np.eye(len(C)))
@@ -114,7 +117,16 @@ def _identified(
         own, seen = [loads[k] for k in has], [differences[k] for k in has]
         modes = load_modes(own, j, root)
         data, coarse = (joint_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
-        yield identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(bare.dynamics.offset[j]))
+        offset = float(bare.dynamics.offset[j])
+        yield joint, identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, offset)
+
+
+def _slipped(joint: str, slip: Slip) -> Verdict:
+    message = (
+        f"link encoder of {joint} slips by {1e3 * slip.size:.1f} mrad before {slip.t:.1f} s of {slip.trial_id}; it is "
+        "not used: fasten it and record again, or leave out the trials on one side"
+    )
+    return Verdict(STAGE, "warning", message)
 
 
 def _dwell_deltas(trains: DriveTrains, trial: Trial, robot: Clock, loads: LinkLoads) -> Iterator[np.ndarray]:

@@ -7,13 +7,21 @@ The sides are those of a simulation with the theta of the round before. Windows 
 is on no side or they disagree, starts, stops and rests do not count: where friction holds a link at rest within
 +-c f_c is settled by jolts that no model of one joint has. What is linear has one minimum, and is free of the kinks
 that a change of side puts into a simulation's cost.
+
+A link encoder that slips on its shaft: from some moment on its readings are off by a constant.
+
+    r(t) = y - delta - terms gamma             while the motor slides steadily, all trials in order of time
+    step = median of r after - median before   largest over moments with `_EACH` windows on either side
+
+It slipped where the step exceeds `_STEP` and `_SIZES` median absolute deviations of what is left beside it: a side of
+the mesh that is predicted wrongly passes, a step stays.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, NU, Problem
+from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, NU, Problem, TrainFit
 
 _ROUNDS, _WEIGHTED = 4, 8
 _CLEAR = 2  # windows beside a change of side
@@ -21,6 +29,8 @@ _APART = 3e-4  # [rad] y and the simulation may differ on a side, half of the ga
 _FLOOR, _ROUGH = 1.5e-5, 1e-4  # [rad] least size of residuals; size to begin with
 _SIDE = 1e-5  # [rad] by which all of a side is off, of what no term holds
 _FEWEST = 60  # windows
+_EACH = 30  # windows
+_STEP, _SIZES = 5e-4, 6.0  # [rad], [-]
 _ZERO = 1.0  # [rad] prior of the zero
 
 
@@ -119,3 +129,45 @@ def _regressed(problem: Problem, side: np.ndarray, compliance: float) -> SteadyC
     J[:, 1] += A[:, 2:p] @ theta[2:]
     own = np.diag(np.append(prior.width**-2.0, np.append(_ZERO**-2.0, GAMMA_INFORMATION[1:])))
     return SteadyContact(theta, x[p:], used, J, r, w, (J.T * w) @ J / problem.correlated + own)
+
+
+@dataclass(frozen=True)
+class Slip:
+    """Where a link encoder slipped.
+
+    Attributes:
+        trial_id: The trial.
+        t: Since its first reading [s].
+        size: Change of motor minus link reading [rad].
+    """
+
+    trial_id: str
+    t: float
+    size: float
+
+
+def slipped_encoder(fit: TrainFit) -> Slip | None:
+    """The slip that a joint's residuals show; None where they show none."""
+    data, r = fit.problem.data, fit.residuals
+    times = data.motion.t[data.first]
+    rows = np.flatnonzero((data.regime == 0) & np.isfinite(r))
+    rows = rows[np.argsort(times[rows], kind="stable")]
+    splits = range(_EACH, len(rows) - _EACH)
+    if not splits:
+        return None
+    x = r[rows]
+    k = min(splits, key=lambda i: _left(x, i))
+    before, after = np.median(x[:k]), np.median(x[k:])
+    beside = np.concatenate([x[:k] - before, x[k:] - after])
+    size = float(after - before)
+    if abs(size) < max(_STEP, _SIZES * float(np.median(np.abs(beside)))):
+        return None
+    i = rows[k]
+    trial = int(data.trial[i])
+    begin = data.motion.begins[trial]
+    return Slip(data.trial_ids[trial], float(times[i] - data.motion.t[begin]), size)
+
+
+def _left(x: np.ndarray, k: int) -> float:
+    """Mean absolute deviation of x (n,) from its medians before and after k."""
+    return float(np.abs(x[:k] - np.median(x[:k])).sum() + np.abs(x[k:] - np.median(x[k:])).sum())

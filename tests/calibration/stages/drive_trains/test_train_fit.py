@@ -8,8 +8,8 @@ import pytest
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.quantities import covariance_of, reported, reverses
-from calibration.stages.drive_trains.steady_contact import steady_contact
-from calibration.stages.drive_trains.train_fit import FLOORS, Problem, derivatives, fit_train, prior_of
+from calibration.stages.drive_trains.steady_contact import slipped_encoder, steady_contact
+from calibration.stages.drive_trains.train_fit import FLOORS, Problem, derivatives, evaluated, fit_train, prior_of
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
 ECCENTRICITY = np.array([4e-3, 1e-3, -2e-3, 3e-4, -5e-4])
@@ -142,3 +142,19 @@ def test_a_load_that_keeps_its_sign_shows_no_gap() -> None:
     assert not reverses(-load, 0.5)
     assert reverses(load, 4.5)  # friction of a reversing joint takes it to the other side
     assert reverses(load - 5.0, 0.5)
+
+
+@pytest.mark.parametrize("size", [0.0, 2e-3, -6e-3])
+def test_a_link_encoder_that_slips_is_found_with_its_trial(size: float) -> None:
+    of_data = data()
+    at = int(1.6 * len(of_data.y) / 3)
+    of = problem(replace(of_data, y=of_data.y + np.where(np.arange(len(of_data.y)) > at, size, 0.0)))
+    later = replace(of.data.motion, t=of.data.motion.t + np.repeat(np.arange(3) * 100.0, len(of.data.motion.t) // 3))
+    of = replace(of, data=replace(of.data, motion=later))
+    found = slipped_encoder(evaluated(of, np.append(TRUTH.values[:4], 0.0), ECCENTRICITY))
+    if size == 0.0:
+        assert found is None
+    else:
+        assert found is not None and found.trial_id == "b"
+        assert found.t == pytest.approx(0.6 * SECONDS, abs=1.0)
+        assert found.size == pytest.approx(size, rel=0.05)
