@@ -38,9 +38,9 @@ _FREE = re.compile(  # of the contract, without effect on the hand's place
     rf"(friction\.\w+\.(coulomb|viscous)|sigmoid\.\w+\.\w+|suspension\.\w+\.\w+|slip\.\w+(\.\w+\.[kdc])?|flexibility\.\w+\.kr?[xyz]|contact\.\w+\.\w+"
     rf"|link\.\w+\.(mass|cx|cy|cz)|payload\.(mass|cx|cy|cz)|marker\.\w+\.[xyz]|plate\.\w+\.\w+"
     rf"|clock\.\w+\.(offset|drift)|frame\.\w+\.\w+\.{_AXIS}|encoder\.\w+\.(motor|link)\.(offset|cos1|sin1|cos2|sin2)"
-    rf"|gear\.\w+\.\w+|backlash\.\w+\.gap|drive\.\w+\.\w+)"
+    rf"|(gear|hysteresis)\.\w+\.\w+|backlash\.\w+\.gap|drive\.\w+\.\w+)"
 )
-_JOINT = re.compile(r"(geometry|encoder|gear|backlash|friction|sigmoid)\.(\w+)\.")
+_JOINT = re.compile(r"(geometry|encoder|gear|hysteresis|backlash|friction|sigmoid)\.(\w+)\.")
 _STATIC = ("encoder", "gear", "backlash")
 _LARGEST = {"m": 0.5, "rad": 1.6}  # a value beyond it is of another unit
 
@@ -80,7 +80,7 @@ def _faults(p: Parameter, units: dict[str, str], joints: tuple[str, ...]) -> Ite
         yield f"{p.name}: no such parameter{_nearest(p.name, tuple(units))}"
     elif p.unit and p.unit != units.get(p.name, p.unit):
         yield f"{p.name}: unit {p.unit!r}; it must be {units[p.name]!r}"
-    elif abs(p.value) > _LARGEST.get(units.get(p.name, ""), np.inf):
+    elif not p.name.startswith("frame.") and abs(p.value) > _LARGEST.get(units.get(p.name, ""), np.inf):
         yield f"{p.name}: {p.value:g} {units[p.name]} is no calibration's; values are in m and rad, not mm or degrees"
 
 

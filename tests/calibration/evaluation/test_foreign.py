@@ -13,6 +13,7 @@ from calibration import evaluate, load_estimate, save_estimate
 from calibration.errors import InputError
 from calibration.evaluation import read_submission
 from calibration.prediction import predict
+from calibration.prediction.foreign import check_names
 
 ROW = ("model_2", "measured", "motor")
 
@@ -98,6 +99,14 @@ def test_another_program_s_models_become_rows_and_agree_with_ours(saved, dataset
 def test_unknown_joints_names_and_units_are_rejected(dataset, tmp_path, parameter, message):
     with pytest.raises(InputError, match=message):
         evaluate(written(tmp_path, mine=[parameter]), dataset)
+
+
+def test_every_name_that_our_stages_write_is_known(dataset, tmp_path):
+    names = [f"{part}.arm_1_joint.{of}" for part, of in (("hysteresis", "slip"), ("gear", "damping"))]
+    names += ["contact.drive_left.friction", "flexibility.torso.krx"]
+    check_names(written(tmp_path, mine=[{"name": name, "value": 0.1} for name in names]), dataset)
+    with pytest.raises(InputError, match="no joint 'arm_9_joint'"):
+        check_names(written(tmp_path, mine=[{"name": "hysteresis.arm_9_joint.slip", "value": 0.1}]), dataset)
 
 
 def write_csv(path, poses, columns=("qw", "qx", "qy", "qz")):
