@@ -6,13 +6,12 @@ import numpy as np
 
 from calibration.mocap.dwells import rests
 from calibration.mocap.measured_trial import MeasuredTrial
-from calibration.numerics.signals import GAP
 from calibration.recording.schema import TrialEntry
 from calibration.verdict import Verdict
 
 STAGE = "reading"
 _MANY = 0.25  # share of moving dwells beyond which all of them are doubtful
-_LONG = 0.5  # [s] a body of markers is out of view, said
+_LONG = 0.5  # [s] a shorter hole is a log's usual drop-out
 _CLOCKS = (("t_robot", "joint readings"), ("t_plate", "readings of the plate"), ("t_mocap", "frames"))
 
 
@@ -35,7 +34,7 @@ def holes(trials: Sequence[MeasuredTrial]) -> Iterator[Verdict]:
         for name, what in _CLOCKS:
             t = getattr(trial, name)
             steps = np.diff(t)
-            long = np.flatnonzero(steps > max(GAP, 5.0 * float(np.median(steps)))) if len(steps) else steps
+            long = np.flatnonzero(steps > _LONG)
             if len(long):
                 k = int(long[np.argmax(steps[long])])
                 message = (

@@ -26,7 +26,7 @@ def rests(trial: MeasuredTrial) -> np.ndarray:
     """Whether the hand rests in each dwell (n,); it does where it is not seen."""
     last, good = -np.inf, np.zeros(len(trial.dwell_start), dtype=bool)
     for k, (start, stop) in enumerate(zip(trial.dwell_start, trial.dwell_stop, strict=True)):
-        inside = trial.t_mocap[0] <= start < stop <= trial.t_mocap[-1] + _MARGIN
+        inside = trial.t_mocap[0] - _MARGIN <= start < stop <= trial.t_mocap[-1] + _MARGIN
         good[k] = inside and start >= last and _travel(trial, start, stop) <= _SETTLES
         last = max(last, stop) if inside else last
     return good
