@@ -130,7 +130,7 @@ def _misdrawn(body: Body, e: np.ndarray, usual: float, limit: float) -> Iterator
     if _mirrored(xyz, measured) < 0.5 * size:
         what, remedy = (
             "its markers move as in a mirror",
-            "the laboratory's frame is left-handed: swap two axes or turn one",
+            "two labels are exchanged, or the laboratory's frame is left-handed: swap two axes or turn one",
         )
     elif alone:
         what, remedy = f"marker {name} is {1e3 * worst:.1f} mm from its drawing", f"{remedy}, or leave this marker out"

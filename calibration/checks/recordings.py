@@ -41,7 +41,8 @@ def check(file: str, trial: Trial | PostureMeans, description: Description, chai
     found += [] if found else [*not_rigid(trial, description)]
     if isinstance(trial, Trial):
         weight = mass * float(np.linalg.norm(description.gravity))
-        found += [*wrong_sides(trial), *_clocks(trial), *implausible_plates(trial, weight)]
+        found += [*wrong_sides(trial), *commanded(trial, description.sigmas.encoder)]
+        found += [*_clocks(trial), *implausible_plates(trial, weight)]
     if found:
         raise InputError(file, "; ".join(found))
 

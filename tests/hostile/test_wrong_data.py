@@ -9,7 +9,7 @@ from calibration.mocap import relabelled_trials
 from calibration.robot.laboratory import Laboratory
 from tests.doubles import rigid_robot
 from tests.hostile.spoilt import reference_of, tried
-from tests.hostile.wrong_data import FAST, TABLE, Campaign, drawn
+from tests.hostile.wrong_data import FAST, TABLE, VALIDATION, Campaign, drawn
 
 DRAWN, ALLOWED = 300, 3
 
@@ -53,6 +53,14 @@ def test_a_mistake_is_named_or_costs_little(twin, mistake, tmp_path):
     found = tried(mistake, campaign, good, reference, tmp_path / "data")
     assert not mistake.says or any(words in m for m in found.said for words in mistake.says.split("|")), found
     assert mistake.says or (found.calibrated and found.error < mistake.worst * found.clean), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mistake", VALIDATION, ids=lambda m: m.name)
+def test_a_mistake_of_validation_recordings_is_named(twin, mistake, tmp_path):
+    good, campaign, reference = twin
+    found = tried(mistake, campaign, good, reference, tmp_path / "data")
+    assert any(mistake.says in message for message in found.said), found
 
 
 @pytest.mark.slow

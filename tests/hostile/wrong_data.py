@@ -289,9 +289,9 @@ FAST = (
     Mistake("markers 1 % too large", scaled(1.01), "times as far apart as drawn", judged=True),
     Mistake("markers 5 % too large", scaled(1.05), "times as far apart as drawn", judged=True),
     Mistake(
-        "a hand marker drawn 50 mm off", drawn_off("gripper", [0.0, 0.05, 0.0], 1), "from the drawing", judged=True
+        "a hand marker drawn 50 mm off", drawn_off("gripper", [0.0, 0.05, 0.0], 1), "from its drawing", judged=True
     ),
-    Mistake("a base marker drawn 20 mm off", drawn_off("base", [0.02, 0.0, 0.0], 2), "from the drawing", judged=True),
+    Mistake("a base marker drawn 20 mm off", drawn_off("base", [0.02, 0.0, 0.0], 2), "from its drawing", judged=True),
     Mistake("a hand marker bumped by 10 mm", moved("gripper", [0.01, 0.0, 0.0], 0.4, 2), "a marker moved", judged=True),
     Mistake("dwells 1 s late", shifted_dwells(1.0), "the hand moves in", judged=True),
     Mistake("commands logged", lambda c: commands(list(range(8)))(commanded()(c)), "are the commands", judged=True),
@@ -300,7 +300,7 @@ FAST = (
 )
 TABLE = (
     *FAST,
-    Mistake("hand drawn 50 mm off", drawn_off("gripper", [0.05, 0.0, 0.0]), "from nominal|plausible"),
+    Mistake("hand drawn 50 mm off", drawn_off("gripper", [0.05, 0.0, 0.0]), "from where they are drawn"),
     Mistake("arm_4 gain 3 %", gain(4, 0.03), "arm_4_joint are off in scale"),
     Mistake("arm_2 gain -2 %", gain(2, -0.02), "arm_2_joint are off in scale"),
     Mistake("arm_3 slips by 1 deg", slip(3, 0.0175, 0.5), SLIPPED),
@@ -317,6 +317,16 @@ TABLE = (
     Mistake("gripper1 hidden for a third", gone("gripper", 0, 0.33), "", 1.1),
     Mistake("base2 hidden for a third", gone("base", 1, 0.33), "", 1.1),
     Mistake("plate lost for a second", lost_plate(0.5, 1.0), "holes in the readings of the plate", 1.1),
+)
+
+VALIDATION = (
+    Mistake("validation in millimetres", scaled(1000.0, "validation"), "in millimetres"),
+    Mistake("validation 1 % too large", scaled(1.01, "validation"), "times as far apart as drawn"),
+    Mistake("validation in a mirror", scaled(-1.0, "validation"), "as in a mirror"),
+    Mistake("validation 0.3 s late", late(0.3, -1.0, "validation"), "readings are late"),
+    Mistake("validation 30 ms late", late(0.03, -1.0, "validation"), "readings are late"),
+    Mistake("hand remounted before", moved("gripper", [0.01, 0.0, 0.0], -1.0, role="validation"), "are elsewhere"),
+    Mistake("arm_4 gain before", gain(4, 0.03, "validation"), "arm_4_joint slipped"),
 )
 
 
