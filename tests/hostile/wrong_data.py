@@ -263,7 +263,7 @@ def lost_readings(joint: int, share: float, length: float) -> Spoil:
         one = next(name for name, after in rows.items() if after.any())
 
         def of_trial(trial: Trial, name: str) -> Trial:
-            q, first = trial.q_motor.copy(), int(np.argmax(rows[name]))
+            q, first = trial.q_motor.copy(), int(np.argmax(rows[name])) + 200  # inside the trial
             q[first : first + int(length * 100) if name == one else first, joint] = np.nan
             return replace(trial, q_motor=q)
 
