@@ -169,6 +169,13 @@ def settle(out: Path | str) -> None:
                 shutil.rmtree(found, ignore_errors=True)
 
 
+def settle_inputs(*places: Path | str) -> None:
+    """Settle folders that are read, and those they lie in."""
+    for place in places:
+        settle(place)
+        settle(Path(place).resolve().parent)
+
+
 def _is_remnant(name: str) -> bool:
     """Whether it is a file or folder of this program that a killed process left half written."""
     return name.startswith(".") and name.endswith((".part", ".partial"))

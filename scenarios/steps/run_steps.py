@@ -84,8 +84,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
     Raises:
         ScenarioError: `out` must not be overwritten.
         TwinError: The simulation failed.
-        NotEnoughData, NotCalibrated, NumericalFailure: The data do not allow a result that may be used; the folder
-            keeps the recordings, and a report of why.
+        NotEnoughData, NotCalibrated, NumericalFailure: No usable result; the folder keeps recordings and reasons.
     """
     from calibration.errors import NotCalibrated, NotEnoughData, NumericalFailure
 
@@ -143,8 +142,7 @@ def calibrate(
     unknown = [name for name in stages or () if name not in STAGES]
     if unknown:
         raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
-    folder.settle(dataset)
-    folder.settle(Path(dataset).resolve().parent)
+    folder.settle_inputs(dataset)
     with folder.replacing(out, folder.ESTIMATE) as new, one_blas_thread():
         return _calibrate(Path(dataset), new, stages, options, progress, plan_next, cross_validate=stages is None)
 
@@ -180,9 +178,7 @@ def evaluate(
 
     `estimate` is an estimate folder, an estimate.json, a URDF with its `zeros`, or predicted poses (.csv, .nc).
     """
-    for place in (estimate, dataset):
-        folder.settle(place)
-        folder.settle(Path(place).resolve().parent)
+    folder.settle_inputs(estimate, dataset)
     with folder.updating(out, folder.EVALUATION, "evaluation.json") as new, one_blas_thread():
         truth = None if truth is None else Path(truth)
         return _evaluate(Path(estimate), Path(dataset), new, truth, progress, zeros)
@@ -194,7 +190,7 @@ def report(run_folder: Path | str, progress: Progress = silent) -> Path:
     Raises:
         ScenarioError: The folder holds no evaluation, or a file that cannot be read.
     """
-    folder.settle(run_folder)
+    folder.settle_inputs(run_folder)
     _report(Path(run_folder), progress)
     return Path(run_folder) / "report.html"
 
