@@ -142,8 +142,7 @@ class Unexplained:
 def unexplained(hand: HandModel, model: Model, x: Passed) -> Unexplained:
     """Residuals of samples x of a hand with the values of an estimated model."""
     known = [k for k, p in enumerate(model.parameters) if p.name in hand.names]
-    random = model.random if len(model.random) else model.covariance
-    names, covariance = [model.parameters[k].name for k in known], random[np.ix_(known, known)]
+    names, covariance = [model.parameters[k].name for k in known], model.random_covariance[np.ix_(known, known)]
     tau = hand.chain.gravity_torques(hand.angles(x.q))
     gears = [n for kind in (Compliance, BacklashPreload) for n in hand.block(kind).names if n not in names]
     at = hand.poses_and_derivatives(x.q, tau, (*names, *gears))

@@ -95,11 +95,13 @@ def load_estimate(path: Path | str, zeros: Path | str | None = None) -> Estimate
     urdf = checked_urdf(read_text(nominal), nominal) if nominal.is_file() else None
     suggested = file.parent / NEXT
     remedies = read_plans(suggested)[1] if suggested.is_file() else ()
-    covariances = _read_covariances(file.parent / COVARIANCES)
+    every, random = (_read_covariances(file.parent / COVARIANCES, name) for name in ("covariance", "random"))
     try:
-        return replace(to_estimate(found, urdf, covariances), remedies=remedies)
+        estimate = to_estimate(found, urdf, every)
     except (ValueError, IndexError, KeyError, TypeError) as error:
         raise InputError(file, f"its arrays do not fit each other ({error}); write the estimate again") from error
+    models = tuple(replace(m, random=random.get(m.name, m.random)) for m in estimate.models)
+    return replace(estimate, models=models, remedies=remedies)
 
 
 def _replace_text(path: Path, text: str) -> None:
@@ -118,14 +120,17 @@ def _write_covariances(path: Path, estimate: Estimate) -> None:
             netcdf.write_labels(group, {"parameter": tuple(p.name for p in model.parameters)})
             units = {"units": "product of the two parameters' units"}
             netcdf.write_variable(group, "covariance", model.covariance, ("parameter", "parameter"), "f8", units)
+            if len(model.random):
+                netcdf.write_variable(group, "random", model.random_covariance, ("parameter", "parameter"), "f8", units)
     os.replace(part, path)
 
 
-def _read_covariances(path: Path) -> dict[str, np.ndarray]:
+def _read_covariances(path: Path, name: str = "covariance") -> dict[str, np.ndarray]:
+    """Of the models that have it."""
     if not path.is_file():
         return {}
     with netcdf.opened(path, "write the estimate again") as file:
-        return {name: netcdf.array(group, "covariance") for name, group in file.groups.items()}
+        return {m: netcdf.array(group, name) for m, group in file.groups.items() if name in group.variables}
 
 
 def calibrated_urdf(urdf: str, chain: Chain) -> str:

@@ -63,7 +63,7 @@ class Model:
         rank: Number of identifiable combinations; 0 where not known.
         condition: Condition number of the scaled whitened Jacobian [-]; 0 where not known.
         hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
-        random: (p, p) covariance by random errors alone; empty where `covariance` counts nothing else.
+        random: Covariance of the first parameters by random errors alone; empty where there is nothing else.
         absorption: How much of each class of defect its parameters swallow; None where not computed.
     """
 
@@ -78,6 +78,13 @@ class Model:
     hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
     random: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     absorption: Absorption | None = None
+
+    @property
+    def random_covariance(self) -> np.ndarray:
+        """(p, p) by random errors alone: what a model leaves out moves parameters and predictions together."""
+        found, p = self.covariance.copy(), len(self.random)
+        found[:p, :p] = self.random
+        return found
 
     def value(self, name: str, default: float) -> float:
         """Estimate of a parameter, `default` where the model has none of that name."""

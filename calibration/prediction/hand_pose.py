@@ -88,4 +88,4 @@ def uncertain(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarra
     if arm:
         vector = np.array([model.parameters[i].value for i in arm])
         G[np.ix_([names.index(name) for name in placement], arm)] = placement_derivative(chain, vector)
-    return names, np.asarray(G @ model.covariance @ G.T)
+    return names, np.asarray(G @ model.random_covariance @ G.T)

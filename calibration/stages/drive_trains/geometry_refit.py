@@ -90,7 +90,8 @@ def refit_geometry(
     robot_hand = hand_model(chain, nominal_frames(chain, description))
     found = fit_robustly(robot_hand, parameters, postures, errors)
     departed = with_departures(robot_hand, parameters, found.fit, postures.rows(found.kept))
-    model = replace(model_of("full", chain, parameters, departed.fit), absorption=departed.absorbed)
+    model = model_of("full", chain, parameters, departed.fit)
+    model = replace(model, random=found.fit.covariance, absorption=departed.absorbed)
     fitted = hand_of(model, chain, nominal_frames(chain, description))
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset
