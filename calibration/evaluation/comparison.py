@@ -54,8 +54,8 @@ class Comparison:
 
 
 def comparisons(traces: Sequence[TrialErrors]) -> Iterator[Comparison]:
-    """The pairs that the ladder is built on, as far as they are there."""
-    present = {(t.model, t.base) for t in traces if t.encoder == "motor"}
+    """The pairs that the ladder is built on, as far as they are there in trials that move."""
+    present = {(t.model, t.base) for t in traces if t.encoder == "motor" and t.kind != "static"}
     for a, b, moves_base_only in _pairs():
         if a in present and b in present:
             found = compare(traces, a, b)
