@@ -204,7 +204,7 @@ def wrong_mounts(hand: HandModel, model: Model, description: Description) -> Ite
                 f"{np.degrees(np.linalg.norm(off[3:])):.1f} deg from where they are drawn on {body.link}, {over:.0f} "
                 "times the tolerance: correct the drawing or the placement in dataset.json"
             )
-            yield Verdict(STAGE, "refused" if over > 2.0 * _MOUNTED else "warning", message)
+            yield Verdict(STAGE, "refused" if over > 1.5 * _MOUNTED else "warning", message)
 
 
 def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Verdict]:
