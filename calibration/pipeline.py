@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from calibration.breakdown import Breakdowns
-from calibration.checks.changes import changes, exchanged_sides, passed, unexplained, wrong_mounts
+from calibration.checks.changes import changes, exchanged_sides, wrong_mounts
 from calibration.checks.recordings import judged
 from calibration.checks.trial_times import listed_twice
+from calibration.checks.unexplained import passed, unexplained
 from calibration.context import Context, with_postures
 from calibration.design.next_motions import drive_next, sweeps_next, swings_next
 from calibration.design.next_postures import record_next

@@ -99,8 +99,7 @@ class Predictor:
     def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
         """Predictions of posture means, one a posture in `t`: the base measured or its markers' own frame, motor side.
 
-        A model of the joints' hysteresis needs the motion before a posture, which means do not show; drive trains are
-        taken to be at rest.
+        Means show no motion before a posture: drive trains are taken to be at rest.
         """
         T_lab_B = poses_of_means(self.description.base_body, means).T
         for row, hand, encoder in self._rows():
@@ -120,13 +119,8 @@ class Predictor:
         theirs = [row_of(name) for name in self.models if all(name != row.name for row in LADDER)]
         for row in (*ours, *theirs):
             for encoder in row.encoders:
-                if encoder == "motor" or not row.bundle or self._link_encoders:
+                if encoder == "motor" or not row.bundle or (self.bundled and self.bundled.knows_link_encoders):
                     yield row, self.models[row.name], encoder
-
-    @property
-    def _link_encoders(self) -> bool:
-        """Whether errors of link encoders were identified with the drive trains."""
-        return self.bundled is not None and any(np.isfinite(train.link).all() for train in self.bundled.trains.trains)
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times."""

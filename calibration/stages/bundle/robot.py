@@ -84,6 +84,11 @@ class BundledRobot:
         found = corrected_trial(self.trains, trial, None, self.hand)
         return found if encoder == "motor" else by_link_encoders(self.trains, found)
 
+    @property
+    def knows_link_encoders(self) -> bool:
+        """Whether errors of link encoders were identified with the drive trains."""
+        return any(np.isfinite(train.link).all() for train in self.trains.trains)
+
     def knows(self, source: Source) -> bool:
         """Whether the base's motion was identified from that source."""
         return self.stick_slip is not None and source in [d.source for d in self.stick_slip.directions]

@@ -55,7 +55,7 @@ def test_a_failed_clip_leaves_the_old_file_and_nothing_else(run_folder, tmp_path
     out.parent.mkdir()
     out.write_text("old")
 
-    def fails(lab, trial, part, options):
+    def fails(lab, trial, part, options, progress):
         part.write_text("half")
         raise NothingToShow("nothing")
 
