@@ -84,7 +84,7 @@ def _shown(description: Description, file: str, trial: Trial | PostureMeans) -> 
 
 
 def _odd_one(chain: Chain, shown: Sequence[Shown]) -> tuple[str, str] | None:
-    """The one file that the frames of all others do not fit, and what is to be said of it."""
+    """The one file that the frames of all others do not fit, and the verdicts on it."""
     if len(shown) < 2 or not all(x.oriented for x in shown):
         return None
     most = max(_FEWEST, _POSES // len(shown))

@@ -112,5 +112,5 @@ def _reason(measured: Sequence[str], j: int, motor: np.ndarray, link: np.ndarray
     if follows.any() and not follows[j]:
         return f": it follows {measured[int(np.argmax(follows))]}"
     slope = covariance[j] / max(float(spread[j]) ** 2, np.finfo(float).tiny)
-    said = [text for value, text in _SLOPES if abs(slope - value) < _NEAR * max(abs(value), 1.0)]
-    return f": {said[0]}" if said else " (sign, unit, whole turns, order of the joints?)"
+    named = [text for value, text in _SLOPES if abs(slope - value) < _NEAR * max(abs(value), 1.0)]
+    return f": {named[0]}" if named else " (sign, unit, whole turns, order of the joints?)"

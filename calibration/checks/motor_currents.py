@@ -1,11 +1,11 @@
-"""Motor currents whose columns are swapped or reversed, told by what gravity asks of each joint at rest.
+"""Motor currents whose columns are swapped or reversed, identified by what gravity asks of each joint at rest.
 
     e_j = tau_j(q) / k_j + friction + constant          r_jm = correlation of e_j with tau_m over postures at rest
 
 tau the nominal robot's gravity torques, k_j > 0 gear and motor, which nobody needs to know. Of the twin's robots r_jj
 is 0.96 and more, 0.3 where a harness pulls at the joint; a reversed current has r_jj near -1, another joint's follows
 that one's torque instead. Joints that carry nothing (about the vertical, or the hand's own axis) have no r_jj; at few
-postures chance alone has a large one: then nothing is said. Each file is judged by itself, then all together.
+postures chance alone has a large one: then nothing is reported. Each file is judged by itself, then all together.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,16 +37,18 @@ def check_currents(chain: Chain, trials: Sequence[tuple[str, Trial | PostureMean
     logged = [(file, t) for file, t in trials if isinstance(t, Trial) and np.isfinite(t.effort).any()]
     at_rest = [_at_rest(trial) for _, trial in logged]
     problems = [
-        InputError(file, said) for (file, _), x in zip(logged, at_rest, strict=True) if (said := _said(chain, [x]))
+        InputError(file, message)
+        for (file, _), x in zip(logged, at_rest, strict=True)
+        if (message := _said(chain, [x]))
     ]
     if problems:
         raise InputErrors(problems)
-    if said := _said(chain, at_rest):
-        raise InputError(f"{logged[0][0]} and {len(logged) - 1} more", said)
+    if message := _said(chain, at_rest):
+        raise InputError(f"{logged[0][0]} and {len(logged) - 1} more", message)
 
 
 def _said(chain: Chain, at_rest: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
-    """What is to be said of the currents of these files, if anything."""
+    """What is wrong with the currents of these files, if anything."""
     q, effort = (np.concatenate(x) for x in zip(*at_rest, strict=True)) if at_rest else (np.zeros((0, 0)),) * 2
     if len(q) < _FEWEST:
         return ""

@@ -76,9 +76,9 @@ class Prospect:
 
     def sigma(self, C: np.ndarray) -> np.ndarray:
         """(p,) standard deviations of the parameters at covariance C of x [m, rad]."""
-        told = np.einsum("pr,rs,ps->p", self.V, C, self.V)
-        untold = 1.0 - (self.V**2).sum(axis=1)
-        return np.asarray(self.scale * np.sqrt(np.maximum(told + untold, 0.0)))
+        expected = np.einsum("pr,rs,ps->p", self.V, C, self.V)
+        outside = 1.0 - (self.V**2).sum(axis=1)
+        return np.asarray(self.scale * np.sqrt(np.maximum(expected + outside, 0.0)))
 
     def hand(self, C: np.ndarray, m: np.ndarray | None = None) -> np.ndarray:
         """(e,) root mean square error of the hand's position at covariance C of x, nuisances pulling by m [m]."""
@@ -171,15 +171,20 @@ class Departures:
 
 
 def departing(
-    told: Prospect, model: HandModel, description: Description, play: np.ndarray, departures: Departures, at: np.ndarray
+    expected: Prospect,
+    model: HandModel,
+    description: Description,
+    play: np.ndarray,
+    departures: Departures,
+    at: np.ndarray,
 ) -> Prospect:
     """A prospect of the hand at postures `at`, with nuisances that its fit does not ask for."""
-    found = model.poses_and_derivatives(told.q, names=())
+    found = model.poses_and_derivatives(expected.q, names=())
     W, *_ = _whitened(found, description, play)
-    G = departures.effects(model, told.q)
+    G = departures.effects(model, expected.q)
     if W.shape[1] == 3:
         G = moved(found.T[:, :3, :3], G, description.hand_body.point)
-    return replace(told, H=W @ G, Z=departures.effects(model, at)[:, :3])
+    return replace(expected, H=W @ G, Z=departures.effects(model, at)[:, :3])
 
 
 def departures_of(chain: Chain, q: np.ndarray) -> Departures:

@@ -21,9 +21,9 @@ An element's standard deviation is the jackknife's over n trials. With m more tr
 
     after = before sqrt(n / (n + m))
 
-and the element is told when that is below its share of the diagonal pair (`suspension_parameters`). On an axis whose
-motion springs do not explain, because wheels slip there, no number of trials tells a spring. Nor does one total wrench
-tell the wheels apart: that takes a plate under each.
+and the element is identified when that is below its share of the diagonal pair (`suspension_parameters`). On an axis
+whose motion springs do not explain, because wheels slip there, no number of trials identifies a spring. Nor does one
+total wrench separate the wheels: that takes a plate under each.
 """
 
 from collections.abc import Sequence
@@ -82,9 +82,9 @@ def drive_next(
     sigma = tuple(Sigma(p.name, p.unit, before[a], p.sigma) for a, p in rows if p.sigma < 0.99 * before[a])
     why = f"{name} is held at its drawing in what only a {' and a '.join(m.kind for m in motions)} tell"
     remedy = ExperimentPlan(STAGE, why, motions=motions, sigma=sigma)
-    told = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in sigma)
+    expected = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in sigma)
     steps = " and ".join(f"a {m.kind} of {m.rests} rests" for m in motions)
-    return remedy, (Verdict(STAGE, "warning", f"{why}; {steps} would, in record_next.yaml: {told}"),)
+    return remedy, (Verdict(STAGE, "warning", f"{why}; {steps} would, in record_next.yaml: {expected}"),)
 
 
 def _planned(
@@ -141,18 +141,20 @@ def sweeps_next(models: Sequence[JointModel]) -> tuple[ExperimentPlan | None, tu
             sigma.append(Sigma(f"sigmoid.{model.joint}.rho", "s/rad", float(before), after))
         else:
             beyond.append(model.joint)
-    said = []
+    verdicts = []
     if beyond:
         message = (
             f"rho of {', '.join(beyond)}: no sweep identifies it, the flanks are too near each other for the noise"
         )
-        said.append(Verdict(_JOINTS, "warning", message))
+        verdicts.append(Verdict(_JOINTS, "warning", message))
     if not motions:
-        return None, tuple(said)
+        return None, tuple(verdicts)
     why = f"rho is not identifiable in {', '.join(m.joint for m in motions)}"
-    told = ", ".join(f"{s.name} {s.before:.0f} -> {s.after:.2g} {s.unit}" for s in sigma)
-    said.append(Verdict(_JOINTS, "warning", f"{why}; to identify it, record the sweeps in record_next.yaml: {told}"))
-    return ExperimentPlan(_JOINTS, why, motions=tuple(motions), sigma=tuple(sigma)), tuple(said)
+    expected = ", ".join(f"{s.name} {s.before:.0f} -> {s.after:.2g} {s.unit}" for s in sigma)
+    verdicts.append(
+        Verdict(_JOINTS, "warning", f"{why}; to identify it, record the sweeps in record_next.yaml: {expected}")
+    )
+    return ExperimentPlan(_JOINTS, why, motions=tuple(motions), sigma=tuple(sigma)), tuple(verdicts)
 
 
 def sweep(model: JointModel) -> Motion:
@@ -195,27 +197,27 @@ def swings_next(suspension: Suspension) -> tuple[ExperimentPlan | None, tuple[Ve
             elif name in open_:
                 ratio = open_[name].sigma / (KNOWN * root[i] * root[j])
                 needed[name] = int(np.ceil(n * max(0.0, ratio**2 - 1.0))) + 1
-    said = []
+    verdicts = []
     if slipping:
         axes = ", ".join(name for name, slip in zip(AXES, slips, strict=True) if slip)
         message = (
             f"{len(slipping)} elements of K and C: the motion excites no spring along {axes}: these slip or hardly move"
         )
-        said.append(Verdict(_SUSPENSION, "warning", message))
+        verdicts.append(Verdict(_SUSPENSION, "warning", message))
     wheels = [name for name in open_ if name not in needed and name not in slipping]
     if wheels:
         message = (
             f"{', '.join(wheels)}: the total wrench does not distinguish the wheels; a plate under each wheel would"
         )
-        said.append(Verdict(_SUSPENSION, "warning", message))
+        verdicts.append(Verdict(_SUSPENSION, "warning", message))
     within = {name: m for name, m in needed.items() if m <= _MOST * n}
     if not within:
-        return None, tuple(said)
+        return None, tuple(verdicts)
     m = max(within.values())
     share = float(np.sqrt(n / (n + m)))
     sigma = tuple(Sigma(x, open_[x].unit, open_[x].sigma, share * open_[x].sigma) for x in within)
     why = f"not identifiable: {', '.join(within)}"
-    said.append(
+    verdicts.append(
         Verdict(
             _SUSPENSION,
             "warning",
@@ -223,4 +225,4 @@ def swings_next(suspension: Suspension) -> tuple[ExperimentPlan | None, tuple[Ve
         )
     )
     motions = (Motion("swing", repeats=m, frequency=_HERTZ, seconds=_SECONDS),)
-    return ExperimentPlan(_SUSPENSION, why, motions=motions, sigma=sigma), tuple(said)
+    return ExperimentPlan(_SUSPENSION, why, motions=motions, sigma=sigma), tuple(verdicts)

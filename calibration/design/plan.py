@@ -24,7 +24,7 @@ from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.parameters import full_parameters, hand_model, reading_floor, reading_sigma
 
-_ANYWHERE = 200  # postures from which largest torques are told
+_ANYWHERE = 200  # postures from which largest torques are determined
 _RANDOM = 100  # sets of random postures the design is compared with
 _FRESH = 300  # postures the comparison predicts the hand at
 Sample = Callable[[int, np.random.Generator], np.ndarray]
@@ -59,10 +59,10 @@ class Task:
 
     def prospect(self, q: np.ndarray, at: np.ndarray) -> Prospect:
         """What candidates q tell of the hand at other postures."""
-        told = prospect(self.model, self.parameters, self.room.description, self.reading_sigma, q, at, self.known)
+        expected = prospect(self.model, self.parameters, self.room.description, self.reading_sigma, q, at, self.known)
         if self.departures is None:
-            return told
-        return departing(told, self.model, self.room.description, self.reading_sigma, self.departures, at)
+            return expected
+        return departing(expected, self.model, self.room.description, self.reading_sigma, self.departures, at)
 
     def sample(self, n: int, rng: np.random.Generator) -> np.ndarray:
         """Postures (n, n_measured) like those the robot works in."""
@@ -151,8 +151,8 @@ class Plan:
         """The postures with the standard deviations of these parameters (all, where none is named)."""
         p, prospect_ = self.task.parameters, self.design.prospect
         rows = zip(p.names, p.units, prospect_.sigma(prospect_.C), prospect_.sigma(self.design.C), strict=True)
-        told = tuple(Sigma(n, u, float(a), float(b)) for n, u, a, b in rows if names is None or n in names)
-        return ExperimentPlan(stage, why, self.postures, sigma=told)
+        expected = tuple(Sigma(n, u, float(a), float(b)) for n, u, a, b in rows if names is None or n in names)
+        return ExperimentPlan(stage, why, self.postures, sigma=expected)
 
 
 def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> Plan:

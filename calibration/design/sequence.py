@@ -7,12 +7,12 @@ flanks of all postures into the error
     x = C sum_i B_i' J_i diag(h) s_i,     x' C^-1 x = | sum_ij s_ij g_ij |^2,     g_ij = L' B_i' J_ij h_j,   C = L L'
 
 Signs are turned one by one, the best first, until none makes the sum shorter: half of the approaches from either side,
-and those halves told apart by no parameter.
+and those halves separated by no parameter.
 
 The order in which postures are recorded: each followed by the nearest one that can be reached without contact.
 
 Moves are straight in the joints. Where no posture that is left can be reached so, the nearest is taken and the move is
-told: somebody has to look, or to put a posture in between.
+so: somebody has to look, or to put a posture in between.
 """
 
 from dataclasses import dataclass
@@ -112,8 +112,8 @@ def _elsewhere(
         return order, contact
     for k in (k for k in range(1, len(rest)) if k != place and k not in contact):
         if clear(q[rest[k - 1]], q[i], shapes) and clear(q[i], q[rest[k]], shapes):
-            told = [c - (c > place) for c in contact if c != place]
-            return [*rest[:k], i, *rest[k:]], [c + (c >= k) for c in told]
+            shifted = [c - (c > place) for c in contact if c != place]
+            return [*rest[:k], i, *rest[k:]], [c + (c >= k) for c in shifted]
     return order, contact
 
 

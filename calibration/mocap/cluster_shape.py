@@ -5,7 +5,7 @@ Median squared distances between markers over all postures give coordinates by c
     B = -1/2 H D H,   X = eigenvectors of B, largest three, times the roots of their values        H centres
 
 then the mean of the clusters laid upon each other. Origin at the mean marker, axes along the principal ones. A posture
-whose cluster does not fit the shape has a label swapped or a ghost in it: it is told by its misfit.
+whose cluster does not fit the shape has a label swapped or a ghost in it: it is identified by its misfit.
 Reference: Torgerson, Psychometrika 1952; Gower, Psychometrika 1975.
 
 How much the markers of a body move against each other within a trial: mounts give way, cameras lose and find them.

@@ -13,7 +13,7 @@ import numpy as np
 from calibration.mocap.measured_trial import MeasuredTrial
 
 _MARGIN = 0.2  # [s] left out at both ends of a dwell, a quarter of it at most
-_SETTLES = 1e-2  # [m]; 4 mm are what is left of a soft base's sway in a dwell of 0.8 s
+_SETTLES = 1e-2  # [m]; 4 mm are what is left of a soft base's response in a dwell of 0.8 s
 
 
 def inner_windows(dwells: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ markers are masked at that instant. A single foreign marker is masked alone wher
 drawing that is off raises the limit to three times the trial's usual misfit. For exchanges that keep the shape see
 `label_jumps`.
 
-Exchanges of labels that keep a body's shape: told by markers that jump, set right by the order that did not.
+Exchanges of labels that keep a body's shape: identified by markers that jump, set right by the order that did not.
 
     d(P) = rms |p_k[a] - p_k-1[P(a)]|, labels a          angle(R_P) > w dt,  x_P(a) ~ R_P x_a + c
 
@@ -76,8 +76,8 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
         position[:, columns] = after
         n_masked = int(np.isnan(after[rows]).all(axis=(1, 2)).sum())
         done.append(Relabelled(body.name, len(rows) - n_masked, n_masked))
-        told = "%s: labels of body %r exchanged: %d frames set right, %d masked"
-        _log.warning(told, trial.id, body.name, len(rows) - n_masked, n_masked)
+        text = "%s: labels of body %r exchanged: %d frames set right, %d masked"
+        _log.warning(text, trial.id, body.name, len(rows) - n_masked, n_masked)
     return (replace(trial, marker_position=position) if done else trial), tuple(done)
 
 

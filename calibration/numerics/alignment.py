@@ -89,7 +89,7 @@ def start(M: np.ndarray, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if len(M) < 3 or turns[1] < _TURNED * turns[0]:
         raise NotEnoughData(
             f"{len(M)} postures turn the arm about one axis only; a turn of arm base "
-            "and tool about it cannot be told apart"
+            "and tool about it cannot be determined apart"
         )
     R_X = nearest_rotations((a.T @ b)[None])[0]
     R_Y = Rotation.from_matrix(np.swapaxes(R_X @ A[:, :3, :3], 1, 2) @ M[:, :3, :3]).mean().as_matrix()

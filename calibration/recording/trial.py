@@ -1,6 +1,6 @@
 """The recording format: a trial as arrays with their clocks, and its netCDF4 file.
 
-A recording holds what instruments said, never what was true: it has no field for truth.
+A recording holds what instruments measured, never what was true: it has no field for truth.
 Each instrument keeps its own clock; t_mocap = t_i (1 + drift_i) + offset_i is estimated later.
 
     t_robot (n,)    q_motor, q_link, v_motor, effort, q_command (n, joint), wrist_wrench (n, 6)

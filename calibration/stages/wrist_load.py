@@ -177,7 +177,7 @@ def weighed(
     hand: HandModel,
     postures: Postures,
 ) -> tuple[Verdict, ...]:
-    """What is to be said of the load of the hand; nothing where no wrist was recorded.
+    """Verdicts on the load of the hand; nothing where no wrist was recorded.
 
     Args:
         lab: Nominal robot and setup, its payload that of these trials.

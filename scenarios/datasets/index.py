@@ -2,7 +2,7 @@
 
     id, split, status, reason, sha256, simulated_s, bytes, then the figures of the runs
 
-`status` is ok, failed (its simulation or fit said why) or killed (it took its worker down). Nothing in it depends on
+`status` is ok, failed (its simulation or fit stopped, with the reason) or killed (it took its worker down). Nothing in it depends on
 how long the work took or who did it.
 """
 

@@ -62,8 +62,8 @@ def _below(
     for key, value in node.items() if isinstance(node, dict) else enumerate(node):
         fields = [field for schema in schemas for field in inner_schemas(schema, str(key))]
         below = [member for field in fields for member in member_schemas(field, root, value)]
-        said = {"text": known.get(str(key), about.get("text", "")), "default": _default(fields)}
-        yield from _below(root, value, below, (*path, str(key)), said)
+        described = {"text": known.get(str(key), about.get("text", "")), "default": _default(fields)}
+        yield from _below(root, value, below, (*path, str(key)), described)
 
 
 def _default(fields: list[Schema]) -> str:

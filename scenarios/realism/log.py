@@ -19,7 +19,7 @@ from calibration.errors import NotEnoughData
 from calibration.mocap import body_poses, free, relabelled_trial, shape_change
 from calibration.numerics.signals import CUTOFF, Signal, low_passed
 from calibration.recording import Clock, Dataset, Description, Trial
-from calibration.stages.suspension import Rest, plate_load, rest_of, sway_of
+from calibration.stages.suspension import Rest, base_response_of, plate_load, rest_of
 
 REST = slice(100, 150)
 """Samples of a trial's rest that displacements are told from: of the log's second second, since its markers step by
@@ -106,10 +106,10 @@ def recorded(dataset: Dataset) -> tuple[Recorded, ...]:
 def _trial(description: Description, trial: Trial) -> Recorded:
     same = Clock("plate", 0.0, 0.0, np.zeros((2, 2)), 0.0, 0.0)
     rest = rest_of(description, trial, np.eye(4))
-    sway = sway_of(description, trial, rest, plate_load(trial, same, rest.T_lab_0, _WRENCH))
-    body, forcing = description.base_body, sway.forcing
+    response = base_response_of(description, trial, rest, plate_load(trial, same, rest.T_lab_0, _WRENCH))
+    body, forcing = description.base_body, response.forcing
     shape = shape_change(body, trial)
     change = referred(CubicSpline(shape.t, shape.x)(forcing.t))
     markers = np.array([m.xyz for m in body.markers if m.name in trial.marker])
     t = forcing.t - forcing.t[0]
-    return Recorded(trial.id, t, _LEVEL * forcing.rest, forcing.w, referred(sway.x), markers, rest, change)
+    return Recorded(trial.id, t, _LEVEL * forcing.rest, forcing.w, referred(response.x), markers, rest, change)

@@ -36,8 +36,8 @@ class Condition:
     @property
     def name(self) -> str:
         """In words."""
-        said = ["markers shift"] * self.shifting + ["casters turn"] * self.turning
-        return ", ".join(said) or "as drawn"
+        causes = ["markers shift"] * self.shifting + ["casters turn"] * self.turning
+        return ", ".join(causes) or "as sampled"
 
 
 AS_DRAWN = Condition()

@@ -80,7 +80,7 @@ class YawFromMoment:
 
 
 @dataclass(frozen=True)
-class Sway:
+class SwingResponse:
     """Base and wrench of a trial on one even grid.
 
     Attributes:
@@ -100,7 +100,7 @@ class Sway:
         return low_passed(Signal(self.t, x, np.ones(len(x), dtype=bool)), _SLOW).x
 
 
-def swung(config: TwinConfig, seed: int) -> Sway:
+def swung(config: TwinConfig, seed: int) -> SwingResponse:
     """Simulate and measure a swing of one drawn robot; how the arm carries the hand, and the ramp, are drawn too."""
     rng = generator(seed, "arm")
     path = AS_LOGGED[int(rng.integers(len(AS_LOGGED)))]
@@ -109,10 +109,10 @@ def swung(config: TwinConfig, seed: int) -> Sway:
     motion = motions.swing("as_logged", "validation", "swing", path, c.validation_swing, c)
     trial, _ = measure(lab, motion, simulate(lab.twin, motion, lab.T_lab_base), EPOCH)
     clock = lab.config.instruments.plate_clock
-    return sway(trial, trial.t_plate * (1.0 + clock.drift) + clock.offset)
+    return swing_response(trial, trial.t_plate * (1.0 + clock.drift) + clock.offset)
 
 
-def sway(trial: Trial, t_plate: np.ndarray) -> Sway:
+def swing_response(trial: Trial, t_plate: np.ndarray) -> SwingResponse:
     """Base and wrench of a trial whose plate's samples were at t_plate [s, mocap clock]."""
     base = trial.marker_position[:, trial.markers_of("base")]
     centroid = base.mean(axis=1)
@@ -125,10 +125,10 @@ def sway(trial: Trial, t_plate: np.ndarray) -> Sway:
     t_block = t_plate[:n].reshape(-1, size).mean(axis=1)
     blocks = trial.plate_wrench[:n, 0].reshape(-1, size, 6).mean(axis=1)
     wrench = np.stack([np.interp(trial.t_mocap, t_block, column) for column in blocks.T], axis=1)
-    return Sway(trial.t_mocap - trial.t_mocap[0], np.array(turned), centroid - at_rest.mean(axis=0), wrench)
+    return SwingResponse(trial.t_mocap - trial.t_mocap[0], np.array(turned), centroid - at_rest.mean(axis=0), wrench)
 
 
-def figures(s: Sway, rest: float) -> Figures:
+def figures(s: SwingResponse, rest: float) -> Figures:
     """The figures of a swing between two rests of `rest` [s]."""
     steady = (s.t > rest + _TRANSIENT) & (s.t < s.t[-1] - rest - 1.0)
     calm, load = s.slow(s.rotation)[steady], s.slow(s.wrench)

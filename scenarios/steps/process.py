@@ -1,4 +1,4 @@
-"""From laboratory files or a dataset to everything that can be said of them, in one folder.
+"""From laboratory files or a dataset to everything that can be computed from them, in one folder.
 
 mapping.yaml -> dataset/ -> estimate/, report.html; evaluation.json where validation trials were recorded
 """

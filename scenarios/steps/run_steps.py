@@ -129,7 +129,7 @@ def calibrate(
         dataset: A dataset folder, the twin's or a real one.
         out: The estimate folder; an earlier one there is replaced.
         stages: Only these; None runs every stage.
-        progress: Told how far it is.
+        progress: Called with how far it is.
         options: What is chosen; None: the defaults.
         plan_next: Whether to search for what to record next.
 

@@ -84,16 +84,16 @@ def plate_of(file: C3dFile, mapped: C3dPlateMap, factor: float, analogs: np.ndar
 def _moment_unit(file: C3dFile, chosen: np.ndarray, mapped: C3dPlateMap, kind: int, factor: float) -> float:
     """Moments' unit in N.m: of the channels where they are forces, of the mapping where the file is silent."""
     units = file.parameter("ANALOG", "UNITS", [])
-    said = {units[c] for c in chosen if c < len(units)} if kind == 2 else set()
-    forces, moments = said & {"N"}, {MOMENT_NAMES[u] for u in said if u in MOMENT_NAMES}
-    strange = said - {"N"} - MOMENT_NAMES.keys() - {""}
+    stated = {units[c] for c in chosen if c < len(units)} if kind == 2 else set()
+    forces, moments = stated & {"N"}, {MOMENT_NAMES[u] for u in stated if u in MOMENT_NAMES}
+    strange = stated - {"N"} - MOMENT_NAMES.keys() - {""}
     if strange:
-        raise InputError(file.path, f"ANALOG:UNITS of plate {mapped.number} are {sorted(said)}, expected N and N.mm")
+        raise InputError(file.path, f"ANALOG:UNITS of plate {mapped.number} are {sorted(stated)}, expected N and N.mm")
     declared = {mapped.moment_unit} if mapped.moment_unit else set()
     if len(moments | declared) != 1 or (kind == 2 and not forces and not declared):
         raise InputError(
             file.path,
-            f"plate {mapped.number}: ANALOG:UNITS say {sorted(said) or 'nothing'} and the mapping "
+            f"plate {mapped.number}: ANALOG:UNITS say {sorted(stated) or 'nothing'} and the mapping "
             f"{mapped.moment_unit or 'nothing'} of its moments; map the right `moment_unit`",
         )
     return MOMENTS[(moments | declared).pop()]

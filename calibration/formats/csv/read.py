@@ -1,6 +1,6 @@
 """CSV files of one trial, read by the tables of the mapping: samples on a clock, or static postures.
 
-A CSV file as named columns of numbers; what is wrong in it is told by line and column.
+A CSV file as named columns of numbers; what is wrong in it is identified by line and column.
 """
 
 import csv

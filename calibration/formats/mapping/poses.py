@@ -131,7 +131,7 @@ def _others(B: np.ndarray, order: str) -> Iterator[tuple[str, np.ndarray]]:
         yield "angle_unit: deg", compose(rotations(np.radians(numbers), order), p)
     yield "rotations of the lab in the body (transposed)", compose(np.swapaxes(B[:, :3, :3], 1, 2), p)
     yield "poses of the lab in the body (inverted)", inverse(B)
-    S = _MIRRORS["x"]  # which axis is mirrored cannot be told: the frames' rotations are free
+    S = _MIRRORS["x"]  # which axis is mirrored cannot be determined: the frames' rotations are free
     yield "a left-handed frame, one axis mirrored", compose(S @ B[:, :3, :3] @ S, p @ S)
     for axis, S in _MIRRORS.items():
         yield f"positions with {axis} of opposite sign", compose(B[:, :3, :3], p @ S)

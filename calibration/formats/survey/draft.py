@@ -51,8 +51,13 @@ def _setup(session: Session, wheels: str | None) -> Iterator[str]:
     joints = [r.joints for r in session.trials.values() if r.joints is not None]
     linked = [n for n in names if any(np.isfinite(j.q_link[:, j.names.index(n)]).any() for j in joints if n in j.names)]
     rate = float(np.median([1.0 / np.median(np.diff(j.t)) for j in joints])) if joints else 100.0
-    said = {"names": list(names), "prismatic": robot.prismatic(names), "link_encoders": linked, "rate": round(rate, 1)}
-    yield f"joints: {flow({k: v for k, v in said.items() if v})}"
+    entries = {
+        "names": list(names),
+        "prismatic": robot.prismatic(names),
+        "link_encoders": linked,
+        "rate": round(rate, 1),
+    }
+    yield f"joints: {flow({k: v for k, v in entries.items() if v})}"
     if wheels is not None:
         yield f"wheels: {flow(wheels)}"
     plates = _plates(session)

@@ -7,7 +7,7 @@ computed: a body of markers carries all links beyond its own, up to the next bod
 placed so that c's link is where its markers are, at nominal places, and only the masses c carries count. The hand's
 markers are not used here. Masses are nominal; errors of the ten inertial parameters of each body's link are nuisances.
 
-Which way a plate's horizontal moments are turned or mirrored, told before its clock is.
+Which way a plate's horizontal moments are turned or mirrored, determined before its clock is.
 
     y_k(t) ~ Q x_k(t - lag_k),   Q'Q = 1        min over Q, lag_k by |y - mean y| against |x - mean x|, free of Q
 

@@ -38,7 +38,7 @@ def synchronise(lab: Laboratory, trials: Sequence[Trial]) -> tuple[tuple[Clock, 
     """Clocks of the instruments recorded in these trials, the robot's first.
 
     Raises:
-        NotEnoughData: There are encoder readings, but their clock cannot be told from the motion capture's.
+        NotEnoughData: There are encoder readings, but their clock cannot be determined from the motion capture's.
     """
     with_robot, with_plate = ([t for t in trials if len(getattr(t, f"t_{name}"))] for name in ("robot", "plate"))
     robot, model, said = None, None, _missing("robot", "no encoder readings")
@@ -56,7 +56,7 @@ def _missing(instrument: str, why: str) -> tuple[Verdict, ...]:
 
 
 def _robot_clock(lab: Laboratory, trials: Sequence[Trial]) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
-    """The robot's clock, and the provisional robot the plate's is told with."""
+    """The robot's clock, and the provisional robot the plate's is determined with."""
     if "robot" not in lab.description.mocap_clock:
         return _estimated_robot_clock(lab, trials)
     said: tuple[Verdict, ...] = (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
@@ -95,7 +95,7 @@ def _plate_clock(
     if "plate" in description.mocap_clock:
         return shared_clock("plate"), (Verdict("clocks", "ok", "plate: on the motion capture's clock"),)
     if robot is None:
-        return None, _missing("plate", "the plate's clock is told from encoder readings, and there are none")
+        return None, _missing("plate", "the plate's clock is determined from encoder readings, and there are none")
     parts = carriers(lab.floating, description, trials)
     motions = list(plate_motions(parts, description, trials, robot, model))
     Q = plate_axes([m.pair for m in motions])
@@ -119,7 +119,7 @@ def _clock(
 
 
 def _concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tuple[Clock, tuple[Verdict, ...]]:
-    """The clock of these lags, and what is to be said of it."""
+    """The clock of these lags, and the verdicts on it."""
     late, common = allowance(instrument, lags, known)
     clock, outliers = fit_clock(instrument, lags, common)
     clock = replace(clock, offset=clock.offset - late)

@@ -151,7 +151,7 @@ class DriveTrain:
 
 @dataclass(frozen=True)
 class DriveMotion:
-    """What one motor did in m trials of n samples in all, in a row, and what loads it; all (n,) unless said otherwise.
+    """What one motor did in m trials of n samples in all, in a row, and its load; all (n,) unless stated otherwise.
 
     Attributes:
         t: [s].

@@ -39,7 +39,7 @@ _SHORTEST = 1.5  # [s] of a trial
 def fit_drive_trains(
     urdf: str, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel
 ) -> tuple[DriveTrains, tuple[Verdict, ...]]:
-    """The drive trains, and what is to be said of them; of joints without link encoders, none.
+    """The drive trains, and the verdicts on them; of joints without link encoders, none.
 
     Args:
         urdf: Nominal robot.

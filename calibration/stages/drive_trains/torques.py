@@ -35,7 +35,7 @@ _TILT, _BENDING = 5e-3, 1e-4  # [rad], [rad/(N.m)] their prior standard deviatio
 
 @dataclass(frozen=True)
 class LinkLoads:
-    """What moves the links in a trial, all (n, k) unless said otherwise.
+    """What moves the links in a trial, all (n, k) unless stated otherwise.
 
     Attributes:
         trial_id: The trial.

@@ -7,7 +7,7 @@ along with it,
     twist of the arm's base = Ad(T_B_arm^-1) twist of T_base_B
 
 and both are in the model's covariance. Residuals larger than the measurement's noise are what "factory calibration is
-good enough" leaves out. They are told, they widen all sigmas, and what the arm's errors have in common, hidden in
+good enough" leaves out. They are reported, they widen all sigmas, and what the arm's errors have in common, hidden in
 the two frames, is taken to be as large as what they have not.
 """
 
@@ -27,8 +27,8 @@ from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
 STAGE = "arm_tool"
-_CHI2 = 3.0  # squared whitened residual per degree of freedom from which the arm is said to be off [-]
-_STRAY = 60.0  # squared distance of a posture over their median from which it is said not to belong [-]
+_CHI2 = 3.0  # squared whitened residual per degree of freedom from which the arm is taken to be off [-]
+_STRAY = 60.0  # squared distance of a posture over their median from which it is taken not to belong [-]
 
 
 def locate_arm(lab: Laboratory, postures: Postures, base_frame: Model | None) -> tuple[Model, tuple[Verdict, ...]]:
@@ -152,7 +152,7 @@ def _verdicts(
         yield Verdict(
             STAGE,
             "warning",
-            f"gauge: {18 - seen.rank} of 18 directions are not told apart. A base that stands shows T_base_B^-1 "
+            f"gauge: {18 - seen.rank} of 18 directions are not separated. A base that stands shows T_base_B^-1 "
             "T_base_arm only; spins and drives (stage base_frame) split it",
         )
 

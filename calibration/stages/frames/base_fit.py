@@ -19,7 +19,7 @@ From one rest to the next, on the floor:
 spin     (dx, dy) = w                          w ~ N(0, s^2 1)     a free centre that wanders by s a step
 drive    dy cos(phi) - dx sin(phi) = w         w ~ N(0, s^2)       no side slip; phi the mean heading, exact on arcs
 
-How far a base wanders a step, told by the scatter of its ties: restricted maximum likelihood.
+How far a base wanders a step, by the scatter of its ties: restricted maximum likelihood.
 
     y = -X g + n,    n ~ N(0, diag(V + s^2, 1))        g integrated out with a flat prior
 

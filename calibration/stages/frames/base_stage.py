@@ -22,7 +22,7 @@ from calibration.verdict import Verdict
 STAGE = "base_frame"
 STANDING = np.array([0.0, 0.0, 2e-3, 2e-3, 2e-3, 0.0])  # of a base on its wheels: height [m], tilt [rad]
 _FEWEST = 4  # rests a spin or drive needs: two give its direction, the rest its scatter
-_CHI2 = 4.0  # squared whitened residual per degree of freedom from which rests are said to differ [-]
+_CHI2 = 4.0  # squared whitened residual per degree of freedom from which rests are taken to differ [-]
 
 
 def locate_base(lab: Laboratory, stations: Stations) -> tuple[Model | None, tuple[Verdict, ...]]:

@@ -111,9 +111,9 @@ def _findings(model: Model, hand: HandModel) -> Iterator[Verdict]:
         (BacklashPreload, "backlash preloaded by gravity", "mrad"),
     ):
         mine = [p for p in model.parameters if p.name in hand.block(kind).names]
-        told = ", ".join(f"{p.name} {1e3 * p.value:+.1f} {unit}" for p in mine if abs(p.value) > 2.0 * p.sigma)
+        sizes = ", ".join(f"{p.name} {1e3 * p.value:+.1f} {unit}" for p in mine if abs(p.value) > 2.0 * p.sigma)
         if mine:
-            yield Verdict(STAGE, "ok", f"{what}: {told or 'none'}")
+            yield Verdict(STAGE, "ok", f"{what}: {sizes or 'none'}")
 
 
 def _averaged(fit: Fit, parameters: ParameterSet, hand: HandModel) -> Fit:

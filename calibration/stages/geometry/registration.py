@@ -46,19 +46,19 @@ _STILL = 1e-10  # [m, rad]
 
 
 def register(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
-    """The two frames, and what is to be said of them."""
+    """The two frames, and the verdicts on them."""
     parameters, tol = registration_parameters(chain, description), description.tolerances
-    told = 6 + postures.components  # a point does not show how the hand is turned: that stays as drawn
-    drawn = np.where(np.arange(12) < told, parameters.tolerance, tol.body_rotation)
-    parameters = replace(parameters, tolerance=drawn)
+    n_seen = 6 + postures.components  # a point does not show how the hand is turned: that stays as widths
+    widths = np.where(np.arange(12) < n_seen, parameters.tolerance, tol.body_rotation)
+    parameters = replace(parameters, tolerance=widths)
     W = frame_weights(description)[: postures.components, : postures.components]
     found, kept = _without_outliers(nominal_hand(chain, parameters.nominal), parameters, postures, W)
     model = model_of(STAGE, chain, parameters, found)
     if not found.converged:
         return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not converge"),)
-    if model.rank < told:
+    if model.rank < n_seen:
         message = (
-            f"{told - model.rank} of {told} directions are not identified: the arm turned about one direction only, "
+            f"{n_seen - model.rank} of {n_seen} directions are not identified: the arm turned about one axis only, "
             "so a turn of both frames about it is not identifiable; move another joint"
         )
         return model, (Verdict(STAGE, "warning", message),)
@@ -86,8 +86,8 @@ def _in_time(found: Fit, parameters: ParameterSet, motion: np.ndarray) -> Fit:
     series = [*np.flatnonzero(motion < 0)[:, None], *swings]
     blocks = block_covariance([J[rows] for rows in series], [found.r_white[rows] for rows in series], prior)
     H = found.J_white.T @ found.J_white + np.diag(prior)
-    drawn = np.linalg.solve(H, np.diag(np.sqrt(prior)))
-    return replace(found, covariance=blocks.covariance + drawn @ drawn.T)
+    widths = np.linalg.solve(H, np.diag(np.sqrt(prior)))
+    return replace(found, covariance=blocks.covariance + widths @ widths.T)
 
 
 def _without_outliers(

@@ -17,7 +17,7 @@ from calibration.numerics.signals import GAP, Signal, low_passed
 from calibration.recording.clock import shared_clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.suspension import plate_load, rest_of, sway_of
+from calibration.stages.suspension import base_response_of, plate_load, rest_of
 
 WRENCH, COMPARED = 20.0, 5.0  # [Hz]
 SETTLED = 1.0  # [s] at the start: the reference of all displacements
@@ -57,8 +57,8 @@ def log_of(lab: Laboratory, trials: Sequence[Trial]) -> BaseLog:
         raise NotEnoughData(f"{whole.id}: no force plate; the base's motion is predicted from its wrench")
     rest = rest_of(lab.description, whole, lab.T_base_B)
     load = plate_load(whole, shared_clock("plate"), rest.T_lab_0, WRENCH)
-    sway = sway_of(lab.description, whole, rest, load)
-    return BaseLog(sway.forcing.t - sway.forcing.t[0], sway.forcing.w, compared(sway.x))
+    response = base_response_of(lab.description, whole, rest, load)
+    return BaseLog(response.forcing.t - response.forcing.t[0], response.forcing.w, compared(response.x))
 
 
 def compared(x: np.ndarray) -> np.ndarray:

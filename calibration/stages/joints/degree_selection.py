@@ -158,7 +158,7 @@ def _covariance(problem: Problem, found: Projection, stops: np.ndarray) -> tuple
 
 
 def no_correction(joint: str, samples: Sequence[Samples], zero: float, terms: Terms) -> JointModel:
-    """The choice "none"; terms that were zero throughout are still told."""
+    """The choice "none"; terms that were zero throughout are still reported."""
     whole, every = pooled(samples), exponents(terms, HIGHEST)
     kept = not_zero(every, whole.theta, whole.tau)
     rms = float(np.sqrt((whole.y**2).mean()))

@@ -104,7 +104,7 @@ def rho_grid() -> np.ndarray:
 def limit_of(rho: float) -> Limit | None:
     """The limit at which the search for rho ended, None where the data found it inside.
 
-    At the lowest a joint's speeds hardly choose a flank: rho (A - B) and A + B are told, A, B and rho are not. At the
-    highest the flanks change between two readings: A and B are told, rho is not.
+    At the lowest a joint's speeds hardly choose a flank: rho (A - B) and A + B are identified, A, B and rho are not. At
+    the highest the flanks change between two readings: A and B are identified, rho is not.
     """
     return "lowest" if rho < 1.01 * RHO[0] else "highest" if rho > 0.99 * RHO[1] else None

@@ -40,7 +40,7 @@ STAGE = "joints"
 def fit_joint_models(
     lab: Laboratory, trials: Sequence[Trial], robot: Clock, hand: HandModel, terms: Terms = TERMS
 ) -> tuple[JointModels, tuple[Verdict, ...]]:
-    """The joint models, and what is to be said of them; without link encoders or rests, none.
+    """The joint models, and the verdicts on them; without link encoders or rests, none.
 
     Args:
         lab: Nominal robot and setup.
@@ -190,7 +190,7 @@ def joints_model(geometry: Model, models: tuple[JointModel, ...]) -> Model:
 
 
 def _status(name: str, rho: float) -> Status:
-    """At a limit of its search rho is where the search ended, and at the lowest no flank is told apart."""
+    """At a limit of its search rho is where the search ended, and at the lowest no flank is separated."""
     limit = limit_of(rho)
     return "not_identifiable" if limit == "lowest" or (limit and name == "rho") else "estimated"
 

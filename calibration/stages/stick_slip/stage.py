@@ -2,7 +2,7 @@
 
 1  forcing of every trial by each source of the wrench, tilt and heave by the suspension's 6x6 compliance
 2  parameters by wheel type, ensemble and band by each source: the plate first, inverse dynamics from its optimum
-3  what is said: the worth of each axis on trials that were left out, against a base that stays
+3  verdicts: the worth of each axis on trials that were left out, against a base that stays
 """
 
 import logging

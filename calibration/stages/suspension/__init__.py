@@ -1,7 +1,7 @@
 """Motion of the base on its wheels under the wrench of the moving arm."""
 
 from calibration.checks.plates import STAGE
-from calibration.stages.suspension.base_response import laboratory, sway_of
+from calibration.stages.suspension.base_response import base_response_of, laboratory
 from calibration.stages.suspension.floor_wrench import plate_load
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of
@@ -19,6 +19,6 @@ __all__ = [
     "laboratory",
     "plate_load",
     "rest_of",
-    "sway_of",
+    "base_response_of",
     "wheel_model",
 ]

@@ -12,7 +12,7 @@ with the base (wheels are suspended in its axes), and its weight f moves with it
 On a mobile manipulator of 73 kg the first is 745 N/rad between force and tilt, the second takes W c_z = 270 N.m/rad off
 roll and pitch.
 
-Trials as sways, by the plate's wrench and by that of inverse dynamics.
+Trials as responses, by the plate's wrench and by that of inverse dynamics.
 """
 
 import logging
@@ -60,7 +60,7 @@ class Forcing:
 
 
 @dataclass(frozen=True)
-class Sway:
+class BaseResponse:
     """Forcing and displacement of one trial.
 
     Attributes:
@@ -92,7 +92,9 @@ def forcing_of(load: Load, start: float) -> Forcing:
     return Forcing(t, w - rest, rest, load.inertia, _tangent(rest, load), load.T_0_plate)
 
 
-def sway_of(description: Description, trial: Trial, rest: Rest, load: Load, cutoff: float = CUTOFF) -> Sway:
+def base_response_of(
+    description: Description, trial: Trial, rest: Rest, load: Load, cutoff: float = CUTOFF
+) -> BaseResponse:
     """Displacement by the base markers, and the forcing on its grid.
 
     Raises:
@@ -107,7 +109,9 @@ def sway_of(description: Description, trial: Trial, rest: Rest, load: Load, cuto
     early = t <= trial.t_mocap[0] + REST
     w = CubicSpline(forcing.t, forcing.w)(t)
     on_grid = replace(forcing, t=t, w=w)
-    return Sway(trial.id, on_grid, x - x[early].mean(axis=0), found.valid[keep], x[early].var(axis=0) * _RESTLESS)
+    return BaseResponse(
+        trial.id, on_grid, x - x[early].mean(axis=0), found.valid[keep], x[early].var(axis=0) * _RESTLESS
+    )
 
 
 def _tangent(rest: np.ndarray, load: Load) -> np.ndarray:
@@ -160,13 +164,13 @@ class WrenchSources:
 
 
 @dataclass(frozen=True)
-class Sways:
-    """Sways of the usable trials; either is empty where there is no such instrument, else in the same order."""
+class BaseResponses:
+    """Responses of the usable trials; either is empty where there is no such instrument, else in the same order."""
 
-    plate: tuple[Sway, ...]
-    dynamics: tuple[Sway, ...]
+    plate: tuple[BaseResponse, ...]
+    dynamics: tuple[BaseResponse, ...]
 
-    def without(self, names: Iterable[str]) -> "Sways":
+    def without(self, names: Iterable[str]) -> "BaseResponses":
         """Without some trials."""
         left_out = set(names)
         return replace(
@@ -189,8 +193,8 @@ def laboratory(
     return WrenchSources(lab, robot, plate, lab.T_base_B if T_base_B is None else T_base_B)
 
 
-def read_sways(wrenches: WrenchSources, trials: Sequence[Trial]) -> Sways:
-    """Sways of the trials that show the base and its wrench, by every instrument the campaign has."""
+def read_responses(wrenches: WrenchSources, trials: Sequence[Trial]) -> BaseResponses:
+    """Responses of the trials that show the base and its wrench, by every instrument the campaign has."""
     sources: dict[str, Callable[[Trial, np.ndarray], Load]] = {}
     if wrenches.robot is not None and any(len(t.t_robot) for t in trials):
         sources["dynamics"] = wrenches.dynamics_load
@@ -200,8 +204,10 @@ def read_sways(wrenches: WrenchSources, trials: Sequence[Trial]) -> Sways:
     for trial in trials:
         try:
             rest = rest_of(description, trial, wrenches.T_base_B)
-            rows.append([sway_of(description, trial, rest, load(trial, rest.T_lab_0)) for load in sources.values()])
+            rows.append(
+                [base_response_of(description, trial, rest, load(trial, rest.T_lab_0)) for load in sources.values()]
+            )
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
     columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(sources)}
-    return Sways(columns.get("plate", ()), columns.get("dynamics", ()))
+    return BaseResponses(columns.get("plate", ()), columns.get("dynamics", ()))

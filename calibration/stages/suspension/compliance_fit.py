@@ -17,7 +17,7 @@ import numpy as np
 
 from calibration.numerics.robust_covariance import block_covariance
 from calibration.numerics.signals import RATE
-from calibration.stages.suspension.base_response import Sway
+from calibration.stages.suspension.base_response import BaseResponse
 from calibration.stages.suspension.modal_response import modes_of
 
 _STRIDE = 4  # every so many samples of a residual that is low-passed at 10 Hz
@@ -100,25 +100,25 @@ class Compliance:
         return found[0], found[1]
 
 
-def fit_compliance(sways: Sequence[Sway], couples: np.ndarray) -> Compliance:
+def fit_compliance(responses: Sequence[BaseResponse], couples: np.ndarray) -> Compliance:
     """Fit S and C; `couples` (6, 6) says which elements may differ from zero."""
-    S, C = _start(sways)
+    S, C = _start(responses)
     qS, qC = np.sqrt(np.diag(S)), np.sqrt(np.diag(C))
     elements = np.array([_element(i, j) for i, j in UPPER if couples[i, j]])
     none = np.zeros_like(elements)
     dS = np.concatenate([elements * np.outer(qS, qS), none])
     dC = np.concatenate([none, elements * np.outer(qC, qC)])
     prior = np.diag([0.0] * len(elements) + [_DAMPING_PRIOR**-2] * len(elements))
-    sigma = np.sqrt(np.mean([(s.x**2).mean(axis=0) for s in sways], axis=0))
+    sigma = np.sqrt(np.mean([(s.x**2).mean(axis=0) for s in responses], axis=0))
     for _ in range(_ROUNDS):
-        S, C, shares = _round(sways, (S, C), (dS, dC), prior, sigma)
+        S, C, shares = _round(responses, (S, C), (dS, dC), prior, sigma)
         squares, count = sum(s.squares for s in shares), sum(len(s.r) for s in shares)
         sigma = sigma * np.sqrt(np.maximum(squares / count, 1e-12))
     return Compliance(S, C, dS, dC, tuple(shares), prior)
 
 
 def _round(
-    sways: Sequence[Sway],
+    responses: Sequence[BaseResponse],
     start: tuple[np.ndarray, np.ndarray],
     directions: tuple[np.ndarray, np.ndarray],
     prior: np.ndarray,
@@ -128,14 +128,14 @@ def _round(
     dS, dC = directions
     qS, qC = (np.sqrt(np.diag(A)) for A in start)
     (S, C), lam = start, 1e-4
-    shares = [_share(s, S, C, dS, dC, sigma) for s in sways]
+    shares = [_share(s, S, C, dS, dC, sigma) for s in responses]
     cost = sum(float(s.squares.sum()) for s in shares)
     for _ in range(_STEPS):
         H, g = sum((s.H for s in shares), prior), sum(s.g for s in shares)
         step = np.linalg.solve(H + lam * np.diag(np.diag(H)), g)
         S_new = _positive(S + np.tensordot(step, dS, axes=1), qS)
         C_new = _positive(C + np.tensordot(step, dC, axes=1), qC)
-        tried = [_share(s, S_new, C_new, dS, dC, sigma) for s in sways]
+        tried = [_share(s, S_new, C_new, dS, dC, sigma) for s in responses]
         new = sum(float(s.squares.sum()) for s in tried)
         if new < cost:
             gain, S, C, shares, cost, lam = cost - new, S_new, C_new, tried, new, max(lam / 10.0, 1e-9)
@@ -148,29 +148,31 @@ def _round(
     return S, C, shares
 
 
-def _share(sway: Sway, S: np.ndarray, C: np.ndarray, dS: np.ndarray, dC: np.ndarray, sigma: np.ndarray) -> Share:
+def _share(
+    response: BaseResponse, S: np.ndarray, C: np.ndarray, dS: np.ndarray, dC: np.ndarray, sigma: np.ndarray
+) -> Share:
     """Residual and derivatives of one trial."""
-    f, K, step = sway.forcing, np.linalg.inv(S), 1.0 / RATE
+    f, K, step = response.forcing, np.linalg.inv(S), 1.0 / RATE
     modes = modes_of(K + f.tangent, C, f.inertia)
     x = modes.respond(f.w, step)
     rate = np.gradient(x, step, axis=0)
-    rows = np.flatnonzero(sway.valid)[::_STRIDE]
+    rows = np.flatnonzero(response.valid)[::_STRIDE]
     J = np.zeros((len(rows), 6, len(dS)))
     for signal, b, directions, sign in ((x @ K.T, modes.b @ K, dS, 1.0), (rate, modes.b, dC, -1.0)):
         lagged = modes.lagged(signal, step)[rows]
         paths = (modes.a[:, None, :] * b.T[None]).reshape(36, -1)  # response of axis o to force i, (o, i)
         T = (lagged.reshape(len(rows) * 6, -1) @ paths.T).real.reshape(len(rows), 6, 6, 6)
         J = J + sign * np.tensordot(T, directions, axes=([1, 3], [2, 1]))
-    r = (sway.x - x)[rows]
+    r = (response.x - x)[rows]
     r, J = (r - r.mean(axis=0)) / sigma, (J - J.mean(axis=0)) / sigma[:, None]
     A = J.reshape(-1, J.shape[2])
     return Share(A.T @ A, A.T @ r.ravel(), J, r)
 
 
-def _start(sways: Sequence[Sway]) -> tuple[np.ndarray, np.ndarray]:
+def _start(responses: Sequence[BaseResponse]) -> tuple[np.ndarray, np.ndarray]:
     """Diagonal compliance by each axis alone, and the damping of a base that settles in 15 ms."""
-    xw = sum((s.x * s.forcing.w).sum(axis=0) for s in sways)
-    ww, xx = sum((s.forcing.w**2).sum(axis=0) for s in sways), sum((s.x**2).sum(axis=0) for s in sways)
+    xw = sum((s.x * s.forcing.w).sum(axis=0) for s in responses)
+    ww, xx = sum((s.forcing.w**2).sum(axis=0) for s in responses), sum((s.x**2).sum(axis=0) for s in responses)
     ww = np.maximum(ww, np.finfo(float).tiny)
     compliance = np.maximum(np.abs(xw) / ww, 0.02 * np.sqrt(xx / ww))
     return np.diag(compliance), np.diag(_SETTLING / compliance)

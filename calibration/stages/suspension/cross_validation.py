@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.stages.suspension.base_response import Sway
+from calibration.stages.suspension.base_response import BaseResponse
 from calibration.stages.suspension.modal_response import predicted
 
 _WORTH = 0.05  # R2 below which an axis is left still [-]
 _NOISE = 1.25  # how much more than expected the noise may be, known from one second a trial [-]
 _SLIP = 0.1  # share of the motion [-]
 _UNKNOWN = 0.05  # of what is left, noise included [-]
-_VISIBLE = 1.5  # motion over noise, mean squares, below which its share cannot be told [-]
+_VISIBLE = 1.5  # motion over noise, mean squares, below which its share cannot be determined [-]
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,13 @@ class HeldOut:
         return np.asarray((self.r2 > 0.0) & worth & (rest_gain > _WORTH * rest_motion))
 
 
-def held_out(sways: Sequence[Sway], without: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> HeldOut:
+def held_out(responses: Sequence[BaseResponse], without: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> HeldOut:
     """Predict every trial by K and C fitted without it."""
     rows = []
-    for k, sway in enumerate(sways):
-        e = (sway.x - predicted(*without(k), sway.forcing))[sway.valid]
-        rows.append(((e**2).sum(axis=0), (sway.x[sway.valid] ** 2).sum(axis=0), len(e) * sway.noise, len(e)))
+    for k, response in enumerate(responses):
+        e = (response.x - predicted(*without(k), response.forcing))[response.valid]
+        rows.append(
+            ((e**2).sum(axis=0), (response.x[response.valid] ** 2).sum(axis=0), len(e) * response.noise, len(e))
+        )
     error, motion, noise, count = (np.array(a, dtype=float) for a in zip(*rows, strict=True))
     return HeldOut(error, motion, noise, count)

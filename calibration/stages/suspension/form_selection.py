@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.recording.schema import Description
-from calibration.stages.suspension.base_response import Sway
+from calibration.stages.suspension.base_response import BaseResponse
 from calibration.stages.suspension.compliance_fit import fit_compliance
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.modal_response import modes_of
@@ -43,9 +43,9 @@ class Springs:
     bound: str = ""
 
 
-def printed_springs(description: Description, wheels: WheelModel, sways: Sequence[Sway]) -> Springs:
+def printed_springs(description: Description, wheels: WheelModel, responses: Sequence[BaseResponse]) -> Springs:
     """The printed form, displacement to wrench."""
-    normals = [normal_of(wheels, s, description.sigmas) for s in sways]
+    normals = [normal_of(wheels, s, description.sigmas) for s in responses]
     values = solve(wheels, normals)
     others = np.array([solve(wheels, normals[:k] + normals[k + 1 :]) for k in range(len(normals))])
     folds = tuple(matrices(wheels, p) for p in others)
@@ -57,15 +57,15 @@ def printed_springs(description: Description, wheels: WheelModel, sways: Sequenc
     )
 
 
-def compliance_springs(description: Description, sways: Sequence[Sway], coupled: bool) -> Springs:
+def compliance_springs(description: Description, responses: Sequence[BaseResponse], coupled: bool) -> Springs:
     """The reduced form, wrench to displacement."""
     couples = np.ones((6, 6), dtype=bool)
     if description.wheels and not coupled:
         couples = wheel_model(description.wheels, "contact").couples
-    found = fit_compliance(sways, couples)
+    found = fit_compliance(responses, couples)
     K, C = found.K, found.C
     placed = [np.hypot(s, frame_sigma(A, description.tolerances)) for s, A in zip(found.sigmas(), (K, C), strict=True)]
-    return Springs(K, C, tuple(found.without(k) for k in range(len(sways))), (placed[0], placed[1]), couples)
+    return Springs(K, C, tuple(found.without(k) for k in range(len(responses))), (placed[0], placed[1]), couples)
 
 
 def not_positive(springs: Springs) -> str:

@@ -1,6 +1,6 @@
 """The base on its wheels as a model of prediction: wrench in, displacement of the base out.
 
-    (K + G) x + C dx/dt + M d2x/dt2 = w          see suspension_wheels, suspension_sway
+    (K + G) x + C dx/dt + M d2x/dt2 = w          see wheels, base_response
 
 K, C are small-signal stiffness and damping about the origin of frame 0 in its axes, gravity's part not in them. An axis
 that the springs do not predict better than a base that stays is left still.

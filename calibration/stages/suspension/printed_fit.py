@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 
 from calibration.numerics.signals import RATE, Signal, low_passed
 from calibration.recording.schema import Sigmas
-from calibration.stages.suspension.base_response import Sway
+from calibration.stages.suspension.base_response import BaseResponse
 from calibration.stages.suspension.wheels import WheelModel
 
 _CUTOFF = 2.5  # [Hz]
@@ -36,14 +36,14 @@ class Normal:
     squares: float
 
 
-def normal_of(wheels: WheelModel, sway: Sway, sigmas: Sigmas) -> Normal:
+def normal_of(wheels: WheelModel, response: BaseResponse, sigmas: Sigmas) -> Normal:
     """Normal equations of one trial."""
-    f = sway.forcing
-    both = Signal(f.t, np.hstack([sway.x, f.w]), sway.valid)
+    f = response.forcing
+    both = Signal(f.t, np.hstack([response.x, f.w]), response.valid)
     smooth = low_passed(both, _CUTOFF).x
     x, w = smooth[:, :6], smooth[:, 6:] - smooth[:, :6] @ f.tangent.T
     rate = np.gradient(x, 1.0 / RATE, axis=0)
-    rows = np.flatnonzero(sway.valid)[::_STRIDE]
+    rows = np.flatnonzero(response.valid)[::_STRIDE]
     sigma = np.array([sigmas.plate_force] * 3 + [sigmas.plate_moment] * 3)
     A = np.concatenate([wheels.regressor(x[rows]), wheels.regressor(rate[rows])], axis=2) / sigma[:, None]
     A = A.reshape(-1, 2 * len(wheels.names))

@@ -1,6 +1,6 @@
 """Stage `suspension`: the base's springs from the base markers and the wrench on the floor, calibration trials alone.
 
-    1  wrong data are told by name (checks.plates)
+    1  wrong data are named (checks.plates)
     2  the printed form, displacement -> wrench; refused unless K > 0, C >= 0, it settles, and, run forward on trials it
        was not fitted to, it is on no axis worse than a base that stays nor, by 2 % of the motion, than
     3  the reduced 6x6 compliance, fitted wrench -> displacement, which then takes its place
@@ -22,7 +22,7 @@ from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.stage import Stage, StageInput, StageResult
-from calibration.stages.suspension.base_response import Sway, Sways, WrenchSources, read_sways
+from calibration.stages.suspension.base_response import BaseResponse, BaseResponses, WrenchSources, read_responses
 from calibration.stages.suspension.cross_validation import HeldOut, held_out
 from calibration.stages.suspension.form_selection import (
     Springs,
@@ -60,45 +60,48 @@ def fit_suspension(
     T_base_B: np.ndarray | None = None,
     form: Form | None = None,
 ) -> tuple[Suspension | None, tuple[Verdict, ...]]:
-    """The suspension by calibration trials, None where there is none to be had, and what is to be said of it.
+    """The suspension by calibration trials, None where there is none to be had, and the verdicts on it.
 
     T_base_B (4, 4) places the base's marker body on the base; nominal where it is not given.
     """
     sources = WrenchSources(lab, robot, plate, lab.T_base_B if T_base_B is None else T_base_B)
-    sways = read_sways(sources, trials)
-    found = list(wrong_plate(lab, *sways.forcings)) if sways.plate else []
-    moved = _moved_bases(sways.dynamics or sways.plate)
-    told = ", ".join(f"{name} by {how}" for name, how in moved.items())
+    responses = read_responses(sources, trials)
+    found = list(wrong_plate(lab, *responses.forcings)) if responses.plate else []
+    moved = _moved_bases(responses.dynamics or responses.plate)
+    listed = ", ".join(f"{name} by {how}" for name, how in moved.items())
     if moved:
-        found.append(Verdict(STAGE, "warning", f"base moved during {told}: left out; brake it, or record again"))
-    sways = sways.without(moved)
-    usable = len(sways.dynamics or sways.plate)
+        found.append(Verdict(STAGE, "warning", f"base moved during {listed}: left out; brake it, or record again"))
+    responses = responses.without(moved)
+    usable = len(responses.dynamics or responses.plate)
     if any(v.verdict == "refused" for v in found) or usable < 2:
         if usable < 2:
             found.append(
                 Verdict(STAGE, "missing", "no suspension: it takes two trials that show the base and its load")
             )
         return None, tuple(found)
-    if not sways.plate:
+    if not responses.plate:
         found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
-    suspension, said = _fitted(lab.description, sways, form or Form())
+    suspension, said = _fitted(lab.description, responses, form or Form())
     return suspension, (*found, *said)
 
 
-def _moved_bases(sways: Sequence[Sway]) -> dict[str, str]:
+def _moved_bases(responses: Sequence[BaseResponse]) -> dict[str, str]:
     """Trials after which the base rests elsewhere, and by how much."""
-    after = {sway.trial_id: moved_by(sway.x[-int(0.5 * REST * RATE) :].mean(axis=0)) for sway in sways}
+    after = {response.trial_id: moved_by(response.x[-int(0.5 * REST * RATE) :].mean(axis=0)) for response in responses}
     return {name: how for name, how in after.items() if how}
 
 
-def _fitted(description: Description, sways: Sways, form: Form) -> tuple[Suspension, list[Verdict]]:
-    used = sways.plate or sways.dynamics
+def _fitted(description: Description, responses: BaseResponses, form: Form) -> tuple[Suspension, list[Verdict]]:
+    used = responses.plate or responses.dynamics
     springs = compliance_springs(description, used, form.coupled)
     said = []
-    if description.wheels and sways.plate:
+    if description.wheels and responses.plate:
         springs, verdict = _chosen(description, used, form, springs)
         said.append(verdict)
-    sources: list[tuple[Source, tuple[Sway, ...]]] = [("plate", sways.plate), ("dynamics", sways.dynamics)]
+    sources: list[tuple[Source, tuple[BaseResponse, ...]]] = [
+        ("plate", responses.plate),
+        ("dynamics", responses.dynamics),
+    ]
     tried = tuple((s, held_out(rows, springs.folds.__getitem__)) for s, rows in sources if rows)
     slips = tried[0][1].slips
     parameters = (
@@ -109,14 +112,16 @@ def _fitted(description: Description, sways: Sways, form: Form) -> tuple[Suspens
     if springs.wheels is not None:
         more, combinations = wheel_parameters(*springs.wheels, len(parameters))
         parameters += more
-    preload = np.mean([s.forcing.tangent for s in sways.plate], axis=0) if sways.plate else np.zeros((6, 6))
+    preload = np.mean([s.forcing.tangent for s in responses.plate], axis=0) if responses.plate else np.zeros((6, 6))
     suspension = Suspension(
         "compliance" if springs.wheels is None else "printed",
         springs.K,
         springs.C,
         *springs.sigmas,
         preload,
-        np.mean([s.forcing.tangent for s in sways.dynamics], axis=0) - preload if sways.dynamics else np.zeros((6, 6)),
+        np.mean([s.forcing.tangent for s in responses.dynamics], axis=0) - preload
+        if responses.dynamics
+        else np.zeros((6, 6)),
         tried,
         parameters,
         combinations,
@@ -124,16 +129,18 @@ def _fitted(description: Description, sways: Sways, form: Form) -> tuple[Suspens
     return suspension, said + [_judged(s, h) for s, h in tried]
 
 
-def _chosen(description: Description, sways: Sequence[Sway], form: Form, reduced: Springs) -> tuple[Springs, Verdict]:
+def _chosen(
+    description: Description, responses: Sequence[BaseResponse], form: Form, reduced: Springs
+) -> tuple[Springs, Verdict]:
     """The printed form, about the points that predict better, or the reduced one where that is refused."""
     points: tuple[Point, ...] = (form.point,) if form.point else ("centre", "contact")
     found: list[tuple[float, Springs, str, Point]] = []
     for point in points:
-        springs = printed_springs(description, wheel_model(description.wheels, point, form.full), sways)
+        springs = printed_springs(description, wheel_model(description.wheels, point, form.full), responses)
         why, worth = not_positive(springs), -np.inf
         if not why:
-            tried = held_out(sways, springs.folds.__getitem__)
-            why = refusal(springs, tried, held_out(sways, reduced.folds.__getitem__))
+            tried = held_out(responses, springs.folds.__getitem__)
+            why = refusal(springs, tried, held_out(responses, reduced.folds.__getitem__))
             worth = float(np.clip(tried.r2, -1.0, 1.0).sum())
         found.append((worth, springs, why, point))
     _, springs, why, point = max(found, key=lambda f: f[0])
@@ -150,9 +157,9 @@ def _chosen(description: Description, sways: Sequence[Sway], form: Form, reduced
 
 def _judged(source: Source, tried: HeldOut) -> Verdict:
     """What the axes are worth."""
-    told = ", ".join(f"{a} {r2:.2f}" for a, r2 in zip(AXES, np.maximum(tried.r2, -9.99), strict=True))
+    listed = ", ".join(f"{a} {r2:.2f}" for a, r2 in zip(AXES, np.maximum(tried.r2, -9.99), strict=True))
     still = [a for a, moves in zip(AXES, tried.moves, strict=True) if not moves]
-    message = f"from {source}, left-out trials: R2 against a base that stays {told}"
+    message = f"from {source}, left-out trials: R2 against a base that stays {listed}"
     if still:
         message += f"; left still: {', '.join(still)} (they slip, or do not move visibly)"
     return Verdict(STAGE, "ok" if tried.moves[3:5].all() else "warning", message)

@@ -52,7 +52,7 @@ class Predicted:
 
 
 @dataclass(frozen=True)
-class Sway:
+class TrialMotion:
     """The base in one trial.
 
     Attributes:
@@ -98,7 +98,7 @@ class Sway:
 
 
 @dataclass(frozen=True)
-class AxisSway:
+class AxisMotion:
     """One axis of one trial.
 
     Attributes:
@@ -130,18 +130,18 @@ class BaseMotion:
 
     def figures(self) -> Mapping[str, Drawn]:
         """The diagram, and the motion of the base in one trial."""
-        found, _ = self._sway
-        return {"wheels": _DIAGRAM, "sway": drawn(found) if found else None}
+        found, _ = self._trial_motion
+        return {"wheels": _DIAGRAM, "trial_motion": drawn(found) if found else None}
 
     def context(self) -> Mapping[str, Any]:
         """Motion of the base or why there is none; its springs and dampers."""
         results = self.view.results
-        found, why = self._sway
+        found, why = self._trial_motion
         fitted = results.estimate.suspension if results.estimate else None
         return {
-            "sway": found,
-            "sway_axes": lines(found) if found else (),
-            "why_no_sway": why,
+            "trial_motion": found,
+            "motion_axes": lines(found) if found else (),
+            "why_no_motion": why,
             "base_scores": results.score.base if results.score else (),
             "axis_lines": suspension.axis_lines(results),
             "suspension_sources": suspension.sources(results),
@@ -155,11 +155,11 @@ class BaseMotion:
         }
 
     @cached_property
-    def _sway(self) -> tuple[Sway | None, str]:
-        return sway(self.view.results)
+    def _trial_motion(self) -> tuple[TrialMotion | None, str]:
+        return trial_motion(self.view.results)
 
 
-def sway(results: Results) -> tuple[Sway | None, str]:
+def trial_motion(results: Results) -> tuple[TrialMotion | None, str]:
     """The first held-out moving trial; or none, and why."""
     estimate, dataset = results.estimate, results.dataset
     if dataset is None:
@@ -177,10 +177,10 @@ def sway(results: Results) -> tuple[Sway | None, str]:
     return _of_trial(trial.trial_id, trial.t, trial.base, estimate.suspension), ""
 
 
-def _of_trial(trial: str, t: np.ndarray, base: prediction.BaseMotion, suspension: Suspension) -> Sway:
+def _of_trial(trial: str, t: np.ndarray, base: prediction.BaseMotion, suspension: Suspension) -> TrialMotion:
     smooth = low_passed(even(t, base.measured), CUTOFF)
     measured = np.where(smooth.valid[:, None], _UNIT * smooth.x, np.nan)
-    alone = Sway(trial, smooth.t - t[0], measured, ())
+    alone = TrialMotion(trial, smooth.t - t[0], measured, ())
     predicted = []
     for source, at_mocap in base.predicted:
         x = np.stack([np.interp(smooth.t, t, _UNIT * column) for column in at_mocap.T], axis=1)
@@ -189,11 +189,11 @@ def _of_trial(trial: str, t: np.ndarray, base: prediction.BaseMotion, suspension
     return replace(alone, predicted=tuple(predicted))
 
 
-def lines(found: Sway) -> tuple[AxisSway, ...]:
+def lines(found: TrialMotion) -> tuple[AxisMotion, ...]:
     """The axes in order."""
     spread, noise, left = found.spread, found.noise, {p.source: found.left(p) for p in found.predicted}
     return tuple(
-        AxisSway(
+        AxisMotion(
             AXES[k],
             UNITS[k],
             float(spread[k]),
@@ -214,7 +214,7 @@ def _r2(measured: np.ndarray, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 - error / np.maximum(motion, np.finfo(float).tiny))
 
 
-def drawn(found: Sway) -> Figure:
+def drawn(found: TrialMotion) -> Figure:
     """Measured and predicted motion, translation on the left, rotation on the right."""
     with drawing():
         page = figure(10.0, _HEIGHT)

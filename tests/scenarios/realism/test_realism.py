@@ -21,7 +21,7 @@ from scenarios.realism.arm_as_logged import AS_LOGGED
 from scenarios.realism.compare import compare_replay, compare_swings
 from scenarios.realism.log import Recorded, recorded, referred
 from scenarios.realism.replayed import AS_DRAWN, CAUSES, Condition, floor_of, gripping, inside, together
-from scenarios.realism.swings import LOG, Figures, Sway, figures, yaw_from_moment
+from scenarios.realism.swings import LOG, Figures, SwingResponse, figures, yaw_from_moment
 from scenarios.steps import import_export
 from twin.motions import JOINTS
 
@@ -50,7 +50,7 @@ def test_figures_are_those_of_the_motion():
     rotation = np.column_stack([swing_of(1e-3), swing_of(2e-3), swing_of(3e-3, 4e-3)])
     centroid = np.column_stack([swing_of(1e-4), swing_of(2e-4), swing_of(3e-4)])
     wrench = np.column_stack([swing_of(a) for a in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)])
-    f = figures(Sway(T, rotation, centroid, wrench), 2.0)
+    f = figures(SwingResponse(T, rotation, centroid, wrench), 2.0)
     assert (f.steady_roll, f.steady_pitch, f.steady_yaw) == pytest.approx((2e-3, 4e-3, 6e-3), rel=0.02)
     assert (f.roll, f.pitch, f.yaw) == pytest.approx((2e-3, 4e-3, 7e-3), rel=0.02)
     assert f.set == pytest.approx(4e-3, rel=0.01)

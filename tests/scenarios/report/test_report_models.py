@@ -32,7 +32,7 @@ from scenarios.report.sections import joints as loops
 from scenarios.report.sections import payload as loads
 from tests.calibration.stages.suspension.test_suspension_fit import C, K, record
 from tests.doubles import joint_data, rigid_robot
-from tests.doubles.swaying_base import WHEELS
+from tests.doubles.moving_base import WHEELS
 
 MOVES = np.array([False, False, True, True, True, False])
 CLOCKS = tuple(Clock(i, 0.0, 0.0, np.zeros((2, 2)), 0.0, 1e-4) for i in ("robot", "plate"))
@@ -163,7 +163,7 @@ def plain(html):
 
 
 def test_the_base_s_measured_motion_is_its_motion(whole, recording):
-    found, why = base_motion.sway(read(whole))
+    found, why = base_motion.trial_motion(read(whole))
     assert (why, found.trial, len(found.predicted)) == ("", "xyz", 1)
     t = np.arange(len(recording[1])) / 100.0
     x = 1e3 * np.stack([np.interp(found.t, t, column) for column in recording[1].T], axis=1)
@@ -172,7 +172,7 @@ def test_the_base_s_measured_motion_is_its_motion(whole, recording):
 
 
 def test_the_true_springs_predict_the_axes_that_are_moved(whole):
-    found, _ = base_motion.sway(read(whole))
+    found, _ = base_motion.trial_motion(read(whole))
     p = found.predicted[0]
     rows = (found.t > 1.0) & np.isfinite(found.measured).all(axis=1)
     error, motion = ((a[rows] ** 2).sum(axis=0) for a in (found.measured - p.x, found.measured))
@@ -211,7 +211,7 @@ def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, told):
 
 
 def test_yaw_is_told_with_what_stays(whole):
-    found, _ = base_motion.sway(read(whole))
+    found, _ = base_motion.trial_motion(read(whole))
     left = np.sqrt(((found.measured - found.predicted[0].x)[found.scored, 5] ** 2).mean())
     assert f"it is not predicted here, residual {fixed(left, 1)} mrad rms" in text_of(whole)
     assert "cross-validated over the calibration trials its R2 is −0.10" in text_of(whole)
@@ -330,7 +330,7 @@ def test_trials_of_one_load_need_no_table(whole):
 
 def test_diagrams_and_figures_can_be_read_without_seeing(whole):
     page = (whole / "report.html").read_text()
-    for name in ("wheels", "sway", "joint", "loops"):
+    for name in ("wheels", "trial_motion", "joint", "loops"):
         label = page.split(f'<g id="{name}-figure_1">')[0].rpartition('<div role="img" aria-label="')[2]
         assert len(label.split('"')[0]) > 60, name
         assert (whole / f"figures/{name}.svg").is_file()
@@ -347,7 +347,7 @@ def test_without_dataset_or_estimate_the_page_says_so(run, gone):
     }[gone]
     assert f"The base's motion is not drawn: {base}." in text
     assert f"The joints' hysteresis is not drawn: {joints}." in text
-    assert not (run / "figures/sway.svg").exists()
+    assert not (run / "figures/trial_motion.svg").exists()
     assert not (run / "figures/loops.svg").exists()
 
 

@@ -13,7 +13,7 @@ from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.modal_response import modes_of
 from calibration.stages.suspension.model import Suspension
 from tests.doubles import rigid_robot
-from tests.doubles.swaying_base import T_LAB_BASE, WHEELS, moved
+from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved
 
 DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
 RECORDED = rigid_robot.Truth(marker_sigma=1e-5, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))

@@ -3,7 +3,7 @@ import numpy as np
 import mjcf
 from calibration.stages.stick_slip.wheels import NAMES, PRIOR, SlipParameters, preloads, wheel_set
 from tests.calibration.stages.stick_slip.slipping import POSITION, TRUTH, WEIGHT, WHEELS
-from tests.doubles.swaying_base import WHEELS as DECLARED
+from tests.doubles.moving_base import WHEELS as DECLARED
 
 
 def test_parameters_are_their_logarithms():

@@ -10,7 +10,7 @@ from calibration.stages.suspension.modal_response import modes_of, predicted
 from calibration.stages.suspension.printed_fit import matrices, normal_of, solve
 from calibration.stages.suspension.wheels import element_parameters, frame_sigma, wheel_model, wheel_parameters
 from tests.doubles import rigid_robot
-from tests.doubles.swaying_base import WHEELS, smooth, sway, values
+from tests.doubles.moving_base import WHEELS, response, smooth, values
 
 SIGMAS = Sigmas(marker=1e-4, encoder=1e-5, plate_force=1.2, plate_moment=0.35)
 DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
@@ -30,12 +30,12 @@ def test_printed_combinations_come_back_exactly(point):
     K, C = matrices(wheels, p)
     G = np.zeros((6, 6))
     G[0, 4], G[1, 3] = -730.0, 730.0
-    sways = []
+    responses = []
     for k in range(3):
         x = smooth(rng, 30.0, np.full(6, 1e-3), fastest=1.0)
         w = x @ (K + G).T + np.gradient(x, 1.0 / RATE, axis=0) @ C.T
-        sways.append(sway(str(k), w, x, G=G))
-    normals = [normal_of(wheels, s, SIGMAS) for s in sways]
+        responses.append(response(str(k), w, x, G=G))
+    normals = [normal_of(wheels, s, SIGMAS) for s in responses]
     found = solve(wheels, normals)
     assert (found >= 0.0).all()
     np.testing.assert_allclose(wheels.matrix(found[:36]), K, rtol=1e-6, atol=1e-6 * np.sqrt(K.max()))
@@ -57,11 +57,11 @@ def test_the_compliance_comes_back_and_gravity_is_told_apart():
     gravity[3, 3] = gravity[4, 4] = -W * h
     for inertia, G in ((NONE, NONE), (M, gravity)):
         w = [smooth(rng, 18.0, LOADS, fastest=6.0) for _ in range(2)]
-        sways = [
-            sway(str(k), w_k, modes_of(K + G, C, inertia).respond(w_k, 1.0 / RATE), inertia, G)
+        responses = [
+            response(str(k), w_k, modes_of(K + G, C, inertia).respond(w_k, 1.0 / RATE), inertia, G)
             for k, w_k in enumerate(w)
         ]
-        found = fit_compliance(sways, wheels.couples)
+        found = fit_compliance(responses, wheels.couples)
         assert matrix_error(found.K, K) < 1e-3
         assert matrix_error(found.C, C) < 2e-2
     assert W * h / K[3, 3] > 5e-3  # what forgetting gravity would cost
@@ -72,12 +72,12 @@ def test_the_uncertainty_of_the_compliance_covers_the_truth():
     wheels = wheel_model(WHEELS, "contact")
     K, C = matrices(wheels, values(rng))
     noise = np.array([2e-5, 2e-5, 2e-5, 1e-4, 1e-4, 5e-5])
-    sways = []
+    responses = []
     for k in range(4):
         w = smooth(rng, 18.0, LOADS, fastest=6.0)
         x = modes_of(K, C, NONE).respond(w, 1.0 / RATE) + noise * rng.normal(size=w.shape)
-        sways.append(sway(str(k), w, x))
-    found = fit_compliance(sways, wheels.couples)
+        responses.append(response(str(k), w, x))
+    found = fit_compliance(responses, wheels.couples)
     sigma, _ = found.sigmas()
     z = ((found.K - K) / np.where(wheels.couples, sigma, np.inf))[wheels.couples]
     assert np.abs(z).max() < 4.5 and np.sqrt((z**2).mean()) < 2.0
@@ -88,12 +88,12 @@ def test_a_fold_is_the_fit_without_that_trial():
     rng = np.random.default_rng(3)
     wheels = wheel_model(WHEELS, "contact")
     K, C = matrices(wheels, values(rng))
-    sways = []
+    responses = []
     for k in range(3):
         w = smooth(rng, 20.0, LOADS, fastest=6.0)
         x = modes_of((1.0 + 0.1 * k) * K, C, NONE).respond(w, 1.0 / RATE)
-        sways.append(sway(str(k), w, x))
-    whole, alone = fit_compliance(sways, wheels.couples), fit_compliance(sways[:2], wheels.couples)
+        responses.append(response(str(k), w, x))
+    whole, alone = fit_compliance(responses, wheels.couples), fit_compliance(responses[:2], wheels.couples)
     fold = whole.without(2)[0]
     q = np.sqrt(np.diag(alone.K))
     assert np.abs((fold - alone.K) / np.outer(q, q)).max() < 0.02
@@ -135,11 +135,13 @@ def test_a_printed_fit_at_its_bound_is_refused_by_name(turning, held):
     K[0, 0] *= 1.0 if turning == 1.0 else 0.6
     assert np.linalg.eigvalsh(K)[0] > 0.0
     noise = np.array([2e-6, 2e-6, 2e-6, 1e-5, 1e-5, 5e-6])
-    sways = []
+    responses = []
     for k in range(3):
         w = smooth(rng, 18.0, LOADS, fastest=6.0)
-        sways.append(sway(str(k), w, modes_of(K, C, NONE).respond(w, 1.0 / RATE) + noise * rng.normal(size=w.shape)))
-    found = printed_springs(DESCRIPTION, wheels, sways)
+        responses.append(
+            response(str(k), w, modes_of(K, C, NONE).respond(w, 1.0 / RATE) + noise * rng.normal(size=w.shape))
+        )
+    found = printed_springs(DESCRIPTION, wheels, responses)
     assert (found.wheels[1] == 0.0).sum() > 20  # zeros alone are no bound
     assert found.bound.startswith(held) and bool(found.bound) == bool(held)
     assert not_positive(found) == (f"at its bound, {found.bound} would be negative" if held else "")
@@ -151,12 +153,12 @@ def test_an_axis_that_follows_its_load_the_wrong_way_round_is_no_spring_s(axis):
     wheels = wheel_model(WHEELS, "contact")
     K, C = matrices(wheels, values(rng))
     turned = np.where(np.arange(6) == axis, -1.0, 1.0)
-    sways = []
+    responses = []
     for k in range(2):
         w = smooth(rng, 18.0, LOADS, fastest=6.0)
-        sways.append(sway(str(k), w, turned * modes_of(K, C, NONE).respond(w, 1.0 / RATE)))
-    found = fit_compliance(sways, wheels.couples)
-    tried = held_out(sways, found.without)
+        responses.append(response(str(k), w, turned * modes_of(K, C, NONE).respond(w, 1.0 / RATE)))
+    found = fit_compliance(responses, wheels.couples)
+    tried = held_out(responses, found.without)
     assert tried.moves.tolist() == [k != axis for k in range(6)]
     known = element_parameters("K", found.K, found.sigmas()[0], wheels.couples, tried.slips)
     status = {p.name[-2:]: p.status for p in known}
@@ -167,16 +169,16 @@ def test_an_axis_that_follows_its_load_the_wrong_way_round_is_no_spring_s(axis):
 def test_r2_compares_with_a_base_that_stays():
     rng = np.random.default_rng(4)
     K, C = np.diag([8e4, 9e4, 9e5, 2e4, 2e4, 4e3]), np.diag([500.0, 500.0, 1e4, 300.0, 300.0, 20.0])
-    sways = []
+    responses = []
     for k in range(3):
         w = smooth(rng, 20.0, LOADS)
         x = modes_of(K, C, NONE).respond(w, 1.0 / RATE)
         x[:, 5] = np.cumsum(rng.normal(size=len(x))) * 1e-4  # slips where no spring would put it
-        sways.append(sway(str(k), w, x))
-    tried = held_out(sways, lambda k: (K, C))
+        responses.append(response(str(k), w, x))
+    tried = held_out(responses, lambda k: (K, C))
     np.testing.assert_allclose(tried.r2[:5], 1.0)
-    literal = 1.0 - sum(((s.x - predicted(K, C, s.forcing)) ** 2).sum(axis=0) for s in sways) / sum(
-        (s.x**2).sum(axis=0) for s in sways
+    literal = 1.0 - sum(((s.x - predicted(K, C, s.forcing)) ** 2).sum(axis=0) for s in responses) / sum(
+        (s.x**2).sum(axis=0) for s in responses
     )
     np.testing.assert_allclose(tried.r2, literal)
     assert tried.moves[:5].all() and not tried.moves[5]

@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import lsim
 
 from calibration.stages.suspension.modal_response import modes_of
-from tests.doubles.swaying_base import smooth
+from tests.doubles.moving_base import smooth
 
 STEP = 0.01
 NONE = np.zeros((6, 6))

@@ -17,7 +17,7 @@ from calibration.stages.suspension.rest_frame import rest_of, upright
 from calibration.stages.suspension.stage import Form, fit_suspension
 from calibration.stages.suspension.wheels import wheel_model
 from tests.doubles import rigid_robot
-from tests.doubles.swaying_base import T_LAB_BASE, WHEELS, moved, values
+from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved, values
 
 DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
 TRUTH = rigid_robot.Truth(marker_sigma=2e-6, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from calibration.stages.suspension.wheels import wheel_model
-from tests.doubles.swaying_base import WHEELS, values
+from tests.doubles.moving_base import WHEELS, values
 
 
 def test_the_printed_formula_is_what_the_matrix_computes():

@@ -8,7 +8,7 @@ import pinocchio as pin
 from calibration.numerics.signals import RATE
 from calibration.recording.schema import Wheel
 from calibration.recording.trial import Trial
-from calibration.stages.suspension.base_response import Forcing, Sway
+from calibration.stages.suspension.base_response import BaseResponse, Forcing
 from tests.doubles import rigid_robot
 
 WHEELS = tuple(
@@ -43,10 +43,12 @@ def smooth(rng: np.random.Generator, seconds: float, scale: np.ndarray, fastest:
     return np.asarray(scale * window[:, None] * waves)
 
 
-def sway(name: str, w: np.ndarray, x: np.ndarray, M: np.ndarray | None = None, G: np.ndarray | None = None) -> Sway:
+def response(
+    name: str, w: np.ndarray, x: np.ndarray, M: np.ndarray | None = None, G: np.ndarray | None = None
+) -> BaseResponse:
     t, none = np.arange(len(w)) / RATE, np.zeros((6, 6))
     forcing = Forcing(t, w, np.zeros(6), none if M is None else M, none if G is None else G, np.eye(4))
-    return Sway(name, forcing, x, np.ones(len(w), dtype=bool), np.full(6, 1e-14))
+    return BaseResponse(name, forcing, x, np.ones(len(w), dtype=bool), np.full(6, 1e-14))
 
 
 def moved(trial: Trial, x: np.ndarray, t: np.ndarray) -> Trial:
