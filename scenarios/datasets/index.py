@@ -2,8 +2,8 @@
 
     id, split, status, reason, sha256, simulated_s, bytes, then the figures of the runs
 
-`status` is ok, failed (its simulation or fit stopped, with the reason) or killed (it took its worker down). Nothing in it depends on
-how long the work took or who did it.
+`status` is ok, failed (its simulation or fit stopped, with the reason) or killed (it took its worker down). Nothing in
+it depends on how long the work took or who did it.
 """
 
 import csv
