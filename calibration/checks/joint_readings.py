@@ -19,6 +19,9 @@ from calibration.verdict import Verdict
 
 _APART, _FEW = 0.1, 20  # [rad, m] a link may be off its motor by this much, its zero apart; readings to judge by
 _MARGIN = 0.3  # a reading may be outside its joint's limits by this much [rad, m] plus this share of the range
+_COPIED = (
+    0.01  # of an encoder's noise by which a reading may differ from its command; noise and quantisation are larger
+)
 _SHARE = 0.05  # of the samples that may be farther out
 _BEYOND = 0.1  # rms [rad, m]
 _NEAR = 0.1  # of the slope [-]
@@ -52,18 +55,18 @@ def implausible_readings(chain: Chain, q: np.ndarray) -> Iterator[str]:
 
 
 def commanded(trial: Trial, sigma: float) -> Iterator[str]:
-    """Joints whose readings follow the command more closely than the encoder, of noise sigma [rad, m], can show."""
+    """Joints whose readings are the commands, closer than an encoder's noise sigma [rad, m] or quantisation allows."""
     names = []
     for name, read, asked in zip(trial.joint, trial.q_motor.T, trial.q_command.T, strict=True):
         known = np.isfinite(asked)
         moves = np.abs(np.gradient(np.where(known, asked, 0.0))) > sigma if len(asked) > 1 else known
         apart = (read - asked)[known & moves]
-        if len(apart) >= _FEW and apart.std() < sigma:
+        if len(apart) >= _FEW and apart.std() < _COPIED * sigma:
             names.append(name)
     if names:
         yield (
-            f"readings of {', '.join(names)} are the commands, to {sigma:.1g} rad in motion: a motor follows later; "
-            "record what its encoder read"
+            f"readings of {', '.join(names)} are the commands, to {_COPIED * sigma:.1g} rad in motion: "
+            "record what the encoders read, which are noisier"
         )
 
 

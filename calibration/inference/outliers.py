@@ -77,17 +77,19 @@ def _agreed(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.
     weight[some] = found.at.weight
     at, distance = _judged(everything, found, weight)
     kept = _near(distance, _ROUGHLY * limit)
+    used = kept
     for _ in range(_ROUNDS):
+        used = kept
         good = everything if kept.all() else problem(kept)
         found = solve(replace(good, start=found.widths), at.rows(kept))
         if kept.all():
             distance = distances(found.at, found.noise, found.widths, found.covariance)
         else:
             at, distance = _judged(everything, found, kept.astype(float))
-        if np.array_equal(_near(distance, limit), kept):
-            break
         kept = _near(distance, limit)
-    return RobustFit(found, kept, distance)
+        if np.array_equal(kept, used):
+            break
+    return RobustFit(found, used, distance)
 
 
 def _near(distance: np.ndarray, limit: float) -> np.ndarray:

@@ -11,9 +11,8 @@ from scenarios.report.sections.paper_models import PaperModels
 from scenarios.report.sections.parameters import Parameters
 from scenarios.report.sections.payload import Payload
 from scenarios.report.sections.recordings import Recordings
-from scenarios.report.sections.reproduce import Reproduce
 from scenarios.report.sections.slip import Slip
-from scenarios.report.sections.stages import Stages
+from scenarios.report.sections.stages import Reproduce, Stages
 from scenarios.report.sections.verdict import Verdict
 
 SECTIONS: tuple[type[Section], ...] = (

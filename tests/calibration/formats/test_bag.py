@@ -30,8 +30,8 @@ def trial(n: int = 50) -> Trial:
     link[:, 0] = np.nan
     noise = [rng.normal(size=q.shape) for _ in range(3)]
     return replace(
-        empty_trial(0.5), t_robot=t, q_motor=q, q_link=link, v_motor=noise[0], effort=noise[1], q_command=q,
-        wrist_wrench=rng.normal(size=(n, 6)),
+        empty_trial(0.5), t_robot=t, q_motor=q, q_link=link, v_motor=noise[0], effort=noise[1],
+        q_command=q + 1e-4 * noise[0], wrist_wrench=rng.normal(size=(n, 6)),
     )  # fmt: skip
 
 
