@@ -152,6 +152,7 @@ def test_workers_write_the_same_bytes(tmp_path, undisturbed):
     assert tree(tmp_path / "c") == undisturbed
 
 
+@pytest.mark.slow
 def test_a_mistake_and_a_killed_worker_end_as_rows_and_the_rest_completes(tmp_path):
     code, err = script(tmp_path / "c", workers=2, produce="worse").ended()
     assert code == 0, err
@@ -161,7 +162,8 @@ def test_a_mistake_and_a_killed_worker_end_as_rows_and_the_rest_completes(tmp_pa
     assert "took its worker down" in rows[4].reason
 
 
-@pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 2])
 def test_killed_at_random_moments_it_resumes_to_the_same_bytes(tmp_path, undisturbed, workers):
     rng = random.Random(workers)
     out = tmp_path / "c"

@@ -56,6 +56,7 @@ def found(task):
     return plan(task, 30, "G", np.random.default_rng(2))
 
 
+@pytest.mark.slow
 def test_thirty_designed_postures_beat_random_ones_where_the_robot_departs_from_its_model(found):
     against = compared(found, np.random.default_rng(3))
     assert len(found.design.chosen) == 30 and len(against.random) == 100
