@@ -135,7 +135,7 @@ def _unreadable() -> tuple[type[Exception], ...]:
     from rosbags.rosbag2 import ReaderError as Two
     from rosbags.rosbag2.reader import zstd
 
-    damaged = OSError, EOFError, ValueError, KeyError, AssertionError, RuntimeError
+    damaged = OSError, EOFError, ValueError, KeyError, OverflowError, AssertionError, RuntimeError
     return AnyReaderError, One, Two, zstd.ZstdError, *damaged
 
 
