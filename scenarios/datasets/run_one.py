@@ -9,7 +9,7 @@ from pathlib import Path
 
 from scenarios.datasets.index import Row
 from scenarios.datasets.run_spec import Magnitude, Order
-from scenarios.steps import one_blas_thread
+from scenarios.steps.threads import one_blas_thread
 
 MANIFEST = "run.json"
 PARTIAL = ".partial"

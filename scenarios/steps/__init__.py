@@ -14,7 +14,6 @@ from scenarios.steps.run_steps import (
     simulate,
     versions,
 )
-from scenarios.steps.threads import one_blas_thread
 
 __all__ = [
     "Progress",
@@ -23,7 +22,6 @@ __all__ = [
     "evaluate",
     "evaluated",
     "load",
-    "one_blas_thread",
     "options",
     "report",
     "run",
