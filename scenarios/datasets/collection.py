@@ -6,13 +6,11 @@ A run appears in runs/ when it is complete; the index is written from what is th
 same command goes on where it stopped and ends with the same bytes.
 """
 
-import fcntl
 import json
 import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,7 +76,7 @@ def collect(
     """
     _check_place(plan)
     plan.folder.mkdir(parents=True, exist_ok=True)
-    with _alone(plan.folder):
+    with folder.locked(os.open(plan.folder, os.O_RDONLY), plan.folder):
         _clear_partial(plan.folder)
         (plan.folder / "runs").mkdir(exist_ok=True)
         write_whole(plan.folder / "collection.json", _description(plan))
@@ -165,20 +163,6 @@ def _description(plan: Plan) -> str:
             "seeds": "SeedSequence(scenario.seed, spawn_key=(id,))",
         }
     return json.dumps(content, indent=1) + "\n"
-
-
-@contextmanager
-def _alone(place: Path) -> Iterator[None]:
-    """Hold the folder; the hold ends with the process, however that ends."""
-    handle = os.open(place, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise ScenarioError(f"{place}: another command is writing it; wait for it, or stop it") from error
-        yield
-    finally:
-        os.close(handle)
 
 
 def _clear_partial(place: Path) -> None:

@@ -182,20 +182,31 @@ def _is_remnant(name: str) -> bool:
 
 
 @contextmanager
+def locked(handle: int, place: Path) -> Iterator[None]:
+    """Lock an open folder and close it at the end; the lock ends with the process, however that ends.
+
+    Raises:
+        ScenarioError: Another command is writing `place`.
+    """
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ScenarioError(f"{place}: another command is writing it; wait for it, or stop it") from error
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
 def _held(work: Path, out: Path) -> Iterator[None]:
     """Hold a work folder; the hold ends with the process, however that ends."""
     try:
         handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError as error:
         raise ScenarioError(f"{work}: cannot be read: {error.strerror}; remove it") from error
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise ScenarioError(f"{out}: another command is writing it; wait for it, or stop it") from error
+    with locked(handle, out):
         yield
-    finally:
-        os.close(handle)
 
 
 @contextmanager

@@ -97,13 +97,6 @@ def moved(hand: HandModel, bending: ColumnBending, q: np.ndarray, moment: np.nda
     return np.asarray(T_B_base @ T_base_column @ turn @ inverse(T_base_column) @ _base(hand))
 
 
-def dwell_moments(trial: Trial, loads: LinkLoads, robot: Clock) -> np.ndarray:
-    """Mean moments (n_dwells, 2) [N.m] of the dwells with readings."""
-    t = robot.to_mocap(loads.t)
-    rows = [(t >= start) & (t <= stop) for start, stop in dwell_windows(trial)]
-    return np.array([loads.moment[k].mean(axis=0) for k in rows if k.any()]).reshape(-1, 2)
-
-
 def _base(hand: HandModel) -> np.ndarray:
     return from_vector(hand.base)
 
