@@ -19,7 +19,7 @@ def recipe(name: str) -> str:
 def copied(tree: Path, *packages: str) -> Path:
     """A folder with a copy of the packages whose code a recipe edits."""
     for package in packages:
-        shutil.copytree(ROOT / package, tree / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / package, tree / package)  # with what numba compiled: modules keep their times
     return tree
 
 

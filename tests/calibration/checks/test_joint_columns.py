@@ -52,6 +52,7 @@ WRONG = {
     "reversed": (reversed_, "joint arm_6_joint is reversed"),
     "degrees": (degrees, "(recorded in degrees?)"),
 }
+SOME_WRONG = ["swapped", *(pytest.param(name, marks=pytest.mark.slow) for name in ("reversed", "degrees"))]
 
 
 def with_readings(change):
@@ -68,7 +69,7 @@ def files(folder: Path) -> list[Path]:
     return sorted(p for p in folder.iterdir() if p.name not in ("mapping.yaml", "nominal.urdf"))
 
 
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("name", SOME_WRONG)
 def test_wrong_columns_of_csv_files_are_told_by_name(tmp_path, capsys, name):
     change, words = WRONG[name]
     source, csv = rigid_robot.write(tmp_path / "source", with_readings(change)), tmp_path / "csv"
@@ -78,7 +79,7 @@ def test_wrong_columns_of_csv_files_are_told_by_name(tmp_path, capsys, name):
     assert words in said and ".csv" in said and not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("name", SOME_WRONG)
 def test_wrong_columns_of_bags_added_to_c3d_files_are_told_by_name(tmp_path, capsys, name):
     change, words = WRONG[name]
     source = rigid_robot.write(tmp_path / "source", with_readings(change))

@@ -21,7 +21,10 @@ def read_on(axes: np.ndarray, trial: Trial) -> Trial:
 
 @pytest.mark.parametrize(
     ("axes", "said"),
-    [(-np.eye(3), "plate sign: Fz"), (np.diag([-1.0, -1.0, 1.0]), "plate rotated by")],
+    [
+        (-np.eye(3), "plate sign: Fz"),
+        pytest.param(np.diag([-1.0, -1.0, 1.0]), "plate rotated by", marks=pytest.mark.slow),
+    ],
     ids=["negated", "half a turn"],
 )
 def test_a_wrong_plate_is_refused_and_the_command_ends_with_1(

@@ -95,7 +95,7 @@ def test_enough_postures_ask_for_no_more(chain):
     assert record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, False) == (None, ())
 
 
-@pytest.mark.parametrize("n, widest", [(4, 2.5), (8, 1.5)])
+@pytest.mark.parametrize("n, widest", [(4, 2.5), pytest.param(8, 1.5, marks=pytest.mark.slow)])
 def test_a_fit_that_must_not_be_used_ends_with_postures_too(chain, n, widest):
     """Their sigmas are those of the recorded errors; at the datasheet's play, which is not there, up to nine times."""
     postures = recorded(rigid_robot.near_postures(np.random.default_rng(0), n), 1)

@@ -53,7 +53,7 @@ def test_two_markers_that_part_are_told_with_their_size_wherever_the_body_turns(
     assert 1e-4 < apart.min()
 
 
-@pytest.mark.parametrize("m", [3, 4])
+@pytest.mark.parametrize("m", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_errors_of_all_markers_have_their_size_by_coordinate(m):
     rng, found = np.random.default_rng(1), []
     for _ in range(200):

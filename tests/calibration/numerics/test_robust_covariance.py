@@ -34,7 +34,15 @@ def covered(a, n, trials, p, seeds):
     return np.mean(hits), np.mean(naive), found
 
 
-@pytest.mark.parametrize("a, n, trials, p", [(0.0, 500, 8, 3), (0.8, 500, 8, 3), (0.9, 4000, 1, 3), (0.8, 250, 8, 21)])
+@pytest.mark.parametrize(
+    "a, n, trials, p",
+    [
+        (0.0, 500, 8, 3),
+        pytest.param(0.8, 500, 8, 3, marks=pytest.mark.slow),
+        (0.9, 4000, 1, 3),
+        pytest.param(0.8, 250, 8, 21, marks=pytest.mark.slow),
+    ],
+)
 def test_intervals_cover_whatever_the_autocorrelation(a, n, trials, p):
     by_block, naive, found = covered(a, n, trials, p, 150)
     assert 0.925 < by_block < 0.975  # 95 % within two and a half standard deviations of 150 draws with 3 of p apart

@@ -68,6 +68,7 @@ def test_postures_that_cannot_tell_both_frames_are_refused(hand, description):
         fit_frames(hand, turned, hand.poses(turned), description)
 
 
+@pytest.mark.slow
 def test_frames_of_few_postures_are_as_uncertain_as_the_same_fit_repeated_shows(hand, description):
     """Geometry off by its own covariance, readings by their random errors: the markers' errors at other postures."""
     rng, q, other = (

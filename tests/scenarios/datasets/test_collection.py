@@ -192,6 +192,7 @@ def test_ctrl_c_leaves_an_index_of_what_is_complete(tmp_path, undisturbed):
     assert tree(out) == undisturbed
 
 
+@pytest.mark.slow
 def test_without_room_it_stops_and_goes_on_later(tmp_path, undisturbed):
     out = tmp_path / "c"
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731

@@ -89,6 +89,7 @@ def test_a_robot_plays_the_tour(found, tmp_path):
     assert trajectory["joint_names"] == list(chain.measured) and (np.diff(stamps) > 0.0).all()
 
 
+@pytest.mark.slow
 def test_without_departures_they_beat_random_ones_by_thirty_percent(task):
     exact = replace(task, departures=None)
     against = compared(plan(exact, 30, "G", np.random.default_rng(2)), np.random.default_rng(3))

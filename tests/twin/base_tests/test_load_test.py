@@ -50,7 +50,7 @@ def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
     np.testing.assert_allclose(C[2, 2], sum(series).imag / h, rtol=1e-9)
 
 
-@pytest.mark.parametrize("ground", ["contact", "anchored", "turning"])
+@pytest.mark.parametrize("ground", ["contact", "anchored", pytest.param("turning", marks=pytest.mark.slow)])
 def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
     twin, wheels = standing(nominal, *GROUNDS[ground])
     K, C = spatial_stiffness(wheels)
@@ -114,7 +114,9 @@ TORSION = {
 }
 
 
-@pytest.mark.parametrize(("axes", "ground"), [("z", "contact"), ("xyz", "contact"), ("xyz", "anchored")])
+@pytest.mark.parametrize(
+    ("axes", "ground"), [pytest.param("z", "contact", marks=pytest.mark.slow), ("xyz", "contact"), ("xyz", "anchored")]
+)
 def test_torsion_is_carried_to_the_floor(nominal, axes, ground):
     twin, wheels = standing(nominal, *TORSION[axes], f"twin.base.wheels={ground}")
     K, C = spatial_stiffness(wheels)
@@ -145,7 +147,7 @@ def test_torsion_that_a_light_wheel_cannot_follow_is_refused(nominal):
         standing(nominal, "twin.base.caster_back.torsion=[0.0, 0.0, 1200.0]")
 
 
-@pytest.mark.parametrize("stiffness", [2e5, 8e5, 3e6])
+@pytest.mark.parametrize("stiffness", [2e5, pytest.param(8e5, marks=pytest.mark.slow), 3e6])
 def test_soft_contacts_alone_carry_heave_and_tilt(nominal, stiffness):
     kinds = ("drive", "caster_front", "caster_back")
     contacts = [f"twin.base.{w}.contact_stiffness={stiffness}" for w in kinds]

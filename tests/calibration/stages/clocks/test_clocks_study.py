@@ -42,7 +42,7 @@ def errors(seed: int, kind: str) -> tuple[float, float, float]:
     return 1e3 * rms, float(off(np.array([clock.epoch]))[0] / clock.sigma), float(drift)
 
 
-@pytest.mark.parametrize("kind", ["swing", "static"])
+@pytest.mark.parametrize("kind", ["swing", pytest.param("static", marks=pytest.mark.slow)])
 def test_jitter_gears_and_one_trial_give_the_clock_within_its_limit(kind):
     rms, epoch, drift = errors(200, kind)
     assert rms <= LIMITS_MS[kind]

@@ -44,7 +44,9 @@ def delivered(postures, fitted):
     return next(m for m in fitted if m.name == best.best), best.verdicts
 
 
-@pytest.mark.parametrize("n, seen", [(8, 6), (12, 3), (20, 3)])
+@pytest.mark.parametrize(
+    "n, seen", [(8, 6), pytest.param(12, 3, marks=pytest.mark.slow), pytest.param(20, 3, marks=pytest.mark.slow)]
+)
 def test_a_few_postures_calibrate_and_say_that_they_are_few(n, seen):
     some, others = robot(1, n, seen=seen)
     model, said = calibrate_geometry(CHAIN, LAB, some)
