@@ -1,4 +1,4 @@
-"""A robot drawn from all that is plausible of the real one's base, calibrated like the others."""
+"""A robot sampled from all that is plausible of the real one's base, calibrated like the others."""
 
 from scenarios import load, run
 

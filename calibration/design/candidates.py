@@ -1,7 +1,7 @@
 """Postures to choose from: inside the joints' limits, clear of the robot itself, base and hand in the cameras' sight.
 
 Drawn uniformly in the joints' ranges, a margin inside the limits, and kept where all of that holds. A continuous joint
-is drawn from one turn.
+is sampled from one turn.
 
 Which markers cameras would see, the robot's own shapes in the way.
 

@@ -1,4 +1,4 @@
-"""The spin or drive that would tell what a base frame holds at its drawing.
+"""The spin or drive that observes what of a base frame is fixed at nominal.
 
 What it would tell is what the stage itself says of the recorded rests and the suggested ones, those without noise but
 with the recorded ones' covariance: a drive that goes straight, a base that turns where it turned. How high the base is
@@ -80,7 +80,7 @@ def drive_next(
         before = {axis: p.sigma for axis, p in zip(AXES, model.parameters, strict=False)}
     rows = [(a, p) for a, p in zip(AXES, found.parameters, strict=False) if p.status == "estimated"]
     sigma = tuple(Sigma(p.name, p.unit, before[a], p.sigma) for a, p in rows if p.sigma < 0.99 * before[a])
-    why = f"{name} is held at its drawing in what only a {' and a '.join(m.kind for m in motions)} tell"
+    why = f"{name}: components observable only from a {' and a '.join(m.kind for m in motions)} are fixed at nominal"
     remedy = ExperimentPlan(STAGE, why, motions=motions, sigma=sigma)
     expected = ", ".join(f"{s.name} {s.before:.2g} -> {s.after:.2g} {s.unit}" for s in sigma)
     steps = " and ".join(f"a {m.kind} of {m.rests} rests" for m in motions)

@@ -3,10 +3,10 @@
     C before = T^-1 Sigma T^-1,     Sigma the covariance of the fit, T = diag(tolerance)        (see `information`)
     C after  = (C^-1 + sum_5 B' B)^-1
 
-A direction is untold where the data shrink its prior variance by less than a tenth, while postures elsewhere inside the
-limits would shrink it. Directions no posture tells, the gauge, do not move the hand and are not counted. They are
-chosen by D, which looks for untold directions first. After a refused fit the robot is taken as drawn, and its random
-errors as the recorded postures let believe (`believed_play`).
+A direction is unobserved where the data shrink its prior variance by less than a tenth, while postures elsewhere
+inside the limits would shrink it. Directions no posture shows, the gauge, do not move the hand and are not counted.
+They are chosen by D, which looks for unobserved directions first. After a rejected fit the robot is taken as nominal,
+and its random errors as the recorded postures suggest (`believed_play`).
 
 How large the readings' random errors are believed to be where a fit must not be relied on.
 
@@ -44,7 +44,7 @@ from calibration.verdict import Verdict
 
 STAGE, FILE = "geometry", "record_next.yaml"
 N = 5
-_UNTOLD = 0.9  # of a direction's prior variance, left of it [-]
+_UNOBSERVED = 0.9  # of a direction's prior variance, left of it [-]
 _FALLS = 0.7  # sigma after over before, of parameters worth naming [-]
 _NEVER = 0.99  # sigma after over before, of parameters that no posture tells [-]
 _NAMED = 12
@@ -64,7 +64,7 @@ class Known:
         reading_sigma: (k,) random error of each joint's reading [rad, m].
         description: With the marker noise the recorded postures had.
         C: (p, p) covariance of the scaled parameters.
-        untold: Number of directions that postures could tell and these did not.
+        unobserved: Number of directions that postures could tell and these did not.
     """
 
     hand: HandModel
@@ -72,7 +72,7 @@ class Known:
     reading_sigma: np.ndarray
     description: Description
     C: np.ndarray
-    untold: int
+    unobserved: int
 
 
 def record_next(
@@ -85,7 +85,7 @@ def record_next(
         p.name for p in model.parameters if p.status == "not_identifiable" and p.name in known.parameters.names
     )
     short = _short(chain, postures)
-    if not known.untold and not lost and short <= 0:
+    if not known.unobserved and not lost and short <= 0:
         return None, ()
     try:
         room = room_of(shapes_of(urdf, chain, description), known.description, rng)
@@ -128,8 +128,8 @@ def _known(
     C = by_tolerance = told.after(np.arange(len(postures)))
     if not refused:
         C = model.covariance[np.ix_(rows, rows)] / np.outer(parameters.scale, parameters.scale)
-    untold = int((np.linalg.eigvalsh(V.T @ by_tolerance @ V) > _UNTOLD).sum())
-    return Known(hand, parameters, play, description, C, untold)
+    unobserved = int((np.linalg.eigvalsh(V.T @ by_tolerance @ V) > _UNOBSERVED).sum())
+    return Known(hand, parameters, play, description, C, unobserved)
 
 
 def _short(chain: Chain, postures: Postures) -> int:
@@ -154,7 +154,7 @@ def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> Exp
     whole = found.remedy(STAGE, "").sigma
     most = sorted((s for s in whole if s.after < _FALLS * s.before), key=lambda s: s.after / s.before)[:_NAMED]
     named = {s.name for s in most} | set(lost)
-    why = f"{known.untold} of {_directions(found)} identifiable combinations are determined by the prior only"
+    why = f"{known.unobserved} of {_directions(found)} identifiable combinations are determined by the prior only"
     if short > 0:
         why = f"{short} distinct postures are missing; {why}"
     never = [s.name for s in whole if s.name in lost and s.after > _NEVER * s.before]

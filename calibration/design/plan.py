@@ -1,9 +1,9 @@
-"""Postures to record: chosen for what they tell, with the side each joint comes from, in an order to drive them.
+"""Postures to record: chosen for their information, with the side each joint comes from, in an order to drive them.
 
 From a robot's room to a design: a coarse choice, then the neighbourhoods of what was chosen.
 
-Candidates are drawn over the whole room, the best are chosen (`design`), and twice more from ever nearer neighbours of
-those: the best postures lie at limits that a coarse pool misses.
+Candidates are sampled over the whole room, the best are chosen (`design`), and twice more from ever nearer neighbours
+of those: the best postures lie at limits that a coarse pool misses.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ _ANYWHERE = 200  # postures from which largest torques are determined
 _RANDOM = 100  # sets of random postures the design is compared with
 _FRESH = 300  # postures the comparison predicts the hand at
 Sample = Callable[[int, np.random.Generator], np.ndarray]
-"""So many postures (n, n_measured), drawn."""
+"""So many postures (n, n_measured), sampled."""
 _POOL = 500
 _WIDTHS = (0.12, 0.05)  # of a joint's range, of the neighbours of the second and third choice [-]
 _NEIGHBOURS = 400
@@ -75,7 +75,7 @@ class Comparison:
 
     Attributes:
         designed: After the design.
-        random: (m,) after as many random postures, drawn like those.
+        random: (m,) after as many random postures, sampled like those.
     """
 
     designed: float
@@ -93,7 +93,7 @@ def nominal_task(urdf: str, description: Description, rng: np.random.Generator, 
     Args:
         urdf: Of the robot.
         description: Of the laboratory.
-        rng: For what is drawn.
+        rng: For what is sampled.
         work: Draws postures like those the robot works in.
     """
     chain = chain_of(urdf, description)
@@ -170,8 +170,8 @@ def plan(task: Task, n: int, criterion: Criterion, rng: np.random.Generator) -> 
 def compared(found: Plan, rng: np.random.Generator) -> Comparison:
     """The design against random postures like those the robot works in, the hand predicted at others, new to both."""
     task, n = found.task, len(found.design.chosen)
-    drawn = task.sample(_FRESH + 4 * n, rng)
-    p = task.prospect(np.concatenate([drawn[_FRESH:], found.design.q]), drawn[:_FRESH])
+    sampled = task.sample(_FRESH + 4 * n, rng)
+    p = task.prospect(np.concatenate([sampled[_FRESH:], found.design.q]), sampled[:_FRESH])
     sets = [rng.choice(4 * n, n, replace=False) for _ in range(_RANDOM)]
     *random, designed = (p.hand(p.after(x), p.pulled(x)).max() for x in (*sets, 4 * n + np.arange(n)))
     return Comparison(float(designed), np.array(random))
@@ -187,15 +187,15 @@ def search(
 ) -> Design:
     """Choose n postures in a room; `prospect_at(q, at)` says what candidates tell of the hand at other postures.
 
-    Those are drawn by `work`, anywhere in the room where it is not given; candidates from both.
+    Those are sampled by `work`, anywhere in the room where it is not given; candidates from both.
 
     Raises:
         NotEnoughData: The room has hardly any postures.
     """
     size = max(_POOL, 5 * n)
     if work is None:
-        drawn = room.pool(size + _AT, rng)
-        at, pool = drawn[:_AT], drawn[_AT:]
+        pool = room.pool(size + _AT, rng)
+        at, pool = pool[:_AT], pool[_AT:]
     else:
         at, pool = work(_AT, rng), np.concatenate([room.pool(size // 2, rng), room.admits(work(size // 2, rng))])
     prospect = prospect_at(pool, at)

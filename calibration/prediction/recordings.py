@@ -1,6 +1,6 @@
 """Recordings as arrays on one clock, for programs that have no stages of their own.
 
-    T_base_hand    pose of the hand's marker body in the base's, as drawn in dataset.json
+    T_base_hand    pose of the hand's marker body in the base's, as stated in dataset.json
     nominal(q)     the same by the datasheet: T_base_hand = F_base nominal(q - zeros) F_hand, both F near the identity
 
 Clocks are estimated as by stage `clocks`; postures are means over the dwells.

@@ -46,7 +46,7 @@ class Chain:
         base_frame: Name of the frame poses are expressed in.
         tool_frame: Name of the frame whose pose is meant.
         xi: (k, 6) placement twists [m, rad].
-        drawn: The nominal path from base to tool.
+        nominal_path: The path from base to tool.
         loads: Bodies moved by the measured joints, and the payload.
     """
 
@@ -56,7 +56,7 @@ class Chain:
     base_frame: str
     tool_frame: str
     xi: np.ndarray
-    drawn: Path
+    nominal_path: Path
     loads: Loads
 
     @property
@@ -76,7 +76,7 @@ class Chain:
     @cached_property
     def path(self) -> Path:
         """The path from base to tool with the placement twists applied."""
-        return self.drawn.moved(np.concatenate([exp6(self.xi), np.eye(4)[None]]))
+        return self.nominal_path.moved(np.concatenate([exp6(self.xi), np.eye(4)[None]]))
 
     @cached_property
     def twists(self) -> np.ndarray:
@@ -85,7 +85,7 @@ class Chain:
         The first is the base's, which none of them moves.
         """
         out = np.zeros((len(self.joints) + 1, 6, 7))
-        out[1:, :, :6], out[1:, :, 6] = jexp6(self.xi), self.drawn.twists
+        out[1:, :, :6], out[1:, :, 6] = jexp6(self.xi), self.nominal_path.twists
         return out
 
     @cached_property
@@ -218,7 +218,7 @@ def chain_of_frames(
     several = [name for name in joints if model.joints[model.getJointId(name)].nv != 1]
     if several:
         raise InputError("nominal.urdf", f"joints {several} have more than one degree of freedom; none of a chain may")
-    drawn = path_of(model, model.getFrameId(base.name), model.getFrameId(tool.name))
+    path = path_of(model, model.getFrameId(base.name), model.getFrameId(tool.name))
     return Chain(
         model,
         measured,
@@ -226,6 +226,6 @@ def chain_of_frames(
         base.name,
         tool.name,
         np.zeros((len(joints), 6)),
-        drawn,
+        path,
         loads_of(model, measured, payload, gravity),
     )

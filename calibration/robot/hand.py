@@ -157,7 +157,7 @@ class HandModel:
         readings = q[:, self.nominal.columns]
         placed = self._path.placed(readings - self._reading_error(readings, tau))
         twists = np.zeros((len(self.nominal.joints) + 1, 6, 7))
-        twists[:, :, :6], twists[1:, :, 6] = np.eye(6), self.nominal.drawn.twists
+        twists[:, :, :6], twists[1:, :, 6] = np.eye(6), self.nominal.nominal_path.twists
         J = placed.end_twists(twists)
         return HandKinematics(readings, tau, placed.T, J[..., :6], J[:, :, 1:, 6])
 

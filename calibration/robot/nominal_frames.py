@@ -63,14 +63,14 @@ def frame_names() -> tuple[str, str]:
 
 
 def nominal_frames(chain: Chain, description: Description) -> np.ndarray:
-    """T_base_B and T_tool_H with every marker body on its link as drawn, (12,) [m, rad]."""
+    """T_base_B and T_tool_H with every marker body on its link as nominal, (12,) [m, rad]."""
     T_base_tool = chain.poses(np.zeros((1, len(chain.measured))))[0]
     T_tool_H = np.linalg.solve(T_base_tool, _drawn(chain, description.hand_body))
     return np.concatenate([to_vector(nominal_base_body(chain, description)), to_vector(T_tool_H)])
 
 
 def nominal_base_body(chain: Chain, description: Description) -> np.ndarray:
-    """T_base_B (4, 4) with the base's marker body as drawn; the hand may have none."""
+    """T_base_B (4, 4) with the base's marker body as nominal; the hand may have none."""
     return _drawn(chain, description.base_body)
 
 

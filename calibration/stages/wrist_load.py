@@ -7,9 +7,9 @@ its centre [m], f_0 the sensor's zero, tau_0' = tau_0 - c x f_0. E turns the sen
 the hand's markers tell R_base_sensor up to a constant on either side. w, E and f_0 by Gauss-Newton, c linearly;
 standard deviations from the residuals, those of a posture together. A base out of level turns w and not m. A gain of
 the sensor's passes for mass: a sensor that is 1 % off weighs 1 % wrong.
-Nominal: all links of the drawing beyond the sensor, and the declared payload where it hangs there.
+Nominal: all nominal links beyond the sensor, and the declared payload where it hangs there.
 
-What the wrist's sensor says hangs on it, held against the drawing and the declared payload.
+What the wrist's sensor says hangs on it, compared with the nominal links and the declared payload.
 
     R_base_sensor = R_base_B R_B_H R_H_tool R_tool_sensor       R_B_H measured by the markers in each dwell
 
@@ -133,8 +133,8 @@ def _least_squares(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return x, psi.T @ psi
 
 
-def drawn(lab: Laboratory, link: str) -> Hanging:
-    """What hangs on the sensor at `link` by the drawing and the declared payload, as wide as their tolerances."""
+def expected_load(lab: Laboratory, link: str) -> Hanging:
+    """What hangs on the sensor at `link` by the nominal links and the declared payload, as wide as their tolerances."""
     model, description = pin.buildModelFromXML(lab.urdf), lab.description
     data, sensor = model.createData(), model.getFrameId(link)
     pin.framesForwardKinematics(model, data, pin.neutral(model))
@@ -202,7 +202,7 @@ def weighed(
         found = weigh(R, np.array([w[label] for label in seen.label]), np.array(description.gravity))
     except NotEnoughData as error:
         return (Verdict(_STAGE, "missing", str(error)),)
-    return (_judged(found, drawn(lab, link), link, len(seen)),)
+    return (_judged(found, expected_load(lab, link), link, len(seen)),)
 
 
 def _turned(hand: HandModel, postures: Postures, link: str) -> np.ndarray:
@@ -229,7 +229,7 @@ def _judged(found: Hanging, expected: Hanging, link: str, n: int) -> Verdict:
     message = (
         f"wrist: {found.mass:.3f} +- {found.sigma[0]:.3f} kg hang on {link}, centre {_millimetres(found.centre)} mm "
         f"+- {_millimetres(found.centre_sigma, 1)}, "
-        f"{n} postures; drawing and declared payload: {expected.mass:.3f} +- {expected.sigma[0]:.3f} kg"
+        f"{n} postures; nominal links and declared payload: {expected.mass:.3f} +- {expected.sigma[0]:.3f} kg"
     )
     more = found.less(expected)
     if abs(more.mass) <= _CLEAR * more.sigma[0]:

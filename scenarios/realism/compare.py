@@ -1,4 +1,4 @@
-"""Many drawn robots against the log of a real one: swings by its figures, and its wrench replayed on their bases."""
+"""Many sampled robots against the log of a real one: swings by its figures, and its wrench replayed on their bases."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -61,7 +61,7 @@ class Replayed:
     """Draws under a recorded wrench.
 
     Attributes:
-        condition: What is not as drawn.
+        condition: What is not nominal.
         n: Robots.
         trials: Share of the time inside the band, by trial.
         share: Of all of them, by axis.
@@ -74,7 +74,7 @@ class Replayed:
 
 
 def compare_swings(scenario: Scenario, n: int) -> Swings:
-    """Swing n drawn robots."""
+    """Swing n sampled robots."""
     config = scenario.twin
 
     def one(seed: int) -> tuple[Figures, YawFromMoment] | str:
@@ -92,7 +92,7 @@ def compare_swings(scenario: Scenario, n: int) -> Swings:
 
 
 def compare_replay(scenario: Scenario, trials: Sequence[Recorded], n: int, condition: Condition = AS_DRAWN) -> Replayed:
-    """Replay the wrench of each trial on the bases of n drawn robots."""
+    """Replay the wrench of each trial on the bases of n sampled robots."""
     seeds, found = range(scenario.seed, scenario.seed + n), []
     for trial in trials:
         draws = _each(partial(_base, scenario, trial, condition), seeds)

@@ -5,7 +5,7 @@ slips in peaks, the displacement at 10 Hz. At rest a robot pulls the floor neith
 a plate reads there of these is its offset.
 
 Markers do not keep their shape (`calibration.shape_change`). What of it is a motion of the body cannot be seen; it is
-drawn as large as what can, d(t), at the same times, in directions of its own (`Recorded.shifting`):
+sampled as large as what can, d(t), at the same times, in directions of its own (`Recorded.shifting`):
 
     e(t) = G d(t) / sqrt(3 m - 6)      G (3 m, 3 m) ~ N(0, 1):  each coordinate's variance is |d|^2 / (3 m - 6)
 """

@@ -1,4 +1,4 @@
-"""A recorded wrench replayed on the bases of many drawn robots: does what was measured lie among what they do?
+"""A recorded wrench replayed on the bases of many sampled robots: does what was measured lie among what they do?
 
 inside_k = share of the time that  q05_k(t) <= x_k(t) <= q95_k(t)          axis k, quantiles over the draws
 """
@@ -16,18 +16,18 @@ from twin.fields import sampled
 from twin.instruments import sample_plate
 from twin.random_streams import generator
 
-_HOLDS = 10.0  # times the drawn friction: no wheel slides
+_HOLDS = 10.0  # times the sampled friction: no wheel slides
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 BAND = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
 class Condition:
-    """What is not as drawn.
+    """What is not nominal.
 
     Attributes:
         shifting: Markers shift by as much as the recording's are seen to (`Recorded.shifting`).
-        turning: Casters turn (`turning`), each wheel is drawn on its own, the floor holds.
+        turning: Casters turn (`turning`), each wheel is sampled on its own, the floor holds.
     """
 
     shifting: bool = False
@@ -91,7 +91,7 @@ def turning(base: Base, weight: float) -> Base:
 
 
 def floor_of(config: TwinConfig, seed: int, condition: Condition, weight: float) -> tuple[Defect, ...]:
-    """The wheels of one drawn robot under a condition, each drawn on its own where they turn."""
+    """The wheels of one sampled robot under a condition, each sampled on its own where they turn."""
     if not condition.turning:
         base = sampled(config, seed).base
         return ground(base, wheels_of(base))
@@ -100,9 +100,9 @@ def floor_of(config: TwinConfig, seed: int, condition: Condition, weight: float)
 
 
 def replayed(config: TwinConfig, seed: int, trial: Recorded, condition: Condition = AS_DRAWN) -> np.ndarray:
-    """What one drawn robot's base does under a trial's wrench, as motion capture would see it (n, 6) [m, rad].
+    """What one sampled robot's base does under a trial's wrench, as motion capture would see it (n, 6) [m, rad].
 
-    The plate's errors are drawn too: what it read is not what it felt.
+    The plate's errors are sampled too: what it read is not what it felt.
 
     Raises:
         Diverged: The simulation left the numbers.

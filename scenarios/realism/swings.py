@@ -1,4 +1,4 @@
-"""A swing of one drawn robot in the figures the log of a real one was read by, in lab axes.
+"""A swing of one sampled robot in the figures the log of a real one was read by, in lab axes.
 
     rotation      of the base's markers since rest; raw with start and stop, low-passed at 2.5 Hz for steady cycles
     displacement  of their centroid, raw
@@ -101,7 +101,7 @@ class SwingResponse:
 
 
 def swung(config: TwinConfig, seed: int) -> SwingResponse:
-    """Simulate and measure a swing of one drawn robot; how the arm carries the hand, and the ramp, are drawn too."""
+    """Simulate and measure a swing of a sampled robot; how the arm carries the hand, and the ramp, are sampled too."""
     rng = generator(seed, "arm")
     path = AS_LOGGED[int(rng.integers(len(AS_LOGGED)))]
     lab = laboratory(config, seed)

@@ -37,7 +37,7 @@ def locate_arm(lab: Laboratory, postures: Postures, base_frame: Model | None) ->
     Args:
         lab: Nominal robot and setup.
         postures: Static ones.
-        base_frame: Of stage `base_frame`; None: the base's marker body is where it is drawn, to its tolerance.
+        base_frame: Of stage `base_frame`; None: the base's marker body is at its nominal place, to its tolerance.
 
     Raises:
         NotEnoughData: The arm turns about one axis only.

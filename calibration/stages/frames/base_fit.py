@@ -4,7 +4,7 @@
 
     floor    tilted by a little
     E_i      pose of an upright base on the floor, a nuisance of every rest
-    S_t      how the base stands in trial t, height and tilt: zero, or drawn once a trial from N(0, standing^2)
+    S_t      how the base stands in trial t, height and tilt: zero, or sampled once a trial from N(0, standing^2)
     T_base_B the marker body B in the base frame, what is asked for, (x, y, z, rx, ry, rz)
 
 Motion ties the rests of a trial together (`base_ties`), up to a wander of s a step that is estimated, one s a trial

@@ -1,6 +1,6 @@
 """Stage `base_frame`: the marker body in the base frame, from yaw spins and straight drives.
 
-See `base_frame` for the model. A base on soft wheels stands neither quite upright nor quite where its drawing has it,
+See `base_frame` for the model. A base on soft wheels rests neither quite upright nor quite at its nominal place,
 the same at every heading, so that no motion on a floor tells it from a marker body that is mounted so. It may differ
 from trial to trial, and what all trials have in common comes on top of the covariance.
 """
@@ -97,7 +97,7 @@ def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarr
         yield Verdict(STAGE, "ok", f"{name}: {text}")
     missing = [t for t, f in (("height: no plate tells the floor's", free[2]), ("heading: no drive", free[5])) if not f]
     if missing:
-        yield Verdict(STAGE, "warning", f"held at nominal: {', '.join(missing)}")
+        yield Verdict(STAGE, "warning", f"fixed at nominal: {', '.join(missing)}")
     if found.chi2 > _CHI2:
         message = (
             f"rests differ by {np.sqrt(found.chi2):.1f} times the markers' noise in tilt and height; sigmas say so"

@@ -2,7 +2,7 @@
 
     r = T_base_body p_body - T_base_hand(q - offset) T_hand_marker m
 
-p_body: hand markers in the frame of the base's markers (measured); m: hand markers as drawn in dataset.json.
+p_body: hand markers in the frame of the base's markers (measured); m: hand markers as nominal in dataset.json.
 Unknown: both marker frames (translation [m], rotation vector [rad]) and one zero a joint [rad, m].
 """
 
@@ -37,7 +37,7 @@ def calibrate(dataset: Path, out: Path) -> Path:
 
 
 def fit(model: pin.Model, tool: str, postures: Postures, base: np.ndarray, hand: np.ndarray) -> np.ndarray:
-    """Unknowns (12 + n_joints,) from the postures; `base` and `hand` are the markers as drawn (n, 3)."""
+    """Unknowns (12 + n_joints,) from the postures; `base` and `hand` are the markers as nominal (n, 3)."""
     data, frame, n = model.createData(), model.getFrameId(tool), len(postures.joints)
     columns = [model.joints[model.getJointId(name)].idx_q for name in postures.joints]
     bodies = [rigid(base, seen) for seen in postures.base]
@@ -64,7 +64,7 @@ def pose(vector: np.ndarray) -> pin.SE3:
 
 
 def drawn(body: dict) -> np.ndarray:
-    """Markers of a body as drawn (n, 3) [m, body frame]."""
+    """Markers of a body as nominal (n, 3) [m, body frame]."""
     return np.array([marker["xyz"] for marker in body["markers"]])
 
 

@@ -31,7 +31,7 @@ def test_moments_are_those_of_inverse_dynamics_across_the_axis():
         pin.rnea(model, data, q, np.zeros(model.nv), np.zeros(model.nv))
         for name, M in zip(CHAIN.joints, of_posture, strict=True):
             i = model.getJointId(name)
-            axis = CHAIN.drawn.axis[CHAIN.joints.index(name)] * (not CHAIN.is_prismatic(name))
+            axis = CHAIN.nominal_path.axis[CHAIN.joints.index(name)] * (not CHAIN.is_prismatic(name))
             force = data.f[i].angular
             R = model.jointPlacements[i].rotation.T @ data.liMi[i].rotation
             np.testing.assert_allclose(M, R @ (force - axis * (axis @ force)), atol=1e-9)

@@ -18,7 +18,7 @@ from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.nominal_frames import nominal_frames
-from calibration.stages.wrist_load import Hanging, drawn, weigh, weighed
+from calibration.stages.wrist_load import Hanging, expected_load, weigh, weighed
 from tests.doubles import rigid_robot
 
 G = np.array([0.0, 0.0, -9.81])
@@ -71,13 +71,13 @@ def test_postures_that_do_not_turn_the_sensor_against_gravity_are_refused():
 
 def test_the_drawing_is_all_mass_beyond_the_sensor_and_the_payload():
     description = rigid_robot.described()
-    none = drawn(Laboratory(mjcf.urdf(), description), LINK)
+    none = expected_load(Laboratory(mjcf.urdf(), description), LINK)
     model = pin.buildModelFromXML(mjcf.urdf())
     masses = {"wrist_ft_tool_link": 0.1, "gripper_link": 0.60266}
     fingers = sum(model.inertias[model.getJointId(f"gripper_{s}_finger_joint")].mass for s in ("left", "right"))
     assert none.mass == pytest.approx(sum(masses.values()) + fingers, abs=1e-9)
     load = Payload(link="gripper_grasping_frame", mass=0.5, com=(0.0, 0.0, 0.0), tolerance=0.05)
-    more = drawn(Laboratory(mjcf.urdf(), description.model_copy(update={"payload": load})), LINK).less(none)
+    more = expected_load(Laboratory(mjcf.urdf(), description.model_copy(update={"payload": load})), LINK).less(none)
     assert more.mass == pytest.approx(0.5)
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
@@ -93,13 +93,13 @@ def test_what_is_left_has_both_covariances():
 
 
 def recorded(undeclared: float):
-    """A tour of postures with the drawn hand and some more at the gripper, the base level."""
+    """A tour of postures with the expected_load hand and some more at the gripper, the base level."""
     rng, description = np.random.default_rng(0), rigid_robot.described(wrist_link=LINK)
     motor, dwells = rigid_robot.through(rigid_robot.near_postures(rng, 25), dwell=0.6, move=0.5)
     truth = replace(rigid_robot.Truth(), robot=(0.0, 0.0))
     trial = rigid_robot.record(truth, motor, 0.0, rng, dwells)
     chain = chain_of(mjcf.urdf(), description)
-    nominal = drawn(Laboratory(mjcf.urdf(), description), LINK)
+    nominal = expected_load(Laboratory(mjcf.urdf(), description), LINK)
     R = chain.poses(trial.q_motor, LINK)[:, :3, :3]
     at = np.array([0.0, 0.02, 0.15])
     m = nominal.mass + undeclared
@@ -109,7 +109,7 @@ def recorded(undeclared: float):
 
 
 @pytest.mark.parametrize(("undeclared", "verdict", "words"), [
-    (0.0, "ok", "drawing and declared payload"),
+    (0.0, "ok", "nominal links and declared payload"),
     (0.8, "warning", "declare the other 0.8"),
     (-0.6, "warning", "is the declared payload in the hand"),
 ])  # fmt: skip
@@ -165,6 +165,6 @@ def test_what_a_finger_carries_is_weighed_once():
         f'<origin xyz="0 0 0.1"/>{limit}</joint>'
         for kind, (a, b) in zip(kinds, pairwise(masses), strict=True)
     )
-    found = drawn(Laboratory(f'<robot name="r">{links}{joints}</robot>', rigid_robot.described()), "sensor")
+    found = expected_load(Laboratory(f'<robot name="r">{links}{joints}</robot>', rigid_robot.described()), "sensor")
     assert found.mass == pytest.approx(1.25)
     assert found.moment[2] == pytest.approx(1.0 * 0.11 + 0.2 * 0.21 + 0.05 * 0.31)
