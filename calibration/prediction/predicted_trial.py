@@ -4,7 +4,8 @@ predictions/<trial>.nc     t                                       [s, mocap clo
                            rows/<model>/<base>/<encoder>           position [m, lab], quaternion_wxyz of the hand
                            base                                    displacement [m, rad, frame 0]: measured, by source
                            base/slipping                           x, variance, moment [N.m], use of friction by wheel
-                           joints/<joint>                          theta, velocity, discrepancy, predicted [rad, rad/s]
+                           joints/<joint>                          theta, velocity, discrepancy, predicted, train, low,
+                                                                   high [rad, rad/s]
 """
 
 import os
@@ -76,7 +77,10 @@ class JointSamples:
         theta: [rad].
         velocity: Motor side [rad/s].
         discrepancy: Motor minus link reading, the zero removed [rad].
-        predicted: By the joint's model [rad].
+        predicted: By the joint's printed model [rad].
+        train: By its drive train [rad]; NaN without one.
+        low: On the lower side of its gap, under the same torque [rad]; NaN without a drive train.
+        high: On the upper side.
     """
 
     joint: str
@@ -85,6 +89,9 @@ class JointSamples:
     velocity: np.ndarray
     discrepancy: np.ndarray
     predicted: np.ndarray
+    train: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -159,12 +166,13 @@ def _write_slipping(group: netcdf.Group, motion: SlippingMotion) -> None:
         netcdf.write_variable(group, name, getattr(motion, name), dimensions, "f4", {"units": units, "frame": "0"})
 
 
-_JOINT = (("t", "s"), ("theta", "rad"), ("velocity", "rad/s"), ("discrepancy", "rad"), ("predicted", "rad"))
+_JOINT = {"t": "s", "theta": "rad", "velocity": "rad/s", "discrepancy": "rad", "predicted": "rad"}
+_JOINT |= dict.fromkeys(("train", "low", "high"), "rad")
 
 
 def _write_joint(group: netcdf.Group, joint: JointSamples) -> None:
     netcdf.add_dimensions(group, {"sample": len(joint.t)})
-    for name, units in _JOINT:
+    for name, units in _JOINT.items():
         netcdf.write_variable(group, name, getattr(joint, name), ("sample",), "f8", {"units": units})
 
 
@@ -198,4 +206,8 @@ def _read_base(file: netcdf.Group) -> BaseMotion | None:
 def _joints(file: netcdf.Group) -> Iterator[JointSamples]:
     if "joints" in file.groups:
         for name, group in file.groups["joints"].groups.items():
-            yield JointSamples(name, *(netcdf.array(group, field) for field, _ in _JOINT))
+            yield JointSamples(name, *(_array_or_nan(group, field) for field in _JOINT))
+
+
+def _array_or_nan(group: netcdf.Group, name: str) -> np.ndarray:
+    return netcdf.array(group, name) if name in group.variables else np.full(len(group.dimensions["sample"]), np.nan)

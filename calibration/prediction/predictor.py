@@ -36,6 +36,7 @@ from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.bundle.robot import BundledRobot
+from calibration.stages.drive_trains.geometry_refit import CorrectedTrial
 from calibration.stages.joints.correction import Corrected, JointModels, correct
 from calibration.stages.joints.samples import aligned_link_readings, samples_of
 from calibration.stages.stick_slip.poses import BasePrediction
@@ -90,7 +91,7 @@ class Predictor:
             found = [(source, poses.displaced(source, NOMINAL)) for source, _ in poses.loaded.suspension.held_out]
             motion = _motion(T_lab_B, found, poses.slipped("plate"))
         moves = entry.kind != "static"
-        samples, delivered = (tuple(self._samples(trial)), poses.delivered()) if moves else ((), None)
+        samples, delivered = (tuple(self._samples(trial, poses.geared())), poses.delivered()) if moves else ((), None)
         dwells = dwell_windows(trial)
         return PredictedTrial(
             entry.id, entry.kind, trial.t_mocap, rows, motion, samples, T_lab_B, dwells, corrected, delivered
@@ -125,7 +126,10 @@ class Predictor:
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
         """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times."""
         side = self.side(row_of(name), encoder)
-        return self.readings(side, trial, self._corrected(trial) if side == "corrected" else None)
+        if side == "bundled" and self.bundled is not None:
+            return self.readings(side, trial, self.bundled.corrected(trial).trial.q_motor)
+        corrected = self._corrected(trial) if side == "corrected" else None
+        return self.readings(side, trial, None if corrected is None else corrected.q)
 
     def side(self, row: LadderRow, encoder: Encoder) -> Side:
         """Which readings the geometry of a row is evaluated at."""
@@ -135,17 +139,15 @@ class Predictor:
             return "motor"
         return "link" if encoder == "link" else "corrected"
 
-    def readings(self, side: Side, trial: Trial, corrected: Corrected | None) -> np.ndarray:
-        """Readings (n, n_joints) [rad, m] of a side of the gears at the motion capture's times."""
+    def readings(self, side: Side, trial: Trial, corrected: np.ndarray | None) -> np.ndarray:
+        """Readings (n, n_joints) [rad, m] of a side of the gears, or corrected ones, at the motion capture's times."""
         if self.robot is None or not len(trial.t_robot):
             raise NotEnoughData(f"{trial.id}: no joint readings on a known clock, so no hand pose can be predicted")
         readings = trial.q_motor
         if side == "link" and self.joints is not None:
             readings = aligned_link_readings(trial, self.joints.zero)
-        elif side in ("bundled", "bundled link") and self.bundled is not None:
-            readings = self.bundled.link_readings(trial, "motor" if side == "bundled" else "link")
-        elif side == "corrected" and corrected is not None:
-            readings = corrected.q
+        elif side != "motor" and corrected is not None:
+            readings = corrected
         return readings_at(trial, self.robot, trial.t_mocap, readings)
 
     def _corrected(self, trial: Trial) -> Corrected | None:
@@ -153,17 +155,22 @@ class Predictor:
             return None
         return correct(self.joints.of_trial(trial.id), trial.t_robot, trial.q_motor)
 
-    def _samples(self, trial: Trial) -> Iterator[JointSamples]:
+    def _samples(self, trial: Trial, geared: CorrectedTrial | None) -> Iterator[JointSamples]:
         """Samples of the joints that have a model and a link encoder."""
         if self.joints is None:
             return
+        trains = {} if geared is None or self.bundled is None else self.bundled.encoder_differences(geared)
         names = self.joints.inputs.measured
         of_joints = samples_of(self.joints.of_trial(trial.id).inputs, trial, self.joints.zero)
         for model in self.joints.models:
             s = of_joints[names.index(model.joint)]
             if s is not None:
                 predicted = model.discrepancy(s.theta, s.tau, s.velocity)
-                yield JointSamples(model.joint, s.t, s.theta, s.velocity, s.y, predicted)
+                by_train = np.full((3, len(s.t)), np.nan)
+                if geared is not None and model.joint in trains:
+                    zero = self.joints.zero[names.index(model.joint)]
+                    by_train = np.array([np.interp(s.t, geared.loads.t, x - zero) for x in trains[model.joint]])
+                yield JointSamples(model.joint, s.t, s.theta, s.velocity, s.y, predicted, *by_train)
 
     def _measured_base(self, entry: TrialEntry, trial: Trial) -> np.ndarray:
         """T_lab_B (n, 4, 4), seen where the trial starts."""
@@ -221,6 +228,13 @@ class TrialPoses:
         found = self.displaced(source, row.name)
         return None if found is None else found[0].poses(found[1])
 
+    def geared(self) -> CorrectedTrial | None:
+        """Link angles behind the drive trains; None where none was identified."""
+        bundled = self.predictor.bundled
+        if bundled is None or not bundled.trains.trains or not len(self.trial.t_robot):
+            return None
+        return self._once(("geared",), lambda: bundled.corrected(self.trial))
+
     def delivered(self) -> Delivered | None:
         """Parts of the row that is delivered; None where it has no prediction of this trial."""
         p, row = self.predictor, row_of(self.predictor.main)
@@ -230,7 +244,7 @@ class TrialPoses:
             return None
         side, hand = p.side(row, "motor"), p.models[row.name].carrying(self.entry.payload)
         T_B_H, columns = self.in_base(row, "motor"), hand.chain.columns
-        q, motor = (p.readings(s, self.trial, self.corrected) for s in (side, "motor"))
+        q, motor = self._readings(side), self._readings("motor")
         link = readings_at(self.trial, p.robot, self.trial.t_mocap, self.trial.q_link) if p.robot else motor
         known = np.isfinite(q).all(axis=1) & np.isfinite(motor).all(axis=1)
         J, rigid, bare = (np.full((len(q), *shape), np.nan) for shape in ((3, len(columns)), (4, 4), (4, 4)))
@@ -248,13 +262,19 @@ class TrialPoses:
         return self._once(("displaced", source, id(hand)), lambda: self._displaced(source, hand))
 
     def _in_base(self, hand: HandModel, side: Side) -> np.ndarray:
-        p = self.predictor
-        if side in ("bundled", "bundled link") and p.bundled is not None and p.robot is not None:
-            return p.bundled.hand_in_base(self.trial, p.robot, "motor" if side == "bundled" else "link")
-        q = p.readings(side, self.trial, self.corrected)
+        p, geared = self.predictor, self.geared() if side in ("bundled", "bundled link") else None
+        if geared is not None and p.bundled is not None and p.robot is not None:
+            return p.bundled.hand_poses(geared, p.robot, "motor" if side == "bundled" else "link")
+        q = self._readings(side)
         T, known = np.full((len(q), 4, 4), np.nan), np.isfinite(q).all(axis=1)
         T[known] = hand.carrying(self.entry.payload).poses(q[known])
         return T
+
+    def _readings(self, side: Side) -> np.ndarray:
+        """Readings (n, n_joints) [rad, m] of a side of the gears at the motion capture's times."""
+        corrected = None if self.corrected is None else self.corrected.q
+        geared = self.geared() if side == "bundled" else None
+        return self.predictor.readings(side, self.trial, corrected if geared is None else geared.trial.q_motor)
 
     def _displaced(self, source: Source, hand: HandModel) -> tuple[Rest, np.ndarray] | None:
         if self.loaded is None or not self._recorded(source):

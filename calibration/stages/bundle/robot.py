@@ -16,7 +16,7 @@ from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending
-from calibration.stages.drive_trains.drive_train import DriveTrain
+from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, corrected_trial, hand_poses
 from calibration.stages.drive_trains.torques import dynamics
@@ -69,20 +69,36 @@ class BundledRobot:
         trains = DriveTrains(loads, parts.trains, zero, urdf, description)
         return cls(hand, trains, parts.bending, parts.stick_slip)
 
-    def hand_in_base(self, trial: Trial, robot: Clock, encoder: Encoder = "motor") -> np.ndarray:
-        """T_B_H (n, 4, 4) at a trial's mocap times by one side's encoders, NaN where a reading is missing.
+    def hand_in_base(self, trial: Trial, robot: Clock) -> np.ndarray:
+        """T_B_H (n, 4, 4) at a trial's mocap times by motor readings, NaN where one is missing."""
+        return self.hand_poses(self.corrected(trial), robot)
+
+    def hand_poses(self, corrected: CorrectedTrial, robot: Clock, encoder: Encoder = "motor") -> np.ndarray:
+        """T_B_H (n, 4, 4) at a trial's mocap times by one side's encoders, NaN where a reading is missing."""
+        one = corrected if encoder == "motor" else by_link_encoders(self.trains, corrected)
+        return hand_poses(self.hand, self.bending, one, robot)
+
+    def corrected(self, trial: Trial) -> CorrectedTrial:
+        """Link angles in place of a trial's motor readings.
 
         The base is taken to be level and at rest: none of its markers is read.
         """
-        return hand_poses(self.hand, self.bending, self._corrected(trial, encoder), robot)
+        return corrected_trial(self.trains, trial, None, self.hand)
 
-    def link_readings(self, trial: Trial, encoder: Encoder = "motor") -> np.ndarray:
-        """(n, k) link angles in place of a trial's motor readings, NaN where one is missing [rad, m]."""
-        return self._corrected(trial, encoder).trial.q_motor
+    def encoder_differences(self, corrected: CorrectedTrial) -> dict[str, np.ndarray]:
+        """Motor minus link reading (3, n) [rad] by each drive train with a link encoder: as predicted, on both flanks.
 
-    def _corrected(self, trial: Trial, encoder: Encoder) -> CorrectedTrial:
-        found = corrected_trial(self.trains, trial, None, self.hand)
-        return found if encoder == "motor" else by_link_encoders(self.trains, found)
+        q_motor - q_link = offset - offset_l + e_m - e_l + delta        flanks: delta = c tau -+ half gap
+        """
+        trains, loads, found = self.trains, corrected.loads, {}
+        for train in (train for train in trains.trains if np.isfinite(train.link).all()):
+            j = trains.joints.index(train.joint)
+            angle = corrected.angles.q[:, j] - trains.dynamics.offset[j]
+            y = loads.q[:, j] - (angle + train.link[0] + harmonic_terms(angle) @ train.link[1:])
+            delta = loads.q[:, j] - train.harmonics(loads.angle[:, j]) - corrected.angles.q[:, j]
+            low, high = train.flanks(drive_motion([loads], j, train.inertials if len(train.inertials) else None))
+            found[train.joint] = np.array([y, y - delta + low, y - delta + high])
+        return found
 
     @property
     def knows_link_encoders(self) -> bool:

@@ -121,6 +121,11 @@ class DriveTrain:
         low, high = np.array([self.at_rest(float(x)) for x in torque]).reshape(-1, 2).T
         return low, high
 
+    def flanks(self, drive: "DriveMotion") -> tuple[np.ndarray, np.ndarray]:
+        """delta (n,) [rad] on the lower and on the upper side of the gap, in contact."""
+        wound = self.values[COMPLIANCE] * (drive.torque + self.link_inertia * drive.a)
+        return wound - self.values[HALF_GAP], wound + self.values[HALF_GAP]
+
     def harmonics(self, angle: np.ndarray) -> np.ndarray:
         """Eccentricity e_m (n,) [rad] of the motor encoder at joint angles (n,) [rad]."""
         return harmonic_terms(angle) @ self.motor
