@@ -1,6 +1,7 @@
 """Discrepancy of a joint against its position: one colour for each direction of motion.
 
-Pale dots: measured. Lines: what the model predicts for the same samples, in the order of time.
+Pale dots: measured. Lines: what the model predicts for the same samples, in the order of time. Grey: both flanks of the
+gap under the same torque.
 """
 
 from dataclasses import dataclass
@@ -8,6 +9,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+
+from scenarios.plots.style import NOMINAL
 
 FORTH, BACK = "#1a5fa8", "#c2410c"
 _PALE = 0.6  # opacity of dots and lines
@@ -36,8 +39,10 @@ class Flank:
     model: np.ndarray | None
 
 
-def hysteresis(flanks: tuple[Flank, ...], ax: Axes) -> Axes:
-    """Draw the flanks of one joint; the caller names the axes."""
+def hysteresis(flanks: tuple[Flank, ...], ax: Axes, edges: tuple[np.ndarray, ...] = ()) -> Axes:
+    """Draw the directions of one joint; the caller names the axes. `edges`: t, position, both sides of its gap (n,)."""
+    for side in edges[2:]:
+        ax.plot(*strokes(edges[0], edges[1], side), color=NOMINAL, linewidth=0.4, label="flanks of the gap")
     for f in flanks:
         if f.model is not None:
             ax.plot(

@@ -3,7 +3,6 @@
 from scenarios.report.results.section import Section
 from scenarios.report.sections.base_motion import BaseMotion
 from scenarios.report.sections.errors import HeldOutErrors
-from scenarios.report.sections.fitted import Fitted
 from scenarios.report.sections.frames import Frames
 from scenarios.report.sections.joints import Joints
 from scenarios.report.sections.ladder import Ladder
@@ -11,9 +10,10 @@ from scenarios.report.sections.paper_models import PaperModels
 from scenarios.report.sections.parameters import Parameters
 from scenarios.report.sections.payload import Payload
 from scenarios.report.sections.recordings import Recordings
+from scenarios.report.sections.residuals import Absorbed, Residuals
 from scenarios.report.sections.slip import Slip
 from scenarios.report.sections.stages import Reproduce, Stages
-from scenarios.report.sections.verdict import Verdict
+from scenarios.report.sections.verdict import Fitted, Verdict
 
 SECTIONS: tuple[type[Section], ...] = (
     Verdict,
@@ -26,9 +26,11 @@ SECTIONS: tuple[type[Section], ...] = (
     Joints,
     Payload,
     Parameters,
+    Residuals,
+    Absorbed,
     Recordings,
     Stages,
     Reproduce,
 )
-UNEVALUATED: tuple[type[Section], ...] = (Fitted, Parameters, Recordings, Stages)
+UNEVALUATED: tuple[type[Section], ...] = (Fitted, Parameters, Absorbed, Recordings, Stages)
 """Those of a fit without held-out trials."""

@@ -1,4 +1,4 @@
-"""Motor minus link reading of each arm joint on held-out moving trials, and what its model predicts.
+"""Motor minus link reading of each arm joint on held-out moving trials, and what its models predict.
 
 Trials with a payload of their own or a push are left out where there are others: one load, one picture.
 
@@ -34,6 +34,7 @@ REGIMES = {
 _HELPS = 10.0  # [%] of the RMS
 _DIAGRAM = Path(__file__).parents[1] / "joint_chain.svg"
 _MOVING = 0.02  # [rad/s]
+_SAMPLED = ("t", "theta", "velocity", "discrepancy", "predicted", "train", "low", "high")
 _COLUMNS = 4
 _HEIGHT = 2.0  # [inch] of a panel
 
@@ -44,12 +45,15 @@ class Loop:
 
     Attributes:
         joint: Its name.
-        corrected: Whether the estimate corrects it.
+        corrected: Whether the estimate's printed model corrects it.
         t: [s].
         theta: [rad].
         velocity: [rad/s].
         measured: Motor minus link reading, the zero removed [mrad].
-        model: Predicted [mrad].
+        printed: Predicted by the printed model [mrad].
+        train: By the drive train; NaN without one.
+        low: On the lower flank of its gap.
+        high: On the upper one.
     """
 
     joint: str
@@ -58,27 +62,54 @@ class Loop:
     theta: np.ndarray
     velocity: np.ndarray
     measured: np.ndarray
-    model: np.ndarray
+    printed: np.ndarray
+    train: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def geared(self) -> bool:
+        """Whether its drive train was identified."""
+        return bool(np.isfinite(self.train).all())
+
+    @property
+    def model(self) -> np.ndarray | None:
+        """What is drawn [mrad]: by the drive train, else by the printed model; None where nothing corrects it."""
+        return self.train if self.geared else self.printed if self.corrected else None
 
     @property
     def before(self) -> float:
         """Rms of the discrepancy [mrad]."""
-        return float(np.sqrt((self.measured**2).mean()))
+        return _rms(self.measured)
 
     @property
     def after(self) -> float:
-        """Rms of what the model leaves [mrad]."""
-        return float(np.sqrt(((self.measured - self.model) ** 2).mean()))
+        """Rms of what the drawn model leaves [mrad]."""
+        return self.before if self.model is None else _rms(self.measured - self.model)
+
+    @property
+    def after_printed(self) -> float:
+        """Rms of what the printed model leaves [mrad]."""
+        return _rms(self.measured - self.printed)
+
+    @property
+    def gap(self) -> float:
+        """Distance of the flanks [mrad]."""
+        return float((self.high - self.low).mean())
 
     @property
     def flanks(self) -> tuple[Flank, ...]:
         """Forth and back."""
-        up = self.velocity > 0.0
+        up, model = self.velocity > 0.0, self.model
         ways = (("angle growing", FORTH, up), ("angle falling", BACK, ~up))
         return tuple(
-            Flank(label, colour, self.t[k], self.theta[k], self.measured[k], self.model[k] if self.corrected else None)
+            Flank(label, colour, self.t[k], self.theta[k], self.measured[k], None if model is None else model[k])
             for label, colour, k in ways
         )
+
+
+def _rms(x: np.ndarray) -> float:
+    return float(np.sqrt((x**2).mean()))
 
 
 @dataclass(frozen=True)
@@ -154,11 +185,11 @@ def loops(results: Results) -> tuple[tuple[Loop, ...], str]:
 def _loops(found: Sequence[JointSamples], corrected: Mapping[str, bool]) -> Iterator[Loop]:
     """A joint's samples of all trials, while it moves."""
     for joint, corrects in corrected.items():
-        rows = [np.stack([s.t, s.theta, s.velocity, s.discrepancy, s.predicted]) for s in found if s.joint == joint]
-        both = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
-        t, theta, velocity, measured, model = both[:, np.abs(both[2]) > _MOVING]
+        rows = [np.stack([getattr(s, name) for name in _SAMPLED]) for s in found if s.joint == joint]
+        both = np.concatenate(rows, axis=1) if rows else np.zeros((len(_SAMPLED), 0))
+        t, theta, velocity, *readings = both[:, np.abs(both[2]) > _MOVING]
         if len(t):
-            yield Loop(joint, corrects, t, theta, velocity, 1e3 * measured, 1e3 * model)
+            yield Loop(joint, corrects, t, theta, velocity, *(1e3 * x for x in readings))
 
 
 def drawn(found: Sequence[Loop]) -> Figure | None:
@@ -171,7 +202,8 @@ def drawn(found: Sequence[Loop]) -> Figure | None:
         axes = page.subplots(rows, _COLUMNS, squeeze=False).ravel().tolist()
         page.subplots_adjust(0.055, 0.42 / (rows * _HEIGHT), 0.995, 1.0 - 0.22 / (rows * _HEIGHT), 0.26, 0.46)
         for loop, ax in zip(found, axes, strict=False):
-            hysteresis(loop.flanks, ax).set_title(_title(loop), fontweight="normal")
+            edges = (loop.t, loop.theta, loop.low, loop.high) if loop.geared else ()
+            hysteresis(loop.flanks, ax, edges).set_title(_title(loop), fontweight="normal")
             ax.set_xlabel("position [rad]")
         for ax in axes[::_COLUMNS]:
             ax.set_ylabel("motor − link [mrad]")
@@ -182,7 +214,7 @@ def drawn(found: Sequence[Loop]) -> Figure | None:
 
 
 def _title(loop: Loop) -> str:
-    after = f"→ {fixed(loop.after, 1)} mrad" if loop.corrected else "mrad, not corrected"
+    after = "mrad, not corrected" if loop.model is None else f"→ {fixed(loop.after, 1)} mrad"
     return f"{loop.joint.removesuffix('_joint')}: {fixed(loop.before, 1)} {after}"
 
 

@@ -1,4 +1,7 @@
-"""The first screen: calibrated or not, the error on unseen motion, what it consists of, and what to do next."""
+"""The first screen: calibrated or not, the error on unseen motion, what it consists of, and what to do next.
+
+Of a fit without held-out trials: what may be used, its error at left-out postures, what is next.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,6 +15,7 @@ from scenarios.report.results.ladder import best_of_each, floor, oracle_base, pr
 from scenarios.report.results.parameters import coverage
 from scenarios.report.results.section import Drawn, RunView
 
+_WORST = ("refused", "warning", "missing", "ok")
 _MIN_COVERAGE = 0.85  # [-] below which 95 % intervals are called too narrow
 
 
@@ -63,3 +67,28 @@ class Verdict:
                 "rather than on single parameters"
             )
             yield Notice("warning", "uncertainty", message)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Badge, cross-validated error, a line a stage."""
+
+    view: RunView
+    title: ClassVar[str] = ""
+    template: ClassVar[str] = "fitted.html"
+    folded: ClassVar[bool] = False
+
+    def figures(self) -> Mapping[str, Drawn]:
+        """None."""
+        return {}
+
+    def context(self) -> Mapping[str, Any] | None:
+        """What the stages reported, the worst of each."""
+        estimate = self.view.results.estimate
+        if estimate is None:
+            return None
+        stages: dict[str, str] = {}
+        for v in estimate.verdicts:
+            stages[v.stage] = min(stages.get(v.stage, "ok"), v.verdict, key=_WORST.index)
+        errors = [v.message for v in estimate.verdicts if "left-out" in v.message]
+        return {"extent": estimate.extent, "errors": errors, "stages": stages, "verdicts": estimate.verdicts}
