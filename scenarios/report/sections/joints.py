@@ -19,7 +19,7 @@ from calibration.prediction import JointSamples
 from calibration.stages.joints import JointModel, limit_of
 from scenarios.plots.hysteresis import BACK, FORTH, Flank, hysteresis
 from scenarios.plots.style import drawing, figure
-from scenarios.report.results.formatting import fixed, significant
+from scenarios.report.results.formatting import error, fixed, significant
 from scenarios.report.results.result_files import Regime
 from scenarios.report.results.run_results import Results
 from scenarios.report.results.section import Drawn, RunView
@@ -214,8 +214,8 @@ def drawn(found: Sequence[Loop]) -> Figure | None:
 
 
 def _title(loop: Loop) -> str:
-    after = "mrad, not corrected" if loop.model is None else f"→ {fixed(loop.after, 1)} mrad"
-    return f"{loop.joint.removesuffix('_joint')}: {fixed(loop.before, 1)} {after}"
+    after = "mrad, not corrected" if loop.model is None else f"→ {error(loop.after)} mrad"
+    return f"{loop.joint.removesuffix('_joint')}: {error(loop.before)} {after}"
 
 
 def _legend(panels: Sequence[Axes], ax: Axes) -> None:
@@ -272,4 +272,4 @@ def _sentence(meaning: str, rows: Sequence[Regime]) -> str:
         text += f" (by {min(cuts):.0f} to {max(cuts):.0f} %)" if len(cuts) > 1 else f" (by {cuts[0]:.0f} %)"
     text += f", by less in {hardly}" if hardly else ""
     text += f", grows in {harmed}" if harmed else ""
-    return text + (f", is left as it is in {as_it_was}." if as_it_was else ".")
+    return text + (f", is unchanged in {as_it_was}." if as_it_was else ".")

@@ -24,7 +24,7 @@ from calibration.stages.suspension.model import Suspension
 from calibration.verdict import Verdict
 from scenarios.report import write
 from scenarios.report.results import suspension
-from scenarios.report.results.formatting import fixed
+from scenarios.report.results.formatting import error, fixed
 from scenarios.report.results.result_files import Regime
 from scenarios.report.results.run_results import read
 from scenarios.report.sections import base_motion
@@ -271,8 +271,8 @@ def test_loops_hold_what_the_encoders_said_and_the_model_says(whole, recording):
     assert not second.corrected
     assert second.flanks[0].model is None
     np.testing.assert_allclose(second.measured, 1.0, atol=1e-3)
-    assert f"arm_2: {first.before:.1f} → {first.after:.1f} mrad" in (whole / "figures/loops.svg").read_text()
-    assert "arm_3: 1.0 mrad, not corrected" in (whole / "figures/loops.svg").read_text()
+    assert f"arm_2: {error(first.before)} → {error(first.after)} mrad" in (whole / "figures/loops.svg").read_text()
+    assert "arm_3: 1.00 mrad, not corrected" in (whole / "figures/loops.svg").read_text()
 
 
 def test_regimes_are_told_joint_by_joint_and_in_sentences(whole):
@@ -282,7 +282,7 @@ def test_regimes_are_told_joint_by_joint_and_in_sentences(whole):
     assert "other repetitions: the rms falls by 10 % or more in 2 of 2 joints (by 85 to 91 %)." in text
     assert "Other motions, held out: the rms falls by 10 % or more in 1 of 1 joints (by 40 %)." in text
     assert (
-        "held out: the rms falls by 10 % or more in 0 of 2 joints, grows in arm_2, is left as it is in arm_3." in text
+        "held out: the rms falls by 10 % or more in 0 of 2 joints, grows in arm_2, is unchanged in arm_3." in text
     )
     assert 'class="missed">−12<' in (whole / "report.html").read_text()
 

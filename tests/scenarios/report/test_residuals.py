@@ -78,7 +78,7 @@ def test_a_joint_with_a_drive_train_is_shown_with_it_and_both_flanks():
     assert one.after_printed > 0.4
     ax = drawn([one]).axes[0]
     assert [line.get_label() for line in ax.lines].count("flanks of the gap") == 2
-    assert "→ 0.1 mrad" in ax.get_title(loc="left")
+    assert "→ 0.10 mrad" in ax.get_title(loc="left")
     bare = replace(one, train=np.nan * t, low=np.nan * t, high=np.nan * t)
     assert bare.model is bare.printed
     assert "flanks of the gap" not in [line.get_label() for line in drawn([bare]).axes[0].lines]
