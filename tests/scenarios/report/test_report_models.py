@@ -281,9 +281,7 @@ def test_regimes_are_told_joint_by_joint_and_in_sentences(whole):
     text = text_of(whole)
     assert "other repetitions: the rms falls by 10 % or more in 2 of 2 joints (by 85 to 91 %)." in text
     assert "Other motions, held out: the rms falls by 10 % or more in 1 of 1 joints (by 40 %)." in text
-    assert (
-        "held out: the rms falls by 10 % or more in 0 of 2 joints, grows in arm_2, is unchanged in arm_3." in text
-    )
+    assert "held out: the rms falls by 10 % or more in 0 of 2 joints, grows in arm_2, is unchanged in arm_3." in text
     assert 'class="missed">−12<' in (whole / "report.html").read_text()
 
 
