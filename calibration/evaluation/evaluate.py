@@ -16,9 +16,10 @@ import numpy as np
 from calibration.checks.plates import moved_by
 from calibration.errors import NotEnoughData
 from calibration.estimate.estimate import Estimate
+from calibration.estimate.rows import NOMINAL
 from calibration.evaluation.budget import Causes, budget, causes
 from calibration.evaluation.joint_regimes import TrialResiduals, residuals, validation_qualities
-from calibration.evaluation.ladder import TrialErrors, ladder, trial_errors
+from calibration.evaluation.ladder import Row, TrialErrors, ladder, trial_errors
 from calibration.evaluation.marker_errors import point_rows
 from calibration.evaluation.pose_errors import PoseErrors, pose_errors
 from calibration.evaluation.recorded import Recorded, believable, departures, recorded
@@ -94,7 +95,7 @@ def evaluate(
     scored = tuple(_each(predict, dataset, read, report, submitted))
     if submitted is not None:
         pairs = (zip(one.predicted.rows, one.errors, strict=True) for one in scored)
-        own = [(p, e.errors.position) for of_trial in pairs for p, e in of_trial if p.base == "submitted"]
+        own = [(p, e.errors) for of_trial in pairs for p, e in of_trial if p.base == "submitted"]
         remarks += tuple(submitted.remarks(dataset, role, own))
     if not estimate.robot:
         remarks += estimate.verdicts
@@ -105,10 +106,12 @@ def evaluate(
         again, others = reregistered(predict, dataset), tuple(recorded(dataset, e) for e in later)
         confirmed = [error for one in _each(again, dataset, others, report, submitted) for error in one.errors]
     errors = [error for one in scored for error in one.errors]
+    rows = tuple(ladder(errors, "mocap"))
+    remarks += () if estimate.robot else tuple(of_another_robot(rows))
     joints = validation_qualities(predict.joints, [one.residuals for one in scored if one.residuals is not None])
     means = ((one.entry, one.means) for one in scored if one.means is not None)
     return Evaluation(
-        rows=tuple(ladder(errors, "mocap")),
+        rows=rows,
         traces=tuple(errors),
         regimes=(*estimate.regimes, *joints) if predict.joints is not None else (),
         confirmation=tuple(ladder(confirmed, "mocap")),
@@ -185,6 +188,21 @@ def _means_errors(p: Prediction, body: Body, means: PostureMeans) -> PoseErrors:
         return pose_errors(p.T_lab_hand, poses_of_means(body, means).T)
     e = places(p.T_lab_hand, body.point) - point_of_means(body, means)[0]
     return PoseErrors(e, np.full(e.shape, np.nan))
+
+
+def of_another_robot(rows: tuple[Row, ...]) -> Iterator[Verdict]:
+    """A warning of every model all of whose rows are worse than the nominal robot's worst [mm]."""
+    mm: dict[str, list[float]] = {}
+    for row in rows:
+        if row.trials == "all":
+            mm.setdefault(row.model, []).append(row.metrics.position_rmse_norm_mm)
+    nominal = max(mm.pop(NOMINAL, [np.inf]))
+    for model, found in mm.items():
+        if min(found) > nominal:
+            message = (
+                f"{model}: {min(found):.2f} mm, the nominal robot {nominal:.2f} mm; is it a calibration of this robot?"
+            )
+            yield Verdict(STAGE, "warning", message)
 
 
 def not_predictable(trials: Iterable[PredictedTrial]) -> Iterator[Verdict]:

@@ -5,7 +5,7 @@
 
 Poses are compared at the camera's times: those submitted at exactly these, else between two of them by interpolation
 (linear, and along the rotation between) where they are less than 0.1 s apart. What cannot be a prediction of these
-trials is rejected: other trials, another clock, units, order of the quaternion or frame, each by what would explain it.
+trials is rejected by what would explain it (`submitted_poses`): other trials, another clock, unit, order or frame.
 """
 
 import csv
@@ -17,7 +17,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from calibration.errors import InputError
-from calibration.numerics.lie import compose, inverse, mean, rotation_vector
+from calibration.evaluation.pose_errors import PoseErrors
+from calibration.evaluation.submitted_poses import check_clock, check_poses, doubts
+from calibration.numerics.lie import compose
 from calibration.prediction.predicted_trial import Prediction
 from calibration.recording import netcdf
 from calibration.recording.dataset import Dataset
@@ -25,10 +27,7 @@ from calibration.recording.schema import Role, TrialEntry
 from calibration.verdict import Verdict
 
 _GAP = 0.1  # [s] between neighbours that are interpolated
-_UNIT = 1e-3  # [-] departure of a quaternion's norm from 1
-_FAR, _TURNED = 0.3, 1.0  # [m], [rad] median errors that are no prediction's
-_SMALL, _EXPLAINED = 5e-3, 0.8  # [m], [-] errors, and share of their squares, of which a constant offset is warned
-_ALIKE = 0.1  # [-] share of the error that a constant transform may leave
+_UNIT = 1e-3  # [-] departure of a quaternion's norm, or of R R', from 1
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 
@@ -68,15 +67,15 @@ class Submission:
             return None
         one = self.trials[entry.id]
         if entry.kind != "static" or len(one.t) != len(t) or not np.array_equal(one.t, t):
-            _check_clock(self.path, entry.id, one.t, t)
+            check_clock(self.path, entry.id, one.t, t)
         T = _at(one, t)
-        _check_poses(self.path, entry.id, T, T_measured)
+        check_poses(self.path, entry.id, t, T, T_measured)
         return Prediction(self.name, "submitted", "motor", entry.id, entry.kind, t, T)
 
     def remarks(
-        self, dataset: Dataset, role: Role, scored: Sequence[tuple[Prediction, np.ndarray]]
+        self, dataset: Dataset, role: Role, scored: Sequence[tuple[Prediction, PoseErrors]]
     ) -> Iterator[Verdict]:
-        """Warnings of missing trials and poses, and of poses of another point; `scored` with errors (n, 3) [m].
+        """Warnings of missing trials and poses, and of what explains the errors of those that are `scored`.
 
         Raises:
             InputError: It has trials that the dataset does not have.
@@ -89,9 +88,9 @@ class Submission:
         if missing:
             yield Verdict("evaluation", "warning", f"{self.name}: no prediction of trial {', '.join(missing)}")
         for row, error in scored:
-            if offset := _offset(row.T_lab_hand, error):
+            for doubt in doubts(row.t, row.T_lab_hand, error):
                 message = (
-                    f"{self.name}: {row.trial_id}: {offset}; are they of the marker body that dataset.json declares?"
+                    f"{self.name}: {row.trial_id}: {doubt}; poses are of the marker body that dataset.json declares"
                 )
                 yield Verdict("evaluation", "warning", message)
             share = float(np.isnan(row.T_lab_hand[:, 0, 0]).mean())
@@ -140,7 +139,12 @@ def _read_csv(path: Path) -> Iterator[tuple[str, SubmittedTrial]]:
         raise InputError(path, f"not a table of predicted poses ({error})") from error
     for trial in dict.fromkeys(name for name, _ in rows):
         x = np.array([values for name, values in rows if name == trial])
-        yield trial, SubmittedTrial(x[:, 0], _of_matrix(x[:, 1:]) if pose is _MATRIX else _poses(path, trial, x[:, 1:]))
+        yield (
+            trial,
+            SubmittedTrial(
+                x[:, 0], _of_matrix(path, trial, x[:, 1:]) if pose is _MATRIX else _poses(path, trial, x[:, 1:])
+            ),
+        )
 
 
 def _read_netcdf(path: Path) -> Iterator[tuple[str, SubmittedTrial]]:
@@ -148,7 +152,10 @@ def _read_netcdf(path: Path) -> Iterator[tuple[str, SubmittedTrial]]:
         for trial, group in file.groups.items():
             t = netcdf.array(group, "t")
             if "T" in group.variables:
-                yield trial, SubmittedTrial(t, _of_matrix(netcdf.array(group, "T")[:, :3].reshape(len(t), 12)))
+                T = netcdf.array(group, "T")
+                if not np.allclose(T[np.isfinite(T).all(axis=(1, 2)), 3], (0.0, 0.0, 0.0, 1.0)):
+                    raise InputError(path, f"{trial}: the last row of T is not 0 0 0 1; is T transposed?")
+                yield trial, SubmittedTrial(t, _of_matrix(path, trial, T[:, :3].reshape(len(t), 12)))
                 continue
             orders = [name for name in ("quaternion_wxyz", "quaternion_xyzw") if name in group.variables]
             if len(orders) != 1:
@@ -158,10 +165,13 @@ def _read_netcdf(path: Path) -> Iterator[tuple[str, SubmittedTrial]]:
             yield trial, SubmittedTrial(t, _poses(path, trial, np.hstack([netcdf.array(group, "position"), q])))
 
 
-def _of_matrix(x: np.ndarray) -> np.ndarray:
-    T = np.tile(np.eye(4), (len(x), 1, 1))
+def _of_matrix(path: Path, trial: str, x: np.ndarray) -> np.ndarray:
+    T, good = np.tile(np.eye(4), (len(x), 1, 1)), np.isfinite(x).all(axis=1)
     T[:, :3] = x.reshape(-1, 3, 4)
-    T[~np.isfinite(x).all(axis=1)] = np.nan
+    T[~good] = np.nan
+    R = T[good, :3, :3]
+    if (np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)) > _UNIT).any() or (np.linalg.det(R) < 0.0).any():
+        raise InputError(path, f"{trial}: T has rotations that are none: R R' must be 1, the determinant 1")
     return T
 
 
@@ -192,62 +202,3 @@ def _at(one: SubmittedTrial, t: np.ndarray) -> np.ndarray:
         turned = Slerp(known, Rotation.from_matrix(T[:, :3, :3]))(t[between]).as_matrix()
         out[between] = compose(turned, np.stack([np.interp(t[between], known, p) for p in T[:, :3, 3].T], axis=1))
     return out
-
-
-def _check_clock(path: Path, trial: str, t: np.ndarray, t_mocap: np.ndarray) -> None:
-    """Whether the times are the motion capture's."""
-    overlap = min(t[-1], t_mocap[-1]) - max(t[0], t_mocap[0])
-    if overlap < 0.5 * min(t[-1] - t[0], t_mocap[-1] - t_mocap[0]):
-        ours, theirs = (f"{x[0]:.2f} to {x[-1]:.2f} s" for x in (t_mocap, t))
-        raise InputError(path, f"{trial}: times {theirs} are on another clock; the motion capture's are {ours}")
-
-
-def _check_poses(path: Path, trial: str, T: np.ndarray, T_measured: np.ndarray) -> None:
-    """Whether an error too large for a prediction is one of units, order or frame."""
-    both = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(T_measured).all(axis=(1, 2))
-    if not both.any():
-        return
-    T, true = T[both], T_measured[both]
-    far, turned = _errors(T, true)
-    if far < _FAR and turned < _TURNED:
-        return
-    for reason, other in _explanations(T, true):
-        left, still = _errors(other, true)
-        if left < max(_ALIKE * far, 0.02) and still < max(_ALIKE * turned, 0.1):
-            raise InputError(path, f"{trial}: {reason}")
-    raise InputError(
-        path, f"{trial}: median errors of {far:.2f} m and {np.degrees(turned):.0f} deg are no prediction's"
-    )
-
-
-def _offset(T: np.ndarray, error: np.ndarray) -> str:
-    """What to say where one vector explains nearly all position errors (n, 3) [m] of poses T (n, 4, 4); else empty."""
-    good = np.isfinite(error).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
-    total = float((error[good] ** 2).sum(axis=1).mean()) if good.any() else 0.0
-    for axes, e in (
-        ("lab", error[good]),
-        ("hand", (np.swapaxes(T[good, :3, :3], 1, 2) @ error[good][..., None])[..., 0]),
-    ):
-        if total > _SMALL**2 and (e.mean(axis=0) ** 2).sum() > _EXPLAINED * total:
-            found = ", ".join(f"{1e3 * x:.1f}" for x in e.mean(axis=0))
-            return f"a constant offset ({found}) mm in the axes of the {axes} explains most of the error"
-    return ""
-
-
-def _explanations(T: np.ndarray, true: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """What may be wrong with poses (n, 4, 4), and the poses without it."""
-    metres = T.copy()
-    metres[:, :3, 3] *= 1e-3
-    yield "positions are in mm; they must be in m", metres
-    q = Rotation.from_matrix(T[:, :3, :3]).as_quat(scalar_first=True)
-    for order in ((3, 0, 1, 2), (1, 2, 3, 0)):
-        mended = compose(Rotation.from_quat(q[:, order], scalar_first=True).as_matrix(), T[:, :3, 3])
-        yield "the order of the quaternions is not the one that is named (w, x, y, z or x, y, z, w)", mended
-    yield "poses are in another frame: a constant transform to the lab explains them", mean(true @ inverse(T)) @ T
-
-
-def _errors(T: np.ndarray, true: np.ndarray) -> tuple[float, float]:
-    """Median distance [m] and angle [rad]."""
-    turn = rotation_vector(T[:, :3, :3] @ np.swapaxes(true[:, :3, :3], 1, 2))
-    far = np.linalg.norm(T[:, :3, 3] - true[:, :3, 3], axis=1)
-    return float(np.median(far)), float(np.median(np.linalg.norm(turn, axis=1)))
