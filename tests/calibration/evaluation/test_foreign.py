@@ -13,6 +13,8 @@ from scipy.spatial.transform import Rotation
 from calibration import evaluate, load_estimate, save_estimate
 from calibration.errors import InputError
 from calibration.evaluation import read_submission
+from calibration.evaluation.pose_errors import pose_errors
+from calibration.evaluation.submitted_poses import check_poses, doubts
 from calibration.numerics.lie import compose, inverse
 from calibration.prediction import predict
 from calibration.prediction.foreign import check_names
@@ -217,9 +219,15 @@ def order_mixed(T):
         (order_mixed, "order of the quaternions"),
     ],
 )
-def test_poses_in_other_units_or_frames_are_rejected_by_what_explains_them(poses, dataset, tmp_path, change, message):
-    path = write_netcdf(tmp_path / "mine.nc", changed(poses, change))
-    with pytest.raises(InputError, match=message):
+def test_poses_in_other_units_or_frames_are_rejected_by_what_explains_them(poses, change, message):
+    name, t, T = poses[0]
+    with pytest.raises(InputError, match=f"{name}: .*{message}"):
+        check_poses("mine.nc", name, t, change(T), T)
+
+
+def test_a_submission_in_mm_is_rejected(poses, dataset, tmp_path):
+    path = write_netcdf(tmp_path / "mine.nc", changed(poses, in_mm))
+    with pytest.raises(InputError, match="mine.nc.*positions are in mm"):
         evaluate(read_submission(path), dataset)
 
 
@@ -260,18 +268,24 @@ def mixed_later(T):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (of_another_point, r"offset \(-?0\.\d, (29|30)\.\d, -(49|50)\.\d\) mm in the axes of the hand"),
-        (moved, r"offset \((19|20)\.\d, -?0\.\d, -(9|10)\.\d\) mm in the axes of the lab"),
-        (turned_hand, r"offset \(.*, 11\.[45]\) deg in the axes of the hand"),
-        (scaled, r"a scale of 1\.0(29|30)\d"),
+        (of_another_point, r"offset \(-?0\.0, 30\.0, -50\.0\) mm in the axes of the hand"),
+        (moved, r"offset \(20\.0, -?0\.0, -10\.0\) mm in the axes of the lab"),
+        (turned_hand, r"offset \(.*, 11\.5\) deg in the axes of the hand"),
+        (scaled, r"a scale of 1\.0300"),
         (late, r"a delay of 0\.50 s"),
         (mixed_later, "2[0-9].. % of the poses err by more than .*: there, the order of the quaternions"),
     ],
 )
-def test_a_doubtful_cause_of_the_error_is_warned_of_with_its_size(poses, dataset, tmp_path, change, message):
-    path = write_netcdf(tmp_path / "mine.nc", changed(poses, change))
+def test_a_doubtful_cause_of_the_error_is_warned_of_with_its_size(poses, change, message):
+    _, t, T = poses[0]
+    found = list(doubts(t, change(T), pose_errors(change(T), T)))
+    assert any(re.search(message, text) for text in found), found
+
+
+def test_doubts_are_among_the_verdicts(poses, dataset, tmp_path):
+    path = write_netcdf(tmp_path / "mine.nc", changed(poses, of_another_point))
     messages = [v.message for v in evaluate(read_submission(path), dataset).verdicts]
-    assert any(re.search(message, text) for text in messages), messages
+    assert any(re.search(r"mine: xyz: a constant offset .* mm in the axes of the hand", text) for text in messages)
 
 
 def test_good_poses_are_not_doubted(poses, dataset, tmp_path):
