@@ -17,7 +17,7 @@ help:
 	@echo "make reliability try every hostile case into docs/reliability.md"
 	@echo "make claims      measure the claims on ten fixed and ten sampled robots into docs/claims.md (half an hour)"
 	@echo "make docs        the documentation site into docs/_site, offline once its tools are installed"
-	@echo "make pictures    the pictures of the README and the documents from runs/demo; needs Chromium"
+	@echo "make pictures    pictures and figures of the README and the documents from runs/demo; needs Chromium"
 	@echo "make bench       the benchmarks"
 	@echo "make bench-peer  geometric calibration beside FIGAROH's, in an environment of its own"
 	@echo "make peer        FIGAROH 1.0.2 in .venv-peer, for tiago-twin peer"
@@ -64,6 +64,7 @@ docs: $(READY) .venv/docs-ready
 pictures: $(READY)
 	$(BIN)/tiago-twin report runs/demo
 	$(BIN)/python docs/pictures.py runs/demo
+	$(BIN)/python docs/evidence.py runs/demo
 
 bench: $(READY)
 	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench --ignore=tests/bench/bench_peer.py

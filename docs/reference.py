@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import itertools
+import json
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,6 +18,7 @@ from twin import laboratory
 from twin.rendering import picture
 
 OUT = Path(__file__).parent / "reference"
+RUNS = Path(__file__).parent / "results" / "runs.json"
 FACES = (
     "scenarios",
     "calibration",
@@ -106,14 +108,29 @@ def commands() -> str:
 
 def scenarios() -> str:
     """Purpose and picture of every scenario."""
-    parts = ["# Scenarios\n"]
+    parts = [
+        "# Scenarios\n\nResults: `docs/evidence.py` of finished runs; errors of the hand against the motion capture.\n"
+    ]
+    runs = json.loads(RUNS.read_text(encoding="utf-8"))
     for name in registry.names():
         loaded = load(name)
         picture(loaded.twin, loaded.seed, OUT / f"{name}.png", (450, 350))
         run = f"```bash\ntiago-twin run {name}\n```"
-        parts.append(f"## {name}\n\n{loaded.description}.\n\n![The robot of {name}]({name}.png)\n\n{run}\n")
-    parts.append("Results: [evidence](../results/README.md).\n")
+        parts.append(f"## {name}\n\n{loaded.description}.\n\n![The robot of {name}]({name}.png)\n\n{run}\n\n")
+        parts.append(_result(runs, name))
+    parts.append("More: [evidence](../results/README.md).\n")
     return "\n".join(parts)
+
+
+def _result(runs: dict[str, dict[str, object]], name: str) -> str:
+    """What a run of the scenario found, and the bars of its rows in millimetres."""
+    if name not in runs:
+        return ""
+    one = runs[name]
+    head, row = (" | ".join(cells) for cells in zip(*one["rows"], strict=True))
+    how = f"Seed {one['seed']}{', `--quick`' if one['quick'] else ''}: {one['badge']}. {one['sentence']}"
+    rows = f"| RMSE per component [mm] | {head} |\n|---{'|---' * len(one['rows'])}|\n| | {row} |"
+    return f"{how}\n\n{rows}\n"
 
 
 def main() -> int:

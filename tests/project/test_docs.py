@@ -64,6 +64,14 @@ def test_links_within_the_project_lead_somewhere(name):
         assert (ROOT / name).parent.joinpath(link).exists(), link
 
 
+def test_figures_in_prose_are_those_of_the_kept_results(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    import evidence
+
+    for page, pattern, phrase in evidence.prose():
+        assert set(re.findall(pattern, page.read_text(encoding="utf-8"))) == {phrase}, f"{page.name}: run make pictures"
+
+
 def test_decisions_and_changelog_stay_short():
     records = [*ROOT.glob("docs/decisions/*.md"), ROOT / "CHANGELOG.md"]
     assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in records) <= 500
