@@ -147,15 +147,21 @@ def confirmation(results: Path) -> Table | None:
 
 
 def points(results: Path) -> Table | None:
-    """Return the table of single markers with the band promised for any session, or None where there are none."""
+    """Return the table of single markers with bands of this and of any other session, or None where there are none."""
     rows = json.loads((results / "evaluation.json").read_text(encoding="utf-8")).get("points", [])
-    table = _table("marker", "row", "trial", "RMSE\nnorm [mm]", "largest\n[mm]", "95 % band\n[mm]", "inside\n[%]")
-    table.title, table.title_justify = "Markers of the hand, with the band for any session", "left"
+    bands = ("95 % band\n[mm]", "inside\n[%]", "other day's\n95 % [mm]", "inside\n[%]")
+    table = _table("marker", "row", "trial", "RMSE\nnorm [mm]", "largest\n[mm]", *bands)
+    table.title, table.title_justify = "Markers of the hand, with bands of this session and of any other", "left"
     for column in table.columns[3:]:
         column.justify = "right"
     for row in rows:
-        figures = (f"{row[key]:.2f}" for key in ("rmse_norm_mm", "max_norm_mm", "band_95_mm"))
-        table.add_row(row["marker"], row["model"], row["trial"], *figures, f"{100.0 * row['inside']:.0f}")
+        figures = (f"{row[key]:.2f}" for key in ("rmse_norm_mm", "max_norm_mm"))
+        bands = tuple(
+            text
+            for day in ("", "other_day_")
+            for text in (f"{row[f'{day}band_95_mm']:.2f}", f"{100.0 * row[f'{day}inside']:.0f}")
+        )
+        table.add_row(row["marker"], row["model"], row["trial"], *figures, *bands)
     return table if rows else None
 
 

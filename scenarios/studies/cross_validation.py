@@ -28,6 +28,8 @@ from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
 from scenarios.steps.import_export import import_files
 
+_OTHER = ("other_day_band_95_mm", "other_day_inside")
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -54,10 +56,7 @@ def held_out(files: Sequence[Path], mapping: Path) -> HeldOut:
         dataset = load(Path(folder) / "dataset")
         found = _estimate(dataset)
         recorded = tuple(dataset.means("validation"))
-        points = (
-            p for m in found.models for p in point_rows(replace(found, main=m.name), dataset.description, recorded)
-        )
-        return HeldOut(tuple(points), found.verdicts)
+        return HeldOut(point_rows(found, dataset.description, recorded), found.verdicts)
 
 
 def cross_validated(table: Path, mapping: Path, parts: Iterable[np.ndarray]) -> tuple[HeldOut, ...]:
@@ -101,7 +100,7 @@ def by_regions(q: np.ndarray, parts: int, rng: np.random.Generator) -> list[np.n
 
 
 def pooled(found: Iterable[HeldOut], model: str, marker: str) -> PointRow:
-    """All postures left out together; `band_95_mm` is the median of the parts'.
+    """All postures left out together; bands are the median of the parts'.
 
     Raises:
         NotEnoughData: No part has that row and marker.
@@ -109,13 +108,15 @@ def pooled(found: Iterable[HeldOut], model: str, marker: str) -> PointRow:
     rows = [p for part in found for p in part.points if (p.model, p.marker) == (model, marker)]
     if not rows:
         raise NotEnoughData(f"nothing was left out of row {model!r}, marker {marker!r}")
-    n, rms, far, band, inside = (
+    n, rms, far, *bands = (
         np.array([getattr(p, name) for p in rows])
-        for name in ("n", "rmse_norm_mm", "max_norm_mm", "band_95_mm", "inside")
+        for name in ("n", "rmse_norm_mm", "max_norm_mm", "band_95_mm", "inside", *_OTHER)
     )
     total = int(n.sum())
-    rmse, share = float(np.sqrt((n * rms**2).sum() / total)), float((n * inside).sum() / total)
-    return PointRow("left out", model, marker, total, rmse, float(far.max()), float(np.median(band)), share)
+    rmse = float(np.sqrt((n * rms**2).sum() / total))
+    shares = [float((n * x).sum() / total) for x in bands[1::2]]
+    radii = [float(np.median(x)) for x in bands[::2]]
+    return PointRow("left out", model, marker, total, rmse, float(far.max()), radii[0], shares[0], radii[1], shares[1])
 
 
 def _estimate(dataset: Dataset) -> Estimate:

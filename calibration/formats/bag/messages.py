@@ -11,6 +11,12 @@ MOTOR, ABSOLUTE, COMMAND = "/joint_states", "/joint_states_absolute", "/joint_st
 NAMES, VALUES = "/introspection_data/names", "/introspection_data/values"
 WRIST = "/wrist_ft"
 JOINT_STATE, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
+POSES = (
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+    "nav_msgs/msg/Odometry",
+)
 STATISTICS_NAMES, STATISTICS_VALUES = (
     "pal_statistics_msgs/msg/StatisticsNames",
     "pal_statistics_msgs/msg/StatisticsValues",

@@ -3,11 +3,13 @@
 from pathlib import Path
 
 from calibration.errors import InputError
-from calibration.formats.bag.messages import JOINT_STATE, NAMES, VALUES
+from calibration.formats.bag.messages import JOINT_STATE, NAMES, POSES, VALUES
 from calibration.formats.bag.read import read_bag, topics_of
 from calibration.formats.mapping.layouts import BagLayout
+from calibration.formats.survey.poses_in_columns import SIGMAS
 from calibration.formats.survey.robot import UrdfRobot
 from calibration.formats.survey.view import FileView
+from calibration.formats.survey.yaml_text import CHOOSE, flow
 
 _LINK = ("absolute", "link", "encoder")
 _COMMAND = ("command", "target", "desired")
@@ -36,6 +38,17 @@ def view_bag(path: Path, robot: UrdfRobot) -> FileView:
         layout = BagLayout(source="joint_states", joints={n: n for n in names}, motor=motor, link=link, command=command)
         pairs = [("motor", motor), ("link", link), ("command", command)]
         lines = ["source: joint_states", "joints: same", *(f"{k}: {v}" for k, v in pairs if v)]
-    used = {motor, link, command}
+    poses = {_body(t): {"topic": t} | SIGMAS for t, (kind, _) in topics.items() if kind in POSES}
+    if poses:
+        layout = BagLayout.model_validate(layout.model_dump() | {"poses": poses})
+        said = (f"  {flow(name)}: {flow(p)}  {CHOOSE}: how well it is measured, per axis" for name, p in poses.items())
+        lines += ["poses:", *said]
+    used = {motor, link, command, *(p["topic"] for p in poses.values())}
     left = tuple(sorted(t for t in topics if t not in used and t not in (NAMES, VALUES)))
     return FileView(path, "bag", read_bag([path], layout), (), tuple(lines), left)
+
+
+def _body(topic: str) -> str:
+    """What a topic of poses is about: /vrpn/hand/pose is of the hand."""
+    parts = [part for part in topic.split("/") if part]
+    return parts[-2] if len(parts) > 1 and parts[-1] in ("pose", "transform", "odom") else parts[-1]

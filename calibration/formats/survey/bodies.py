@@ -91,7 +91,7 @@ def _by_name(group: list[int], names: Sequence[str]) -> list[list[int]]:
 
 
 def _stem(name: str) -> str:
-    return re.sub(r"[\W_]*\d*$", "", name)
+    return re.sub(r"(\.[xyz][+-]|[\W_]*\d*)$", "", name)  # also of the markers that stand for a pose
 
 
 def _common(group: Sequence[int], names: Sequence[str]) -> str:

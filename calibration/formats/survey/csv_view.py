@@ -2,7 +2,7 @@
 
 A marker is three columns that differ in x, y, z only; a joint a column that contains its name in the URDF; a plate
 Fx..Mz with or without a prefix, its CoP columns beside them. Lengths beyond 30 are millimetres, angles beyond two turns
-degrees. With CoP = c + (-My, Mx) / Fz a plate in lab axes shows its centre c.
+degrees. 6D poses: `poses_in_columns`. With CoP = c + (-My, Mx) / Fz a plate in lab axes shows its centre c.
 """
 
 import re
@@ -15,8 +15,10 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.formats.csv.read import CsvText, read_text
 from calibration.formats.mapping.channels import Joints, Markers, Means, Recorded
+from calibration.formats.survey.poses_in_columns import PoseColumns, lines_of, poses_in
 from calibration.formats.survey.robot import UrdfRobot
 from calibration.formats.survey.view import FileView, PlateView
+from calibration.formats.survey.yaml_text import flow
 from calibration.numerics.wrench import LOADED
 
 _TIME = re.compile(r"^(t|time|times|stamp|timestamp|seconds?|time[_ ]?(utc|s|ms|stamp))$", re.IGNORECASE)
@@ -55,30 +57,27 @@ def view_csv(path: Path, robot: UrdfRobot) -> FileView:
         dwells = Recorded(str(path), dwells=text.numbers(text.header))
         return FileView(path, "csv", dwells, (), (f"dwells: [{', '.join(text.header)}]",))
     timed = next((c for c in text.header if _TIME.match(c)), None)
-    triples = list(_triples(c for c in text.header if c != timed))
+    joints = _joint_columns(text, robot.movable)
+    used = {timed, *(c for of in joints.values() for c in of.values())}
+    poses = poses_in(text, used)
+    used |= {c for p in poses for c in p.columns}
+    triples = list(_triples(c for c in text.header if c not in used))
     wrenches = {t.name: t for t in triples if _WRENCH.match(t.name)}
     markers = _of_one_pattern([t for t in triples if t.name not in wrenches])
-    joints = _joint_columns(text, robot.movable)
-    if not (markers or wrenches or "motor" in joints):
+    if not (markers or poses or wrenches or "motor" in joints):
         raise InputError(
             f"{path}:1:1", "no columns of markers (x, y, z), of the URDF's joints, or of forces and moments"
         )
     unit, t = (None, None) if timed is None else _times(text, timed)
-    lines = []
-    if timed is not None:
-        lines.append(f"time: {{column: {timed}, unit: {unit}}}")
-    used = {timed, *(c for m in markers for c in m.columns)}
-    position, more = _markers(text, markers)
+    lines = [] if timed is None else [f"time: {flow({'column': timed, 'unit': unit})}"]
+    used |= {c for m in markers for c in m.columns}
+    seen, more = _seen(text, markers, poses)
     lines += more
     readings, more = _readings(text, joints, robot)
     lines += more
-    used |= {c for of in joints.values() for c in of.values()}
     plates = tuple(_plates(text, wrenches))
     used |= {c for t in wrenches.values() for c in t.columns} if plates else set()
-    if not (markers or readings):
-        return FileView(path, "csv", Recorded(str(path)), plates, tuple(lines), _left(text, used))
-    names = tuple(m.name for m in markers)
-    recorded = _recorded(path, t, Markers(np.zeros(0), names, position) if markers else None, readings)
+    recorded = _recorded(path, t, seen, readings) if seen or readings else Recorded(str(path))
     return FileView(path, "csv", recorded, plates, tuple(lines), _left(text, used))
 
 
@@ -144,9 +143,20 @@ def _joint_columns(text: CsvText, joints: Sequence[str]) -> dict[str, dict[str, 
     return found
 
 
+def _seen(text: CsvText, markers: Sequence[Triple], poses: Sequence[PoseColumns]) -> tuple[Markers | None, list[str]]:
+    """Markers, those that stand for poses behind them, without times; None where there are none."""
+    if not (markers or poses):
+        return None, []
+    position, lines = _markers(text, markers) if markers else (np.zeros((len(text.cells), 0, 3)), [])
+    try:
+        parts = [position, *(p.positions(text) for p in poses)]
+    except ValueError as error:
+        raise InputError(text.path, str(error)) from error
+    names = (*(m.name for m in markers), *(n for p in poses for n in p.markers))
+    return Markers(np.zeros(0), names, np.concatenate(parts, axis=1)), [*lines, *lines_of(poses)]
+
+
 def _markers(text: CsvText, markers: Sequence[Triple]) -> tuple[np.ndarray, list[str]]:
-    if not markers:
-        return np.zeros((0, 0, 3)), []
     raw = np.stack([text.numbers(m.columns, gaps=True) for m in markers], axis=1)
     zero = (raw == 0.0).all(axis=2)
     raw[zero] = np.nan
@@ -211,9 +221,7 @@ def _plate(text: CsvText, name: str, of: dict[str, Triple]) -> PlateView:
             about = "lab"
         span = 2.0 * np.nanmax(np.abs(cop[loaded, :2] - centre[:2]), axis=0) if loaded.any() else [np.nan] * 2
         size = (float(np.ceil(10.0 * span[0]) / 10.0), float(np.ceil(10.0 * span[1]) / 10.0))
-    columns = ", ".join(
-        f"{key}: [{', '.join(t.columns)}]" for key, t in sorted(of.items(), key=lambda x: x[0] != "force")
-    )
+    columns = ", ".join(f"{key}: {flow(t.columns)}" for key, t in sorted(of.items(), key=lambda x: x[0] != "force"))
     layout = f"{columns}, axes: lab, about: {about}, force_unit: N, moment_unit: {unit}"
     wrench = np.concatenate([force, moment], axis=1)
     return PlateView(name, wrench, centre, np.eye(3), size, layout, of["force"].columns)

@@ -3,20 +3,17 @@
 A plate's centre, axes and size are the file's where it shows them.
 """
 
-import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from calibration.formats.mapping.poses import marker_names
 from calibration.formats.survey.bodies import FoundBody
 from calibration.formats.survey.plate_signs import division, reversed_force
 from calibration.formats.survey.session import Session, sigmas_of
 from calibration.formats.survey.trials import kind_of
 from calibration.formats.survey.view import FileView, PlateView
-
-CHOOSE = "# CHOOSE"
-_PLAIN = re.compile(r"^[A-Za-z_][\w./-]*$")
-_WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
+from calibration.formats.survey.yaml_text import CHOOSE, flow
 
 
 def draft(session: Session, urdf: str, files: Sequence[str], wheels: str | None = None) -> str:
@@ -114,6 +111,8 @@ def _bodies(session: Session) -> Iterator[str]:
 
 
 def _body(body: FoundBody, link: str, **more: bool) -> str:
+    if body.markers == marker_names(body.name):
+        return flow({"name": body.name, "link": link, "pose": True} | more)
     return flow({"name": body.name, "link": link, "undrawn": list(body.markers)} | more)
 
 
@@ -159,6 +158,7 @@ def _layouts(session: Session) -> Iterator[str]:
         static = view.recorded.means is not None
         lines = [f"suffix: {session.tails[view.path.name]}", *layout]
         why = "of a posture's mean position of a marker [m]"
+        static = static and any(line.startswith("markers:") for line in layout)
         lines += [f"marker_std: {sigmas_of(session)['marker']:g}  {CHOOSE}: {why}"] if static else []
         yield from _nested(lines + list(_plate_lines(session, view)), view)
     for kind, views in others.items():
@@ -191,16 +191,3 @@ def _plate_lines(session: Session, view: FileView) -> Iterator[str]:
 def _unused(view: FileView) -> Iterator[str]:
     if view.left:
         yield f"# not used: {', '.join(view.left[:12])}{', ...' if len(view.left) > 12 else ''}"
-
-
-def flow(value: object) -> str:
-    """A value in one line of YAML."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{flow(k)}: {flow(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(flow(v) for v in value) + "]"
-    if isinstance(value, str) and (not _PLAIN.match(value) or value.lower() in _WORDS):
-        return "'" + value.replace("'", "''") + "'"
-    return str(value)

@@ -11,8 +11,9 @@ from calibration.formats.bag.read import read_bag
 from calibration.formats.mapping.layouts import BagLayout
 from calibration.formats.mapping.poses import shape_of
 from calibration.mocap.cluster_pose import body_poses
+from scenarios.steps.import_export import import_files, init_mapping
 from tests.calibration.formats.test_poses import SIGMA_P, SIGMA_R, mapping
-from tests.doubles.six_axis_arm import JOINTS, measured
+from tests.doubles.six_axis_arm import ARM, JOINTS, measured
 
 RATE, DWELL, MOVE = 20.0, 26, 16  # [Hz], samples
 TYPES = {
@@ -120,3 +121,11 @@ def test_an_arm_is_calibrated_from_a_bag_alone(lab):
     (said,) = [v.message for v in estimate.verdicts if "left-out postures" in v.message]
     error, base = (float(said.split(word)[1].split()[0]) for word in ("left-out postures ", "registration "))
     assert error < 0.5 < base
+
+
+def test_a_draft_of_a_bag_names_its_poses(lab):
+    log = write(lab.folder / "log", "PoseStamped", 12)
+    text = init_mapping([log], lab.folder / "lab.yaml", ARM)
+    assert "poses: {topic: '/poses', sigma_position:" in text and "name: poses, link: tool0, pose: true" in text
+    import_files(None, [log], lab.folder / "lab.yaml", lab.out)
+    assert load(lab.out).description.hand_body.name == "poses"

@@ -10,6 +10,7 @@ from calibration import calibrate, load
 from calibration.formats.mapping.layouts import PoseChannels
 from calibration.formats.mapping.poses import marker_sigma, shape_of
 from calibration.mocap.cluster_pose import body_poses
+from scenarios.steps.import_export import import_files, init_mapping
 from tests.calibration.formats.test_csv import write_csv
 from tests.doubles.six_axis_arm import ARM, JOINTS, measured
 
@@ -119,3 +120,30 @@ def test_a_body_whose_pose_is_in_no_table_is_named(lab, capsys):
     wrong = json.loads(json.dumps(mapping("quat_xyzw")).replace('"poses": {"hand"', '"poses": {"wrist"'))
     file = write_csv(lab.folder / "postures.csv", columns("quat_xyzw"))
     assert "named in no table's or bag's `poses`" in lab.refused(capsys, wrong, file)
+
+
+STYLES = {
+    "OptiTrack": ("quat_xyzw", "hand_X hand_Y hand_Z", "hand_qx hand_qy hand_qz hand_qw", 1e3),
+    "Motive": ("quat_xyzw", "hand Position X,hand Position Y,hand Position Z", "", 1.0),
+    "Vicon": ("rotation_vector", "hand:TX hand:TY hand:TZ", "hand:RX hand:RY hand:RZ", 1e3),
+    "Qualisys": ("euler_XYZ", "X Y Z", "Roll Pitch Yaw", 1e3),
+}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_draft_finds_the_poses_that_systems_export(lab, style):
+    order, place, turn, factor = STYLES[style]
+    found, degrees = measured(0, 20), np.degrees(1.0) if order.startswith(("euler", "rotation")) else 1.0
+    x = degrees * NUMBERS.get(order, lambda R: R.as_euler("XYZ"))(Rotation.from_matrix(found.T[:, :3, :3]))
+    turn = turn.split() or [f"hand Rotation {a}" for a in "XYZW"]
+    place = place.split(",") if "," in place else place.split()
+    table = dict(zip(place, factor * found.T[:, :3, 3].T, strict=True)) | dict(zip(turn, x.T, strict=True))
+    file = write_csv(lab.folder / "p.csv", table | dict(zip(JOINTS, found.q.T, strict=True)))
+    text = init_mapping([file], lab.folder / "lab.yaml", ARM)
+    assert len(text.splitlines()) <= 25 and f"order: {order}" in text and "pose: true" in text
+    import_files(None, [file], lab.folder / "lab.yaml", lab.out)
+    dataset = load(lab.out)
+    ((_, means),) = dataset.means("calibration")
+    body = dataset.description.hand_body
+    T = body_poses(np.array([m.xyz for m in body.markers]), means.marker_position).T
+    np.testing.assert_allclose(T, found.T, atol=1e-6)
