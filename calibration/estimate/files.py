@@ -5,43 +5,36 @@
     record_next.yaml         postures and motions for what the data do not identify; only if there are any
     nominal.urdf             what the placement twists are relative to
     calibrated.urdf          joint placements of the main model        } only if the result
-    master_calibration.yaml  zeros of the readings of the main model   } may be used: see `estimate_tables`
+    zeros.yaml               zeros of the readings of the main model   } may be used: see `tables`
+    master_calibration.yaml  the same geometry as PAL's robots read it } see `calibrated_urdf`
     parameters.csv           every parameter of every model            }
 
 The same estimate gives the same bytes. `load_estimate` also reads another program's estimate.json or URDF.
-
-A calibrated URDF: the nominal text with the joint origins moved.
-
-    origin <- origin exp6(xi)           xyz [m], rpy [rad]: R = Rz(yaw) Ry(pitch) Rx(roll)
-
-Near pitch = +-pi/2 yaw and roll turn about one axis and only their sum is defined: yaw is taken first, whatever it is,
-and pitch and roll from Rz(yaw)' R, so that the three together give R to rounding. Zeros of readings do not fit in a
-URDF: they go to master_calibration.yaml, and this file's joint positions are readings minus those.
 """
 
 import json
 import os
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 from pydantic import ValidationError
 
 from calibration.errors import InputError
+from calibration.estimate.calibrated_urdf import calibrated_urdf, pal_calibration
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.json_schema import EstimateFile, to_estimate, to_file
 from calibration.estimate.tables import parameters_text, read_zeros, zero_parameters, zeros_text
 from calibration.inference.parameters import Model
 from calibration.recording import netcdf
 from calibration.recording.experiment import plans_text, read_plans
-from calibration.robot.chain import Chain, chain_of_frames
+from calibration.robot.chain import chain_of_frames
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.untrusted import checked_urdf, findings, json_of, read_text
 
 JSON, COVARIANCES, NOMINAL = "estimate.json", "estimate.nc", "nominal.urdf"
-CALIBRATED, ZEROS, TABLE = "calibrated.urdf", "master_calibration.yaml", "parameters.csv"
+CALIBRATED, ZEROS, TABLE = "calibrated.urdf", "zeros.yaml", "parameters.csv"
+PAL = "master_calibration.yaml"
 NEXT = "record_next.yaml"
 
 
@@ -53,7 +46,7 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
     _write_covariances(folder / COVARIANCES, estimate)
     if estimate.urdf is not None:
         _replace_text(folder / NOMINAL, estimate.urdf)
-    for name in (CALIBRATED, ZEROS, TABLE, NEXT):
+    for name in (CALIBRATED, ZEROS, PAL, TABLE, NEXT):
         (folder / name).unlink(missing_ok=True)
     if estimate.remedies and estimate.robot is not None:
         _replace_text(folder / NEXT, plans_text(estimate.robot.joints, estimate.remedies))
@@ -65,6 +58,7 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
         if estimate.has_geometry:
             _replace_text(folder / CALIBRATED, calibrated_urdf(estimate.urdf, hand.chain))
             _replace_text(folder / ZEROS, zeros_text(hand))
+            _replace_text(folder / PAL, pal_calibration(estimate.urdf, hand))
         _replace_text(folder / TABLE, parameters_text(estimate.models))
 
 
@@ -131,38 +125,3 @@ def _read_covariances(path: Path, name: str = "covariance") -> dict[str, np.ndar
         return {}
     with netcdf.opened(path, "write the estimate again") as file:
         return {m: netcdf.array(group, name) for m, group in file.groups.items() if name in group.variables}
-
-
-def calibrated_urdf(urdf: str, chain: Chain) -> str:
-    """The URDF text with the placement twists of `chain` on its joints; all else, comments included, as it was.
-
-    Raises:
-        InputError: A joint of the chain is not in the text.
-    """
-    parser = ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
-    robot = ET.fromstring(urdf, parser=parser)
-    joints = {joint.get("name"): joint for joint in robot.findall("joint")}
-    for name, xi in zip(chain.joints, chain.xi, strict=True):
-        if name not in joints:
-            raise InputError("nominal.urdf", f"no joint {name!r}; it has {sorted(str(j) for j in joints)}")
-        if np.any(xi):
-            _move(joints[name], xi)
-    return '<?xml version="1.0"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
-
-
-def _move(joint: ET.Element, xi: np.ndarray) -> None:
-    origin = joint.find("origin")
-    if origin is None:
-        origin = ET.SubElement(joint, "origin")
-    xyz, rpy = (np.array([float(v) for v in origin.get(key, "0 0 0").split()]) for key in ("xyz", "rpy"))
-    moved = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz) * pin.exp6(xi)
-    origin.set("xyz", " ".join(repr(float(v)) for v in moved.translation))
-    origin.set("rpy", " ".join(repr(float(v)) for v in roll_pitch_yaw(moved.rotation)))
-
-
-def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
-    """Angles (3,) [rad] with Rz(yaw) Ry(pitch) Rx(roll) = R (3, 3) to rounding, everywhere."""
-    yaw = np.arctan2(R[1, 0], R[0, 0])
-    c, s = np.cos(yaw), np.sin(yaw)
-    rest = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
-    return np.array([np.arctan2(-rest[1, 2], rest[1, 1]), np.arctan2(-rest[2, 0], rest[0, 0]), yaw])

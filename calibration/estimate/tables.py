@@ -1,12 +1,12 @@
 """The main model as two small texts other programs read.
 
-    master_calibration.yaml   - joint: NAME            angle = reading - offset            [rad; m where a joint slides]
+    zeros.yaml                - joint: NAME            angle = reading - offset            [rad; m where a joint slides]
                                 offset: o              ... - compliance * torque - gap / 2 * tanh(torque / 0.3 N.m)
                                 compliance: c          [rad/(N.m), m/N], left out where it is 0
                                 gap: g                 [rad; m], left out where it is 0
     parameters.csv            name,value,sigma,unit,status,nominal,model, a line each, every model of the estimate
 
-PAL's list of joints and offsets. Reading: what the motor-side encoder reports, in the URDF's sense of the joint;
+Reading: what the motor-side encoder reports, in the URDF's sense of the joint;
 angle: joint position of calibrated.urdf. Who adds offsets to readings has to change their sign.
 """
 
@@ -68,7 +68,7 @@ class Row:
 
 
 def zeros_text(hand: HandModel) -> str:
-    """master_calibration.yaml of a calibrated robot."""
+    """zeros.yaml of a calibrated robot."""
     plays = bool(hand.gap.any())
     lines = [_HEADER + (_ELASTIC if plays or hand.compliance.any() else "") + (_PLAY if plays else "")]
     for name, *values in zip(hand.chain.joints, hand.offset, hand.compliance, hand.gap, strict=True):
@@ -78,7 +78,7 @@ def zeros_text(hand: HandModel) -> str:
 
 
 def read_zeros(path: Path | str) -> tuple[Zero, ...]:
-    """Read master_calibration.yaml, a mapping of joints to offsets, or a CSV table with the columns joint, offset.
+    """Read zeros.yaml, a mapping of joints to offsets, or a CSV table with the columns joint, offset.
 
     Raises:
         InputError: It is not such a list.

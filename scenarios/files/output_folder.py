@@ -49,6 +49,7 @@ ESTIMATE = Kind(
             "estimate.nc",
             "nominal.urdf",
             "calibrated.urdf",
+            "zeros.yaml",
             "master_calibration.yaml",
             "parameters.csv",
             "record_next.yaml",

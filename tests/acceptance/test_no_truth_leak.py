@@ -12,7 +12,7 @@ import twin
 from calibration.recording.trial import sha256
 from scenarios import load, steps
 
-FILES = ("estimate.json", "estimate.nc", "calibrated.urdf", "master_calibration.yaml")
+FILES = ("estimate.json", "estimate.nc", "calibrated.urdf", "zeros.yaml", "master_calibration.yaml")
 
 
 def copied(run, tmp_path):

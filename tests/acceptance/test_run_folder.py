@@ -47,6 +47,7 @@ def test_the_run_folder_is_complete(result):
         "estimate/estimate.nc",
         "estimate/calibrated.urdf",
         "estimate/master_calibration.yaml",
+        "estimate/zeros.yaml",
         "evaluation.json",
         "score.json",
         "report.html",

@@ -50,7 +50,7 @@ class Target:
 
 _FILES = "csv csv/swing.mocap.csv csv/swing.robot.csv csv/swing.plate.csv"
 _FRAMES = "calibrate one --stages clocks,registration --out out"
-_ZEROS = "estimate/master_calibration.yaml"
+_ZEROS = "estimate/zeros.yaml"
 _IMPORT = "import {} --map {}/mapping.yaml --out out"
 TARGETS = {
     "dataset.json": Target(

@@ -38,4 +38,6 @@ def test_a_wrong_plate_is_refused_and_the_command_ends_with_1(
     assert end.value.code == 1 and "must not be used" in printed.err and said in printed.out
     found = load_estimate(tmp_path / "estimate")
     assert found.status == "not_calibrated" and found.suspension is None
-    assert not {"calibrated.urdf", "master_calibration.yaml"} & {p.name for p in (tmp_path / "estimate").iterdir()}
+    assert not {"calibrated.urdf", "zeros.yaml", "master_calibration.yaml"} & {
+        p.name for p in (tmp_path / "estimate").iterdir()
+    }

@@ -1,15 +1,17 @@
 import json
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 import mjcf
 from calibration import Compensator, load_estimate, save_estimate
 from calibration.errors import InputError, NotCalibrated, ShapeError
-from calibration.estimate.files import calibrated_urdf, roll_pitch_yaw
+from calibration.estimate.calibrated_urdf import calibrated_urdf, roll_pitch_yaw
 from calibration.estimate.tables import read_parameters, read_zeros, zeros_text
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
@@ -31,9 +33,9 @@ def test_the_exported_urdf_is_the_estimate_to_1e_9_on_1000_configurations(estima
     assert np.abs(exported.poses(q) - chain.poses(q)).max() > 1e-3
 
 
-def test_zeros_read_back_from_master_calibration_close_the_loop(estimate, chain, tmp_path):
+def test_zeros_read_back_close_the_loop(estimate, chain, tmp_path):
     save_estimate(estimate, tmp_path)
-    zeros = read_zeros(tmp_path / "master_calibration.yaml")
+    zeros = read_zeros(tmp_path / "zeros.yaml")
     assert [z.joint for z in zeros] == list(chain.joints)
     exported = chain_of((tmp_path / "calibrated.urdf").read_text(), rigid_robot.described())
     readings = rigid_robot.random_angles(np.random.default_rng(0), 20)
@@ -46,11 +48,31 @@ def test_zeros_of_an_elastic_robot_carry_its_compliance(chain, tmp_path):
     elastic = nominal_hand(chain, np.zeros(12)).with_values(
         offset=0.01 * np.arange(8.0), compliance=1e-4 * np.arange(8.0)
     )
-    (tmp_path / "master_calibration.yaml").write_text(zeros_text(elastic))
-    zeros = read_zeros(tmp_path / "master_calibration.yaml")
+    (tmp_path / "zeros.yaml").write_text(zeros_text(elastic))
+    zeros = read_zeros(tmp_path / "zeros.yaml")
     q = rigid_robot.random_angles(np.random.default_rng(0), 5)
     angles = q - [z.offset for z in zeros] - np.array([z.compliance for z in zeros]) * chain.gravity_torques(q)
     np.testing.assert_allclose(angles, elastic.angles(q), atol=1e-15)
+
+
+def test_what_pals_publisher_adds_to_the_origins_is_the_same_robot(estimate, chain, tmp_path):
+    save_estimate(estimate, tmp_path)
+    added = yaml.safe_load((tmp_path / "master_calibration.yaml").read_text())
+    added = added["robot_state_publisher"]["geometric_calibration"]
+    assert len(added) > 40 and {k.rpartition("_")[2] for k in added} == set("dx dy dz droll dpitch dyaw".split())
+    robot = ET.fromstring(mjcf.urdf())
+    for key, value in added.items():
+        name, _, what = key.rpartition("_")
+        origin = next(j for j in robot.findall("joint") if j.get("name") == f"{name}_joint").find("origin")
+        kind, k = ("xyz", "xyz".find(what[1:])) if len(what) == 2 else ("rpy", "rpy".find(what[1]))
+        numbers = [float(x) for x in origin.get(kind, "0 0 0").split()]
+        origin.set(kind, " ".join(repr(x + value * (i == k)) for i, x in enumerate(numbers)))
+    published = chain_of(ET.tostring(robot, encoding="unicode"), rigid_robot.described())
+    readings = rigid_robot.random_angles(np.random.default_rng(0), 50)
+    hand = hand_of(estimate.model("model_2"), chain, np.zeros(12))
+    np.testing.assert_allclose(
+        published.poses(readings), hand.in_base_frame(readings) @ inverse_of_hand(hand), atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("text", ["- joint: a\n  offset: none", "- [1, 2", "- joint: a\n  ofset: 1.0", "3"])
@@ -131,7 +153,7 @@ def test_an_estimate_that_must_not_be_used_exports_nothing_and_cannot_be_loaded_
     save_estimate(estimate, tmp_path)
     bad = replace(estimate, status="not_calibrated", verdicts=(Verdict("geometry", "refused", "too few postures"),))
     save_estimate(bad, tmp_path)
-    assert not (tmp_path / "calibrated.urdf").exists() and not (tmp_path / "master_calibration.yaml").exists()
+    assert not {"calibrated.urdf", "zeros.yaml", "master_calibration.yaml"} & {p.name for p in tmp_path.iterdir()}
     with pytest.raises(NotCalibrated, match="too few postures"):
         Compensator.load(tmp_path)
 

@@ -50,7 +50,7 @@ def mm(evaluation, model, base, trials="dynamic"):
 
 
 def test_our_urdf_with_its_zeros_scores_as_the_estimate(saved, dataset, ours):
-    found = evaluate(load_estimate(saved / "calibrated.urdf", saved / "master_calibration.yaml"), dataset)
+    found = evaluate(load_estimate(saved / "calibrated.urdf", saved / "zeros.yaml"), dataset)
     for trials in ("dynamic", "static"):
         assert mm(found, "calibrated", "measured", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=0.02)
     bare = evaluate(load_estimate(saved / "calibrated.urdf"), dataset)
