@@ -85,7 +85,7 @@ def import_files(
         some = [(recorded[entry.id].file, trial) for entry, trial in found if entry.role in session]
         check_columns(description, chain, some)
         check_currents(chain, some)
-    _write(out, mapping.urdf, description, found)
+    _write(out, mapping.urdf, description, sorted(found, key=_begin))
     return tuple(dict.fromkeys(note for r in recorded.values() for note in r.notes))
 
 
@@ -162,6 +162,12 @@ def _trial(
             "approach": np.array(approach, dtype=np.int8),
         }
     return replace(trial, **fields)
+
+
+def _begin(pair: tuple[MappedTrial, Trial | PostureMeans]) -> float:
+    """When a trial began on the markers' clock [s], by which a dataset lists its trials; those without a time first."""
+    t = getattr(pair[1], "t_mocap", ())
+    return float(t[0]) if len(t) else -np.inf
 
 
 def _entry_before(before: Dataset, trial_id: str) -> TrialEntry:

@@ -93,6 +93,7 @@ WRONG = {
     "y of opposite sign": ("quat_xyzw", {}, {"py": -1.0}),
     "transposed": ("quat_xyzw", {}, {"transposed": 1}),
     "inverted": ("quat_xyzw", {}, {"inverted": 1}),
+    "no joint reversed and no two swapped": ("quat_xyzw", {}, {"turning": 1}),
 }
 
 
@@ -106,6 +107,9 @@ def spoilt(table, how):
     if {"transposed", "inverted"} & how.keys():
         R = Rotation.from_quat(x).inv()
         p, x = (p if "transposed" in how else -R.apply(p)), R.as_quat()
+    if "turning" in how:  # in a frame on the first link
+        turn = Rotation.from_rotvec(-table[JOINTS[0]][:, None] * [0.0, 0.0, 1.0])
+        p, x = turn.apply(p), (turn * Rotation.from_quat(x)).as_quat()
     return table | {f"p{a}": p[:, k] for k, a in enumerate("xyz")} | {f"r{k}": c for k, c in enumerate(x.T)}
 
 
