@@ -81,7 +81,7 @@ def pal_calibration(urdf: str, hand: HandModel) -> str:
         InputError: A joint of the chain is not in the text.
     """
     chain = hand.chain
-    xi = log6(exp6(chain.xi) @ exp6(-hand.offset[:, None] * chain.drawn.twists))
+    xi = log6(exp6(chain.xi) @ exp6(-hand.offset[:, None] * chain.nominal_path.twists))
     before, after = (
         {j.get("name"): _origin(j) for j in ET.fromstring(text).findall("joint")}
         for text in (urdf, calibrated_urdf(urdf, chain.with_placements(xi)))
