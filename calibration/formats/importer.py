@@ -166,8 +166,8 @@ def _trial(
 
 def _begin(pair: tuple[MappedTrial, Trial | PostureMeans]) -> float:
     """When a trial began on the markers' clock [s], by which a dataset lists its trials; those without a time first."""
-    t = getattr(pair[1], "t_mocap", ())
-    return float(t[0]) if len(t) else -np.inf
+    trial = pair[1]
+    return float(trial.t_mocap[0]) if isinstance(trial, Trial) and len(trial.t_mocap) else -np.inf
 
 
 def _entry_before(before: Dataset, trial_id: str) -> TrialEntry:

@@ -156,12 +156,12 @@ def points(results: Path) -> Table | None:
         column.justify = "right"
     for row in rows:
         figures = (f"{row[key]:.2f}" for key in ("rmse_norm_mm", "max_norm_mm"))
-        bands = tuple(
+        inside = [
             text
             for day in ("", "other_day_")
             for text in (f"{row[f'{day}band_95_mm']:.2f}", f"{100.0 * row[f'{day}inside']:.0f}")
-        )
-        table.add_row(row["marker"], row["model"], row["trial"], *figures, *bands)
+        ]
+        table.add_row(row["marker"], row["model"], row["trial"], *figures, *inside)
     return table if rows else None
 
 

@@ -58,7 +58,7 @@ def view_csv(path: Path, robot: UrdfRobot) -> FileView:
         return FileView(path, "csv", dwells, (), (f"dwells: [{', '.join(text.header)}]",))
     timed = next((c for c in text.header if _TIME.match(c)), None)
     joints = _joint_columns(text, robot.movable)
-    used = {timed, *(c for of in joints.values() for c in of.values())}
+    used: set[str | None] = {timed, *(c for of in joints.values() for c in of.values())}
     poses = poses_in(text, used)
     used |= {c for p in poses for c in p.columns}
     triples = list(_triples(c for c in text.header if c not in used))

@@ -6,7 +6,8 @@ measures it, no file states: both are to be chosen; the import checks the order 
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +53,7 @@ class PoseColumns:
         return markers_at(p, x, self.channels)
 
 
-def poses_in(text: CsvText, others: set[str]) -> tuple[PoseColumns, ...]:
+def poses_in(text: CsvText, others: AbstractSet[str | None]) -> tuple[PoseColumns, ...]:
     """Poses of rigid bodies in columns that are not `others`."""
     known, found = [c for c in text.header if c not in others], dict[str, PoseColumns]()
     position = _of(_POSITION, known)
@@ -66,7 +67,7 @@ def poses_in(text: CsvText, others: set[str]) -> tuple[PoseColumns, ...]:
     return tuple(found.values())
 
 
-def lines_of(poses: tuple[PoseColumns, ...]) -> Iterator[str]:
+def lines_of(poses: Sequence[PoseColumns]) -> Iterator[str]:
     """The lines of the mapping."""
     if poses:
         yield "poses:"
