@@ -2,8 +2,9 @@
 
 Zeros of either side may be anything; a link may be off its motor by its gear's backlash and deflection.
 
-    y = q_motor - q_link - zero         rms y > 0.1 rad over calibration trials: ten times the backlash of a worn gear
-    q_link ~ a q_motor + b              a = -1 sign, a = 180 / pi degrees, a = 0 stands still; by least squares
+    y = q_link - q_motor + zero      rms y > 0.1 rad in a trial: ten times the backlash of a worn gear
+    jumps of y from sample to sample, of whole turns where it wraps; q_link at its limit while q_motor moves
+    q_link ~ a q_motor + b           a = -1 sign, a = 180 / pi degrees, another scale; by least squares
 
 A polynomial of the angle explains such a discrepancy perfectly, so the R2 of a joint model does not show it.
 """
@@ -23,10 +24,10 @@ _COPIED = (
     0.01  # of an encoder's noise by which a reading may differ from its command; noise and quantisation are larger
 )
 _SHARE = 0.05  # of the samples that may be farther out
-_BEYOND = 0.1  # rms [rad, m]
-_NEAR = 0.1  # of the slope [-]
-_FOLLOWS = 0.99  # correlation with another joint's motor side [-]
-_SLOPES = ((-1.0, "its sign is turned"), (180.0 / np.pi, "it is in degrees"), (0.0, "it stands still"))
+_NEAR = 0.1  # of a slope, of a turn [-]
+_SCALE, _LEFT = 0.03, 0.3  # a slope is off 1 by more and leaves less of the difference, rms: no backlash is so straight
+_SLOPES = ((-1.0, "has its sign turned"), (180.0 / np.pi, "is in degrees"))
+_UNNAMED = "is off its motor side by"
 
 
 def missing_readings(trial: Trial | PostureMeans) -> Iterator[str]:
@@ -71,49 +72,82 @@ def commanded(trial: Trial, sigma: float) -> Iterator[str]:
 
 
 def wrong_sides(trial: Trial) -> Iterator[str]:
-    """Link readings of one trial that do not follow their motor's."""
+    """Link readings of one trial that are not those of their joint's motor side, and why."""
     for k, name in enumerate(trial.joint):
-        known = np.isfinite(trial.q_link[:, k])
-        if known.sum() < _FEW or _range(trial.q_link[known, k] - trial.q_motor[known, k]) < _APART:
-            continue
-        others = {
-            (other, how): _range(trial.q_link[known, k] - sign * trial.q_motor[known, j])
-            for j, other in enumerate(trial.joint)
-            for sign, how in ((1.0, "follows"), (-1.0, "runs against"))
-            if _range(trial.q_motor[known, j]) > 2.0 * _APART
-        }
-        other, how = min(others, key=lambda key: others[key], default=("", ""))
-        hint = f"; it {how} the motor of {other}" if others and others[other, how] < _APART else ""
-        yield f"joint {name}: its link reading does not follow its motor's{hint}: columns swapped, or a sign reversed"
+        if reason := _wrong_side(trial, k, None):
+            yield f"link encoder of {name} {reason}; correct the recording"
+
+
+def wrong_links(measured: Sequence[str], trials: Sequence[Trial], zero: np.ndarray) -> Iterator[Verdict]:
+    """A refusal for each joint whose link readings, its zero (n_measured,) added, are not those of its motor side."""
+    for j, joint in enumerate(measured):
+        found = {t.id: reason for t in trials if (reason := _wrong_side(t, j, float(zero[j])))}
+        if found:
+            reason = next((r for r in found.values() if not r.startswith(_UNNAMED)), next(iter(found.values())))
+            where = "every trial" if len(found) == len(trials) else ", ".join(found)
+            yield Verdict("joints", "refused", f"link encoder of {joint} {reason}: {where}; correct the recording")
+
+
+def _wrong_side(trial: Trial, j: int, zero: float | None) -> str:
+    """What is wrong with joint j's link readings, or nothing; its zero [rad, m], where it is known."""
+    known = np.isfinite(trial.q_link[:, j]) & np.isfinite(trial.q_motor).all(axis=1)
+    motor, link = trial.q_motor[known], trial.q_link[known, j]
+    if len(link) < _FEW:
+        return ""
+    y = link - motor[:, j]
+    off = _range(y) if zero is None else float(np.sqrt(((y + zero) ** 2).mean()))
+    named = (_another(trial.joint, j, motor, link) if off > _APART else "") or _limit(motor[:, j], link)
+    named = named or _slope(motor[:, j], link) or _jumps(y)
+    return named or (f"{_UNNAMED} {off:.2g} rad (unit, whole turns?)" if off > _APART else "")
+
+
+def _another(joints: Sequence[str], j: int, motor: np.ndarray, link: np.ndarray) -> str:
+    """Which other joint's motor readings, of all (n, k), joint j's link readings (n,) follow."""
+    others = {
+        (other, how): _range(link - sign * motor[:, k])
+        for k, other in enumerate(joints)
+        for sign, how in ((1.0, "follows"), (-1.0, "runs against"))
+        if k != j and _range(motor[:, k]) > 2.0 * _APART
+    }
+    other, how = min(others, key=lambda key: others[key], default=("", ""))
+    return f"{how} the motor of {other}" if others and others[other, how] < _APART else ""
+
+
+def _jumps(y: np.ndarray) -> str:
+    """Whether link less motor readings y (n,) jump, by whole turns or otherwise."""
+    steps = np.diff(y)
+    at = np.flatnonzero(np.abs(steps) > _APART)
+    if not len(at):
+        return ""
+    turns = abs(steps[at[0]]) / (2.0 * np.pi)
+    whole = turns > 0.5 and abs(turns - round(turns)) < _NEAR
+    return f"{'wraps' if whole else 'jumps'} by {steps[at[0]]:.2g} rad"
+
+
+def _limit(motor: np.ndarray, link: np.ndarray) -> str:
+    """Whether readings link (n,) stay at their largest or least while the motor (n,) moves on."""
+    for end in (link.max(), link.min()):
+        stays = link == end
+        if stays.sum() >= _FEW and np.ptp(motor[stays]) > _APART:
+            return "stands still" if stays.all() else f"does not exceed {end:.3g} rad while its motor does"
+    return ""
+
+
+def _slope(motor: np.ndarray, link: np.ndarray) -> str:
+    """Whether readings link (n,) are the motor's (n,) by another factor, which leaves little of their difference."""
+    if _range(motor) < 2.0 * _APART:
+        return ""
+    dq, y = motor - motor.mean(), link - motor
+    a = float(dq @ (link - link.mean())) / float(dq @ dq)
+    y = y - y.mean()
+    left = y - (a - 1.0) * dq
+    if abs(a - 1.0) < _SCALE or left @ left > _LEFT**2 * (y @ y):
+        return ""
+    named = [text for value, text in _SLOPES if abs(a - value) < _NEAR * abs(value)]
+    return named[0] if named else f"has {a:.3g} of its motor's scale"
 
 
 def _range(x: np.ndarray) -> float:
     """Between the 5th and the 95th percentile."""
     low, high = np.percentile(x, (5.0, 95.0))
     return float(high - low)
-
-
-def wrong_links(measured: Sequence[str], trials: Sequence[Trial], zero: np.ndarray) -> Iterator[Verdict]:
-    """A refusal for each joint whose link readings, its zero (n_measured,) removed, are not those of its motor side."""
-    motor, link = (np.concatenate([getattr(t, side) for t in trials]) for side in ("q_motor", "q_link"))
-    for j, joint in enumerate(measured):
-        known = np.isfinite(link[:, j]) & np.isfinite(motor).all(axis=1)
-        if not known.any():
-            continue
-        rms = float(np.sqrt((((motor - link)[known, j] - zero[j]) ** 2).mean()))
-        if rms > _BEYOND:
-            why = _reason(measured, j, motor[known], link[known, j])
-            message = f"link encoder of {joint} is off its motor side by {rms:.2g} rad rms{why}; correct the recording"
-            yield Verdict("joints", "refused", message)
-
-
-def _reason(measured: Sequence[str], j: int, motor: np.ndarray, link: np.ndarray) -> str:
-    """What explains the readings `link` (n,), or nothing; motor (n, n_measured)."""
-    spread, across = motor.std(axis=0), link.std()
-    covariance = ((motor - motor.mean(axis=0)) * (link - link.mean())[:, None]).mean(axis=0)
-    follows = np.abs(covariance) > _FOLLOWS * np.maximum(spread * across, np.finfo(float).tiny)
-    if follows.any() and not follows[j]:
-        return f": it follows {measured[int(np.argmax(follows))]}"
-    slope = covariance[j] / max(float(spread[j]) ** 2, np.finfo(float).tiny)
-    named = [text for value, text in _SLOPES if abs(slope - value) < _NEAR * max(abs(value), 1.0)]
-    return f": {named[0]}" if named else " (sign, unit, whole turns, order of the joints?)"

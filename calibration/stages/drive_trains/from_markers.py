@@ -1,7 +1,10 @@
 """Drive train of a joint without a link encoder, from the hand's markers through the chain.
 
     r(t) = log6( (Q^-1 T_measured)^-1 T_B_H(q) ) = J_j delta_j(t) + geometry, noise         q of other joints corrected
-    y_j = (J_j' W J_j)^-1 J_j' W r        W^-1  covariance of the two marker bodies' poses
+    y_j = (J_j' W J_j)^-1 J_j' W r        W^-1  covariance of the two marker bodies' poses + sum_k J_k J_k' s_k^2
+
+k are joints whose drive trains are not known yet, s_k the datasheet's backlash of each: what only they move says
+nothing of j. Where no joint has a link encoder all are found so, and once more with each other corrected.
 
 The geometry is one fitted to link angles of the joints that have an encoder, its column bent as `column_bending` says.
 y_j takes the place of motor minus link reading: the same fit, windows weighted by what the markers say of this joint
@@ -30,6 +33,7 @@ from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData
 from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial
 from calibration.stages.drive_trains.steady_contact import Slip
 from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances
+from calibration.stages.geometry.parameters import reading_sigma
 from calibration.verdict import Verdict
 
 _FLOOR = 1e-4  # [rad] a joint's angle is known to through the chain, however long its levers
@@ -55,17 +59,18 @@ def completed(
 
     Their geometry is fitted with those there are, and again with all; arguments as of `refit_geometry`.
     """
-    first = refit_geometry(chain, description, trials, robot, hand, trains)
+    found = refit_geometry(chain, description, trials, robot, hand, trains)
     have = [train.joint for train in trains.trains]
     if all(joint in have or chain.is_prismatic(joint) for joint in chain.joints):
-        return first, ()
-    more = with_hand_markers(first.trains, trials, robot, first.hand(chain), first.bending)
-    new = [train.joint for train in more.trains if train.joint not in have]
-    if not new:
-        return first, ()
-    message = f"without a link encoder, from the hand's markers: {', '.join(new)}"
-    again = refit_geometry(chain, description, trials, robot, first.hand(chain), more)
-    return again, (Verdict(STAGE, "ok", message),)
+        return found, ()
+    new: list[str] = []
+    for _ in range(1 if have else 2):
+        more = with_hand_markers(found.trains, trials, robot, found.hand(chain), found.bending, new or None)
+        new = [train.joint for train in more.trains if train.joint not in have]
+        if not new:
+            return found, ()
+        found = refit_geometry(chain, description, trials, robot, found.hand(chain), more)
+    return found, (Verdict(STAGE, "ok", f"without a link encoder, from the hand's markers: {', '.join(new)}"),)
 
 
 def with_hand_markers(
@@ -160,8 +165,10 @@ def seen_joint(
         raise NotEnoughData(f"{trial.id}: the hand is not seen")
     y, variance = np.full(len(T), np.nan), np.full(len(T), np.nan)
     r = log6(inverse(T[known]) @ bent(hand, bending, at[known], moment[known]))
-    J = hand.joint_jacobians(at[known])[:, :, hand.chain.joints.index(joint)]
-    WJ = np.linalg.solve(C[known], J[..., None])[..., 0]
+    every = hand.joint_jacobians(at[known])
+    J = every[:, :, hand.chain.joints.index(joint)]
+    others = every * _unknown(trains, hand.chain, joint)
+    WJ = np.linalg.solve(C[known] + others @ np.swapaxes(others, 1, 2), J[..., None])[..., 0]
     information = (J * WJ).sum(axis=1)
     y[known], variance[known] = (WJ * r).sum(axis=1) / information, 1.0 / information
     t = robot.to_mocap(loads.t)
@@ -170,6 +177,13 @@ def seen_joint(
     found = np.interp(t, trial.t_mocap[rows], y[rows])
     hidden = ~known[np.minimum(near, len(known) - 1)] | (t < trial.t_mocap[0]) | (t > trial.t_mocap[-1])
     return SeenJoint(np.where(hidden, np.nan, found), np.interp(t, trial.t_mocap[rows], variance[rows]))
+
+
+def _unknown(trains: DriveTrains, chain: Chain, joint: str) -> np.ndarray:
+    """Standard deviation (k,) [rad] of the chain's other joints' angles: 0 where one has a drive train or slides."""
+    have = {joint, *(train.joint for train in trains.trains)}
+    open_ = [name not in have and not chain.is_prismatic(name) for name in chain.joints]
+    return reading_sigma(chain, trains.description) * np.array(open_)
 
 
 def _data(

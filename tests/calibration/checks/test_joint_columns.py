@@ -182,8 +182,8 @@ def test_one_marker_on_the_hand_tells_swapped_columns_of_postures():
 @pytest.mark.parametrize(("change", "words"), [
     (lambda q: q, ""),
     (lambda q: q + 1.3, ""),
-    (swapped, "joint arm_5_joint: its link reading does not follow its motor's; it follows the motor of arm_6_joint"),
-    (reversed_, "joint arm_6_joint: its link reading does not follow its motor's; it runs against the motor of arm_6"),
+    (swapped, "link encoder of arm_5_joint follows the motor of arm_6_joint"),
+    (reversed_, "link encoder of arm_6_joint has its sign turned"),
 ])  # fmt: skip
 def test_link_readings_are_held_against_their_motor_s(tmp_path, capsys, change, words):
     with_link = [(n, r, k, replace(t, q_link=change(t.q_motor + 5e-3))) for n, r, k, t in trials()[:1]]

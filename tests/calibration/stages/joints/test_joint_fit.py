@@ -151,25 +151,30 @@ def test_joints_that_never_move_are_told_and_not_corrected() -> None:
 @pytest.mark.parametrize(
     ("wrong", "why"),
     [
-        (lambda q, other: -q, "its sign is turned"),
-        (lambda q, other: np.degrees(q), "it is in degrees"),
-        (lambda q, other: 0.0 * q + 0.3, "it stands still"),
-        (lambda q, other: other, "it follows arm_3_joint"),
-        (lambda q, other: q + 2.0 * np.pi * (q > np.median(q)), "whole turns"),
+        (lambda q, other: -q, "has its sign turned"),
+        (lambda q, other: np.degrees(q), "is in degrees"),
+        (lambda q, other: 1.05 * q, "has 1.05 of its motor's scale"),
+        (lambda q, other: 0.0 * q + 0.3, "stands still"),
+        (lambda q, other: np.minimum(q, np.quantile(q, 0.7)), "does not exceed"),
+        (lambda q, other: other, "follows the motor of arm_3_joint"),
+        (lambda q, other: q + 2.0 * np.pi * (q > np.median(q)), "wraps by"),
     ],
-    ids=["sign", "degrees", "stuck", "swapped", "turns"],
+    ids=["sign", "degrees", "scale", "stuck", "saturated", "swapped", "wrapped"],
 )
 def test_link_readings_that_are_not_the_joint_s_are_refused_by_name(trials: list[Trial], wrong, why: str) -> None:
     """A polynomial of the angle would explain them all the same."""
     data = []
-    for t in trials:
+    for t in trials[:-1]:
         link = t.q_link.copy()
         link[:, ARM_6] = wrong(t.q_link[:, ARM_6], t.q_link[:, ARM_3])
         data.append(replace(t, q_link=link))
+    data.append(trials[-1])
     models, verdicts = fitted(data)
     assert models.models == ()
     assert [v.verdict for v in verdicts] == ["refused"]
-    assert "arm_6_joint" in verdicts[0].message and why in verdicts[0].message
+    message = verdicts[0].message
+    assert "arm_6_joint" in message and why in message
+    assert trials[0].id in message and trials[-1].id not in message
 
 
 def test_joints_without_a_link_encoder_are_told(trials: list[Trial]) -> None:
