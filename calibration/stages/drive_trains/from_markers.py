@@ -31,11 +31,11 @@ from calibration.stages.drive_trains.geometry_refit import RefittedGeometry, ref
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
 from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial
-from calibration.stages.drive_trains.steady_contact import Slip
 from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances
 from calibration.stages.geometry.parameters import reading_sigma
 from calibration.verdict import Verdict
 
+_POSTURE = 15.0  # [s] errors hang together: the geometry is off by posture
 _FLOOR = 1e-4  # [rad] a joint's angle is known to through the chain, however long its levers
 
 
@@ -58,15 +58,20 @@ def completed(
     """Geometry on link angles, with the drive trains of joints without a link encoder, and which those are.
 
     Their geometry is fitted with those there are, and again with all; arguments as of `refit_geometry`.
+
+    Raises:
+        NotEnoughData: No joint has a drive train: neither link encoders nor the hand's markers show one.
     """
     found = refit_geometry(chain, description, trials, robot, hand, trains)
     have = [train.joint for train in trains.trains]
     if all(joint in have or chain.is_prismatic(joint) for joint in chain.joints):
         return found, ()
     new: list[str] = []
-    for _ in range(1 if have else 2):
+    for _ in range(1 if have else 3):
         more = with_hand_markers(found.trains, trials, robot, found.hand(chain), found.bending, new or None)
         new = [train.joint for train in more.trains if train.joint not in have]
+        if not more.trains:
+            raise NotEnoughData("neither link encoders nor the hand's markers show a drive train in motion")
         if not new:
             return found, ()
         found = refit_geometry(chain, description, trials, robot, found.hand(chain), more)
@@ -133,11 +138,7 @@ def identified_by_markers(
     C = inertial_tolerances(trains.dynamics, tolerances.link_mass, tolerances.link_com)
     modes = load_modes(own, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
     data, coarse = (_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
-    found = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))
-    if isinstance(found, Slip):
-        raise NotEnoughData(
-            f"{joint}: the hand's markers show a step of {1e3 * found.size:.1f} mrad in {found.trial_id}"
-        )
+    found, _ = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))
     names = [q for q in found.parameters if ".link." not in q.name]
     return replace(found, link=np.full(5, np.nan), parameters=tuple(names))
 
@@ -180,10 +181,11 @@ def seen_joint(
 
 
 def _unknown(trains: DriveTrains, chain: Chain, joint: str) -> np.ndarray:
-    """Standard deviation (k,) [rad] of the chain's other joints' angles: 0 where one has a drive train or slides."""
-    have = {joint, *(train.joint for train in trains.trains)}
-    open_ = [name not in have and not chain.is_prismatic(name) for name in chain.joints]
-    return reading_sigma(chain, trains.description) * np.array(open_)
+    """Standard deviations (k,) [rad] of the chain's other joints: the play, or what their drive trains leave."""
+    known = {train.joint: train.residual for train in trains.trains}
+    play = dict(zip(chain.joints, reading_sigma(chain, trains.description), strict=True))
+    sliding = {name for name in chain.joints if chain.is_prismatic(name)} | {joint}
+    return np.array([0.0 if name in sliding else known.get(name, play[name]) for name in chain.joints])
 
 
 def _data(
@@ -194,4 +196,4 @@ def _data(
     data = joint_data(loads, differences, column, modes, window)
     count = np.diff(np.append(data.first, len(data.motion.t)))
     variance = data.means(np.concatenate([s.variance for s in seen])) / count + _FLOOR**2
-    return replace(data, weight=np.median(variance) / variance)
+    return replace(data, weight=np.median(variance) / variance, correlated=_POSTURE)

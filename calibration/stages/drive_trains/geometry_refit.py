@@ -85,7 +85,8 @@ def refit_geometry(
     for part in parts[1:]:
         postures = postures.joined(part)
     parameters = geometry_parameters(chain, description)
-    play, floor = _READING * reading_sigma(chain, description), reading_floor(chain, description)
+    known = [joint in [train.joint for train in trains.trains] for joint in chain.joints]
+    floor, play = reading_floor(chain, description), reading_sigma(chain, description) * np.where(known, _READING, 1.0)
     errors = NoiseModel(np.maximum(play, floor), floor, _HAND[: postures.components // 3])
     robot_hand = hand_model(chain, nominal_frames(chain, description))
     found = fit_robustly(robot_hand, parameters, postures, errors)

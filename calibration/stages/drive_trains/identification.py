@@ -21,7 +21,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB
 from calibration.stages.drive_trains.quantities import covariance_of, reported
-from calibration.stages.drive_trains.steady_contact import Slip, SteadyContact, slipped_encoder, steady_contact
+from calibration.stages.drive_trains.steady_contact import SteadyContact, steady_contact
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.drive_trains.train_fit import (
     FLOORS,
@@ -84,17 +84,14 @@ def identify(
     backlash: float,
     deflection: float,
     motor_offset: float,
-) -> DriveTrain | Slip:
-    """The drive train of a joint, or where its encoder slipped.
+) -> tuple[DriveTrain, TrainFit]:
+    """The drive train of a joint and its fit.
 
     `modes` (p, z) as in its data, priors as `prior_of`, `coarse` as `best_train`.
     """
     prior = prior_of(data, "dead_zone", backlash, deflection)
     chosen = best_train(Problem(joint, data, prior), coarse, backlash, deflection)
     fit = chosen.fit
-    slip = slipped_encoder(fit)
-    if slip is not None:
-        return slip
     train = replace(
         fit.problem.train(fit.theta),
         link=np.append(motor_offset - fit.gamma[0], -fit.gamma[1:]),
@@ -103,7 +100,7 @@ def identify(
         inertials=modes @ fit.problem.modes(fit.theta),
         torque_sigma=torque_sigma(float(fit.problem.train(fit.theta).values[COULOMB])),
     )
-    return reported(train, fit, chosen.covariance, motor_offset)
+    return reported(train, fit, chosen.covariance, motor_offset), fit
 
 
 def torque_sigma(coulomb: float) -> float:

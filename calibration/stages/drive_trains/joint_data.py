@@ -15,6 +15,7 @@ from calibration.stages.drive_trains.drive_train import LONGEST, DriveMotion, Dr
 from calibration.stages.drive_trains.torques import LinkLoads
 
 WINDOW, COARSE = 0.1, 0.5  # [s]
+CORRELATED = 1.5  # [s] readings' errors hang together
 _START = 0.3  # [s] of a trial's rest that show where delta starts
 REGIMES = 3
 _FEW = 20  # windows
@@ -37,6 +38,7 @@ class JointData:
         terms: (k, 5) 1, cos, sin, cos 2, sin 2 of the joint's angle.
         weight: (k,) of each window, 1 where all are alike, 0 of one that does not count.
         window: Its length [s].
+        correlated: How long errors hang together [s].
     """
 
     trial_ids: tuple[str, ...]
@@ -49,6 +51,7 @@ class JointData:
     terms: np.ndarray
     weight: np.ndarray
     window: float = WINDOW
+    correlated: float = CORRELATED
 
     @property
     def group(self) -> np.ndarray:
@@ -116,7 +119,7 @@ class JointData:
         return JointData(
             self.trial_ids[trial : trial + 1], motion, self.modes[own],
             self.first[rows] - start, np.zeros(len(rows), dtype=int), self.regime[rows], self.y[rows],
-            self.terms[rows], self.weight[rows], self.window,
+            self.terms[rows], self.weight[rows], self.window, self.correlated,
         )  # fmt: skip
 
 

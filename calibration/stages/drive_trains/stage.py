@@ -20,7 +20,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains, zeros_of
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, joint_data
-from calibration.stages.drive_trains.steady_contact import Slip
+from calibration.stages.drive_trains.steady_contact import Slip, slipped_encoder
 from calibration.stages.drive_trains.torques import (
     Dynamics,
     LinkLoads,
@@ -118,7 +118,8 @@ def _identified(
         modes = load_modes(own, j, root)
         data, coarse = (joint_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
         offset = float(bare.dynamics.offset[j])
-        yield joint, identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, offset)
+        train, fit = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, offset)
+        yield joint, slipped_encoder(fit) or train
 
 
 def _slipped(joint: str, slip: Slip) -> Verdict:

@@ -10,18 +10,18 @@ that a change of side puts into a simulation's cost.
 
 A link encoder that slips on its shaft: from some moment on its readings are off by a constant.
 
-    r(t) = y - delta - terms gamma             while the motor slides steadily, all trials in order of time
-    step = median of r after - median before   largest over moments with `_EACH` windows on either side
+    y = delta(theta) + terms gamma + d h(t - t_0)        while the motor slides steadily, all trials in order of time
 
-It slipped where the step exceeds `_STEP` and `_SIZES` median absolute deviations of what is left beside it: a side of
-the mesh that is predicted wrongly passes, a step stays.
+d by weighted least squares together with theta and gamma, linear about the fit, for every t_0 with `_EACH` windows on
+either side; the one that lowers the cost most. It slipped where d exceeds `_STEP` and `_SIGMAS` standard deviations.
+Where the joint does not slide in between, t_0 is where absolute residuals add up to least.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, NU, Problem, TrainFit
+from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, NU, Problem, TrainFit, derivatives
 
 _ROUNDS, _WEIGHTED = 4, 8
 _CLEAR = 2  # windows beside a change of side
@@ -29,8 +29,9 @@ _APART = 3e-4  # [rad] y and the simulation may differ on a side, half of the ga
 _FLOOR, _ROUGH = 1.5e-5, 1e-4  # [rad] least size of residuals; size to begin with
 _SIDE = 1e-5  # [rad] by which all of a side is off, of what no term holds
 _FEWEST = 60  # windows
-_EACH = 30  # windows
-_STEP, _SIZES = 5e-4, 6.0  # [rad], [-]
+_EACH, _STEPPED = 10, 3  # windows; rounds
+_STEP, _SIGMAS = 5e-4, 5.0  # [rad], [-]
+_NORMAL = 1.4826  # standard deviations in a median absolute deviation
 _ZERO = 1.0  # [rad] prior of the zero
 
 
@@ -147,27 +148,45 @@ class Slip:
 
 
 def slipped_encoder(fit: TrainFit) -> Slip | None:
-    """The slip that a joint's residuals show; None where they show none."""
-    data, r = fit.problem.data, fit.residuals
+    """The slip that a joint's readings show; None where they show none."""
+    problem, data, r = replace(fit.problem, dynamic=False), fit.problem.data, fit.residuals
     times = data.motion.t[data.first]
-    rows = np.flatnonzero((data.regime == 0) & np.isfinite(r))
-    rows = rows[np.argsort(times[rows], kind="stable")]
-    splits = range(_EACH, len(rows) - _EACH)
-    if not splits:
+    known = np.flatnonzero(np.isfinite(r))
+    known = known[np.argsort(times[known], kind="stable")]
+    at = np.flatnonzero(data.regime[known] == 0)
+    if len(at) < _FEWEST:
         return None
-    x = r[rows]
-    k = min(splits, key=lambda i: _left(x, i))
-    before, after = np.median(x[:k]), np.median(x[k:])
-    beside = np.concatenate([x[:k] - before, x[k:] - after])
-    size = float(after - before)
-    if abs(size) < max(_STEP, _SIZES * float(np.median(np.abs(beside)))):
+    rows = known[at]
+    A = derivatives(problem, fit.theta, fit.gamma)
+    k, size, sigma, x = _step(A[rows], r[rows], data.group[rows], problem)
+    if abs(size) < max(_STEP, _SIGMAS * sigma):
         return None
-    i = rows[k]
+    between = known[at[k - 1] + 1 : at[k] + 1]
+    left = r[between] - A[between] @ x
+    i = between[int(np.argmin(np.cumsum(np.abs(left) - np.abs(left - size)) - np.abs(left) + np.abs(left - size)))]
     trial = int(data.trial[i])
-    begin = data.motion.begins[trial]
-    return Slip(data.trial_ids[trial], float(times[i] - data.motion.t[begin]), size)
+    return Slip(data.trial_ids[trial], float(times[i] - data.motion.t[data.motion.begins[trial]]), size)
 
 
-def _left(x: np.ndarray, k: int) -> float:
-    """Mean absolute deviation of x (n,) from its medians before and after k."""
-    return float(np.abs(x[:k] - np.median(x[:k])).sum() + np.abs(x[k:] - np.median(x[k:])).sum())
+def _step(A: np.ndarray, r: np.ndarray, group: np.ndarray, problem: Problem) -> tuple[int, float, float, np.ndarray]:
+    """First row after the likeliest step in residuals r (n,), its size and standard deviation [rad], and x (q,).
+
+    A (n, q) are derivatives by theta and gamma; sizes of residuals are medians in each group.
+    """
+    n, left = len(r), r
+    for _ in range(_STEPPED):
+        scale = np.full(problem.data.n_groups, _FLOOR)
+        for g in np.unique(group):
+            own = left[group == g]
+            scale[g] = max(_FLOOR, _NORMAL * float(np.median(np.abs(own - np.median(own)))))
+        w = (NU + 1.0) / (NU * scale[group] ** 2 + left**2) / problem.correlated
+        B = A * w[:, None]
+        C = np.linalg.inv(A.T @ B + problem.prior.information)
+        after, weight, total = (np.cumsum(x[::-1], axis=0)[::-1] for x in (B, w, w * r))
+        by_x = C @ (B.T @ r)
+        information = weight - np.einsum("ij,jk,ik->i", after, C, after)
+        d = (total - after @ by_x) / information
+        k = _EACH + int(np.argmax((d**2 * information)[_EACH : n - _EACH]))
+        x = by_x - C @ after[k] * d[k]
+        left = r - A @ x - d[k] * (np.arange(n) >= k)
+    return k, float(d[k]), float(information[k] ** -0.5), x

@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.stages.drive_trains.drive_train import DriveTrain, Form
-from calibration.stages.drive_trains.joint_data import WINDOW, JointData
+from calibration.stages.drive_trains.joint_data import JointData
 
-CORRELATED = 15.0  # windows of a tenth of a second that hang together
 FLOORS = (4e-4, 1e-4, 5e-5, 2e-5)  # [rad] least size of residuals, round by round
 NU = 4.0
 _ECCENTRIC = np.array([3e-3, 3e-3, 1e-3, 1e-3])  # [rad] prior of once and twice per turn
@@ -79,7 +78,7 @@ class Problem:
     @property
     def correlated(self) -> float:
         """Windows that hang together."""
-        return max(1.0, CORRELATED * WINDOW / self.data.window)
+        return max(1.0, self.data.correlated / self.data.window)
 
     @property
     def names(self) -> tuple[str, ...]:
