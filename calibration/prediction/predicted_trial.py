@@ -20,7 +20,7 @@ from calibration.estimate.rows import Base, Encoder
 from calibration.prediction.delivered import Delivered
 from calibration.recording import netcdf
 from calibration.stages.joints.correction import Corrected
-from calibration.stages.stick_slip.poses import SlippingMotion
+from calibration.stages.stick_slip.poses import BasePrediction, SlippingMotion
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import Rest
 
@@ -59,12 +59,14 @@ class BaseMotion:
         predicted: Displacement (n, 6) by source of the wrench.
         rest: Frame 0; None where it was read from a file.
         slipping: The base that sticks and slips, its marker body as estimated, from the plate; None without one.
+        slipped: The same by every source, with its poses; none where it was read from a file.
     """
 
     measured: np.ndarray
     predicted: tuple[tuple[Source, np.ndarray], ...]
     rest: Rest | None = None
     slipping: SlippingMotion | None = None
+    slipped: tuple[tuple[Source, BasePrediction], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,8 @@ class Predictor:
         motion = None
         if poses.loaded is not None and NOMINAL in self.models:
             found = [(source, poses.displaced(source, NOMINAL)) for source, _ in poses.loaded.suspension.held_out]
-            motion = _motion(T_lab_B, found, poses.slipped("plate"))
+            slipped = [(source, poses.slipped(source)) for source, _ in poses.loaded.suspension.held_out]
+            motion = _motion(T_lab_B, found, tuple((s, one) for s, one in slipped if one is not None))
         moves = entry.kind != "static"
         samples, delivered = (tuple(self._samples(trial, poses.geared())), poses.delivered()) if moves else ((), None)
         dwells = dwell_windows(trial)
@@ -303,14 +304,16 @@ class TrialPoses:
 
 
 def _motion(
-    T_lab_B: np.ndarray, found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]], slipped: BasePrediction | None
+    T_lab_B: np.ndarray,
+    found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]],
+    slipped: tuple[tuple[Source, BasePrediction], ...],
 ) -> BaseMotion | None:
     """The base by the sources that were recorded; None where none was."""
     there = [(source, *one) for source, one in found if one is not None]
     if not there:
         return None
-    rest, own = there[0][1], None if slipped is None else slipped.motion
-    return BaseMotion(rest.displacement(T_lab_B), tuple((source, x) for source, _, x in there), rest, own)
+    rest, own = there[0][1], next((one.motion for source, one in slipped if source == "plate"), None)
+    return BaseMotion(rest.displacement(T_lab_B), tuple((source, x) for source, _, x in there), rest, own, slipped)
 
 
 def _start(T_lab_B: np.ndarray, trial: Trial) -> np.ndarray:

@@ -19,6 +19,7 @@ from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
 from scenarios.score.parameters import ModelScore, ParameterScore, judge_estimate
+from scenarios.score.slip import SlipScore, slip_scores
 from twin import truth
 from twin.truth import Parameter, TruthTrial
 
@@ -35,6 +36,7 @@ class Score(ParameterScore):
         rows: The ladder against the truth, floor included.
         skill: Of each row: (registration - row) / (registration - floor) in position RMSE per component [-].
         base: The base's roll and pitch by source of the wrench.
+        slip: The slipping base alone, by trial and source.
         models: Every model by itself, the main one first.
         main: Model that is delivered; empty where there is none.
         budget: What its error consists of; None where it was not taken apart.
@@ -43,6 +45,7 @@ class Score(ParameterScore):
     rows: tuple[Row, ...]
     skill: tuple[float | None, ...]
     base: tuple[BaseScore, ...] = ()
+    slip: tuple[SlipScore, ...] = ()
     models: tuple[ModelScore, ...] = ()
     main: str = ""
     budget: Budget | None = None
@@ -58,6 +61,7 @@ class Score(ParameterScore):
             "budget": None if self.budget is None else self.budget.entry(),
             "rows": rows,
             "base": [asdict(b) for b in self.base],
+            "slip": [one.entry() for one in self.slip],
         }
 
     def _headline(self, entries: Mapping[Row, object]) -> dict[str, object]:
@@ -87,6 +91,7 @@ def score(estimate: Estimate | None, evaluation: Evaluation, truth_folder: Path)
         rows=rows,
         skill=skill,
         base=base_scores(pairs),
+        slip=tuple(slip_scores(pairs)),
         models=models,
         main=evaluation.main,
         budget=_budget(pairs, truth_folder),

@@ -1,7 +1,7 @@
 """The base's motion on a force plate, from base markers and plate alone: fitted to one part, predicted in the rest.
 
 OUT/dataset (where files were given), base_motion.json (forms, parameters, scores), base_motion.csv (measured, predicted
-and 95 % band), base_motion.svg
+and 95 % band)
 """
 
 import csv
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from calibration.stages.hysteretic_base import BaseLog, HystereticBase, MotionScore
 
 NAME = "base_motion"
-KIND = folder.Kind("base motion", f"{NAME}.json", frozenset({"dataset", f"{NAME}.json", f"{NAME}.csv", f"{NAME}.svg"}))
+KIND = folder.Kind("base motion", f"{NAME}.json", frozenset({"dataset", f"{NAME}.json", f"{NAME}.csv"}))
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 _TWO_SIDED = 1.96
 

@@ -17,7 +17,11 @@ from twin.fields.values import (
 )
 from twin.motions.swings import CALIBRATION_SWINGS, FURTHER_SWINGS, VALIDATION_SWINGS
 
-TRIALS = ("postures", "sweeps", *CALIBRATION_SWINGS, *VALIDATION_SWINGS, *FURTHER_SWINGS, "push", "postures_validation")
+JOLTED = "postures_jolts"
+TRIALS = (
+    *("postures", "sweeps", *CALIBRATION_SWINGS, *VALIDATION_SWINGS, *FURTHER_SWINGS),
+    *("push", "postures_validation", JOLTED),
+)
 TrialName = Annotated[str, one_of("trial", lambda: TRIALS)]
 OwnName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]+$"), other_than("trial", lambda: TRIALS)]
 Form = Literal["kinematic", "wheels"]
@@ -90,8 +94,9 @@ class Campaign:
         driving: Trials in which the base moves.
         carried: Whether every trial is without physics, joints and base where they are commanded to be.
         motions: Motions of one's own by the names of their trials.
-        only: Trials to record beside these, `sweeps` for those of one joint; empty: all but `FURTHER_SWINGS`. A
-            confirmation repeats those of validation.
+        only: Trials to record beside these, `sweeps` for those of one joint; empty: all but `FURTHER_SWINGS` and
+            `postures_jolts`, the validation postures with moves as abrupt as those of swings. A confirmation repeats
+            those of validation.
     """
 
     ramp: Annotated[float, Field(gt=0.0, le=3.0)]

@@ -8,7 +8,7 @@ import numpy as np
 from calibration.recording import schema
 from twin.motions import driving
 from twin.motions import motion as motions
-from twin.motions.campaign import Campaign
+from twin.motions.campaign import JOLTED, Campaign
 from twin.motions.csv_trajectory import read_trajectory
 from twin.motions.motion import Motion
 from twin.motions.postures import sample_postures
@@ -36,6 +36,7 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
         *(read_trajectory(m.file, name, m.role, campaign.rest) for name, m in campaign.motions.items()),
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
+        *_jolted(nominal, seed, campaign),
     )
     second = _confirmation(campaign, nominal, seed) if campaign.confirmation else ()
     found = (*(m for m in trials if _asked(campaign, _group(m))), *second)
@@ -79,6 +80,14 @@ def _statics(
         return ()
     q = sample_postures(nominal, n + 1, generator(seed, "postures", role))
     return (motions.static_postures(id, role, q, campaign),)
+
+
+def _jolted(nominal: mujoco.MjModel, seed: int, campaign: Campaign) -> tuple[Motion, ...]:
+    """The postures of validation, each left and reached with a jolt, where the campaign names them."""
+    if JOLTED not in campaign.only:
+        return ()
+    abrupt = replace(campaign, posture_ramp=None)
+    return _statics(JOLTED, "validation", campaign.validation_postures, nominal, seed, abrupt)
 
 
 def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scenarios import load
 from twin.errors import Unreachable
 from twin.motions import CALIBRATION_SWINGS, JOINTS, RATE, postures, sample_postures, schedule
 from twin.motions import motion as motions
@@ -77,6 +78,20 @@ def test_moves_between_postures_have_a_ramp_of_their_own(config):
     acceleration = [np.abs(np.diff(q, 2)).max() * RATE**2 for q in (soft, abrupt)]
     np.testing.assert_allclose(acceleration, [speed[0] / 0.6, speed[1] / 0.12], rtol=0.05)
     np.testing.assert_array_equal(command(ramp=0.6, posture_ramp=None), soft)
+
+
+def test_the_tour_with_jolts_leaves_every_other_trial_as_it_is(config, nominal):
+    """Its postures are those of validation, reached as abruptly as swings start."""
+    soft = {m.id: m for m in schedule(config.campaign, nominal, 3)}
+    asked = load("jolts").twin.campaign
+    names = tuple(dict.fromkeys((*asked.only, "postures_validation")))
+    found = {m.id: m for m in schedule(replace(config.campaign, only=names), nominal, 3)}
+    jolted = found.pop("postures_jolts")
+    assert list(found) == list(soft) and "postures_validation" not in asked.only
+    for name, motion in found.items():
+        np.testing.assert_array_equal(motion.command, soft[name].command)
+    peak = [np.abs(np.diff(m.command, 2, axis=0)).max() for m in (jolted, found["postures_validation"])]
+    assert peak[0] > 3.0 * peak[1] and len(jolted.dwells) == config.campaign.validation_postures
 
 
 @pytest.mark.parametrize(("duration", "amplitude"), [(3.0, 0.15), (6.0, 0.3), (12.0, 0.6), (20.0, 0.6)])
