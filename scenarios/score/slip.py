@@ -13,15 +13,14 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calibration.evaluation.ladder import scored_errors
-from calibration.evaluation.pose_errors import PoseErrors
+from calibration.evaluation import trial_errors
 from calibration.numerics.lie import inverse, mean
-from calibration.prediction import PredictedTrial
-from calibration.prediction.predictor import REFERENCE
+from calibration.prediction import PredictedTrial, Prediction
 from calibration.stages.stick_slip import BasePrediction
 from calibration.stages.suspension import Source
 from twin.truth import TruthTrial
 
+_REFERENCE = 1.0  # [s] of rest at the start of every trial
 _TWO_SIDED = 1.96
 _SLIDES = 0.999  # of a wheel's friction
 _SLIPS = (0, 10, 100)  # since the reference, lower ends of the groups
@@ -89,7 +88,7 @@ def slip_scores(trials: Iterable[tuple[PredictedTrial, TruthTrial]]) -> Iterator
 
 
 def _score(trial: PredictedTrial, true: TruthTrial, source: Source, found: BasePrediction) -> SlipScore:
-    early = trial.t <= trial.t[0] + REFERENCE
+    early = trial.t <= trial.t[0] + _REFERENCE
     at_rest = mean(true.base_pose[early])
     base = found.T_lab_B @ inverse(mean(found.T_lab_B[early])) @ at_rest
     hand_in_base, hand = inverse(true.base_pose) @ true.hand_pose, true.hand_pose[:, :3, 3]
@@ -99,8 +98,7 @@ def _score(trial: PredictedTrial, true: TruthTrial, source: Source, found: BaseP
     sliding = (motion.use > _SLIDES).astype(int)
     slips = np.cumsum((np.diff(sliding, axis=0, prepend=sliding[:1]) > 0).sum(axis=1))
     columns = [*errors, sigma, np.repeat(slips[:, None], 3, axis=1)]
-    static = trial.kind == "static"
-    kept = [scored_errors(trial.t, PoseErrors(c, np.zeros_like(c)), trial.dwells, static).position for c in columns]
+    kept = [_counted(trial, c) for c in columns]
     seen = np.isfinite(np.concatenate(kept, axis=1)).all(axis=1)
     predicted, still, spread, count = (c[seen] for c in kept)
     yaw, own = (_yaw(T)[~early] for T in (base, true.base_pose))
@@ -108,6 +106,14 @@ def _score(trial: PredictedTrial, true: TruthTrial, source: Source, found: BaseP
     r2 = 1.0 - float(((yaw - own) ** 2).sum()) / moved
     errors_found = Errors(predicted, still, spread, count[:, 0])
     return SlipScore(trial.trial_id, trial.kind, source, motion.predictable, r2, errors_found)
+
+
+def _counted(trial: PredictedTrial, x: np.ndarray) -> np.ndarray:
+    """Rows (m, 3) of x (n, 3) that a row of the ladder counts: after the first second, or means of postures."""
+    T, zero = np.tile(np.eye(4), (2, len(x), 1, 1))
+    T[:, :3, 3] = x
+    found = Prediction("", "fixed", "motor", trial.trial_id, trial.kind, trial.t, T)
+    return trial_errors(found, zero, trial.dwells).scored.position
 
 
 def _carried(variance: np.ndarray, T_lab_0: np.ndarray, hand: np.ndarray) -> np.ndarray:
