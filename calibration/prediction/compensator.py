@@ -27,8 +27,9 @@ from calibration.estimate.rows import LADDER, row_of
 from calibration.numerics.lie import from_vector, inverse
 from calibration.prediction.base_pose import LoadedBase, base_at, loaded_base
 from calibration.prediction.bundled_arm import ArmPositions, BundledArm
-from calibration.prediction.hand_pose import HandPose, RobotState, in_lab, needed, uncertain
+from calibration.prediction.hand_pose import HandPose, RobotState, at_readings, in_lab, needed, uncertain
 from calibration.prediction.slipping_base import Motion, SlippingBase
+from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand import HandModel
@@ -57,6 +58,7 @@ class Compensator:
         laboratory: Where it was found, None where the estimate does not say.
         arm: Drive trains and column of row `full`; None of another row.
         slipping: Its base; None where the suspension alone moves it.
+        clocks: Of robot and plate on the motion capture's, in the session it was calibrated in.
     """
 
     hand: HandModel
@@ -69,6 +71,7 @@ class Compensator:
     laboratory: Description | None = None
     arm: BundledArm | None = None
     slipping: SlippingBase | None = None
+    clocks: tuple[Clock, ...] = ()
 
     @property
     def spread(self) -> Spread:
@@ -108,6 +111,7 @@ class Compensator:
             inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
         found = cls(hand, *uncertain(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)
+        found = replace(found, clocks=estimate.clocks)
         return found._bundled(estimate, payload)
 
     def _bundled(self, estimate: Estimate, payload: float | None) -> "Compensator":
@@ -128,6 +132,7 @@ class Compensator:
         wrench: np.ndarray | None = None,
         T_lab_base_start: np.ndarray | None = None,
         velocity: np.ndarray | None = None,
+        t_wrench: np.ndarray | None = None,
     ) -> HandPose:
         """Hand poses at readings q_motor (n, n_joints) [rad, m], taken at t (n,) [s].
 
@@ -139,9 +144,10 @@ class Compensator:
                 where the base's pose is not given, in the base's axes about its origin.
             T_lab_base_start: (4, 4) pose of the base frame at the start; identity where not given.
             velocity: (n, n_joints) of the motor side [rad/s, m/s], where it is known.
+            t_wrench: Times (m,) [s, plate's clock] of a wrench (m, 6) that was not taken at t, then the robot's clock.
 
         Raises:
-            NotEnoughData: A wrench without a suspension or for less than a second.
+            NotEnoughData: A wrench without a suspension or for less than a second, or without its clock.
             InputError: Readings are far outside the joints' limits, as degrees are.
         """
         t, q = np.asarray(t, dtype=float), np.asarray(q_motor, dtype=float)
@@ -151,6 +157,8 @@ class Compensator:
         base, moved, variance = self._base(T_lab_base_start), None, None
         if wrench is not None:
             w, there = np.asarray(wrench, dtype=float), needed(base)
+            if t_wrench is not None:
+                w = at_readings(t, self.clocks, np.asarray(t_wrench, dtype=float), w)
             if self.slipping is None:
                 moved = there.moved(t, w)
             else:

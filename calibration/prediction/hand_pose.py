@@ -1,6 +1,6 @@
 """What `Compensator` returns: poses of the hand with their covariance, and the state after a sample."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,8 +8,10 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model
+from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase
 from calibration.prediction.bundled_arm import ArmState
+from calibration.recording.clock import Clock
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
 
@@ -56,6 +58,26 @@ def needed(base: LoadedBase | None) -> LoadedBase:
     if base is None:
         raise NotEnoughData("this estimate has no suspension for a wrench to move: leave the wrench out")
     return base
+
+
+def at_readings(t: np.ndarray, clocks: Sequence[Clock], t_wrench: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """Wrenches (n, 6), linear, at the times t (n,) [s] of readings from those (m, 6) at t_wrench (m,) [s].
+
+    t is on the robot's clock, t_wrench on the plate's; clocks are those of both on the motion capture's.
+
+    Raises:
+        NotEnoughData: A clock is not known, or readings were taken before the first or after the last wrench.
+    """
+    clock = {c.instrument: c for c in clocks}
+    if missing := sorted({"robot", "plate"} - clock.keys()):
+        raise NotEnoughData(f"clock of {missing} not known: pass the wrench at the times of the readings")
+    at = clock["plate"].from_mocap(clock["robot"].to_mocap(t))
+    beyond = max(float(t_wrench[0] - at[0]), float(at[-1] - t_wrench[-1]))
+    if beyond > 0.0:
+        raise NotEnoughData(
+            f"wrenches end {beyond:.3g} s before the readings do, or begin after them; cut the readings"
+        )
+    return interpolate_columns(at, t_wrench, wrench)
 
 
 def in_lab(

@@ -207,6 +207,9 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     still = compensator.predict(t, q, T_lab_base_start=start)
     np.testing.assert_allclose(still.T, rows[row, "fixed"], atol=1e-9)
     assert 1e3 * np.abs(found.T - still.T)[:, :3, 3].max() > 1.0
+    robot, plate = (estimate.clock(name) for name in ("robot", "plate"))
+    clocks = compensator.predict(robot.from_mocap(t), q, w, start, t_wrench=plate.from_mocap(t))
+    np.testing.assert_allclose(clocks.T, found.T, atol=1e-6)
 
 
 def test_without_velocities_readings_are_taken_to_be_at_rest(estimate, compensator, swing):

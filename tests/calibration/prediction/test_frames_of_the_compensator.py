@@ -9,6 +9,8 @@ import mjcf
 from calibration import Compensator
 from calibration.errors import InputError, NotEnoughData
 from calibration.numerics.lie import from_vector
+from calibration.prediction.hand_pose import at_readings
+from calibration.recording.clock import shared_clock
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from tests.doubles import rigid_robot
@@ -47,3 +49,18 @@ def test_degrees_are_refused(robot, how):
     wrong = np.where(np.arange(8) > 0, np.degrees(q), q)
     with pytest.raises(InputError, match="degrees"):
         robot.predict(np.arange(3.0), wrong) if how == "recording" else robot.step(0.0, wrong[0])
+
+
+def test_a_wrench_on_the_plates_clock_is_brought_to_the_readings():
+    robot, plate = (
+        replace(shared_clock(n), offset=o, drift=d) for n, o, d in (("robot", 3.9, 2e-5), ("plate", -2.6, 0.0))
+    )
+    t, wave = np.linspace(10.0, 12.0, 50), np.array([1.0, 2.0, 0.5, 3.0, 0.1, 1.0])
+    t_plate = np.arange(15.0, 20.0, 1e-3)
+    wrench = np.sin(plate.to_mocap(t_plate)[:, None] * wave)
+    found = at_readings(t, (robot, plate), t_plate, wrench)
+    np.testing.assert_allclose(found, np.sin(robot.to_mocap(t)[:, None] * wave), atol=2e-6)
+    with pytest.raises(NotEnoughData, match="cut the readings"):
+        at_readings(t + 3.0, (robot, plate), t_plate, wrench)
+    with pytest.raises(NotEnoughData, match=r"\['plate'\] not known"):
+        at_readings(t, (robot,), t_plate, wrench)
