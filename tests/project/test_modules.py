@@ -19,6 +19,7 @@ SIDE_EFFECTS = ("open", "read_text", "read_bytes", "loadtxt", "print", "Argument
 LONGEST_FILE = 300
 MOST_FILES = 14
 MOST_NAMES = 12
+ROBOT = re.compile(r"tiago(?!-twin)|gripper|torso|arm_\d", re.I)
 
 
 def sources() -> list[Path]:
@@ -153,6 +154,19 @@ def test_files_and_folders_are_small_and_packages_offer_few_names(modules):
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="compares with the files under version control")
+def named_in(tree: ast.Module) -> list[str]:
+    """Strings of a module, documentation aside, that name a robot or its joints and links."""
+    documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    strings = (n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str))
+    return [n.value for n in strings if id(n) not in documents and ROBOT.search(n.value)]
+
+
+def test_calibration_names_no_robot(modules):
+    found = {name: named_in(m.tree) for name, m in modules.items() if name.startswith("calibration.")}
+    assert len(found) > 100 and {name: texts for name, texts in found.items() if texts} == {}
+    assert named_in(ast.parse('"""Of arm_1."""\nlink = "arm_1_link"')) == ["arm_1_link"]
+
+
 def test_the_wheel_holds_the_four_packages_with_their_data_and_nothing_else(tmp_path):
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
