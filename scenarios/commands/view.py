@@ -31,7 +31,7 @@ def view(
                 raise
             typer.echo(f"{error}; install the extra in a clone of the repository: pip install '.[view]'", err=True)
             raise typer.Exit(FAILED) from error
-        shown = write(run_folder, trial, page, magnify)
+        shown = write(run_folder, trial, page, magnify, progress)
     typer.echo(f"View of {shown}: {page}")
     if open_:
         webbrowser.open(page.resolve().as_uri())

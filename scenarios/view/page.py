@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 import calibration
 from calibration.numerics.lie import inverse
 from calibration.prediction import NOMINAL
-from scenarios.report.page import replace_text
+from scenarios.files.output_folder import one_file
+from scenarios.steps import Progress, silent
 from scenarios.view.moment import Moments, moments
 from scenarios.view.shapes import joined, meshes, rigid_groups
 
@@ -34,7 +35,7 @@ class Node:
     changes: dict[str, np.ndarray]
 
 
-def write(run: Path, trial: str | None, out: Path, magnify: float) -> str:
+def write(run: Path, trial: str | None, out: Path, magnify: float, progress: Progress = silent) -> str:
     """Write the page of a held-out trial, the first that moves unless named; return its name.
 
     Raises:
@@ -47,10 +48,11 @@ def write(run: Path, trial: str | None, out: Path, magnify: float) -> str:
     with redirect_stdout(io.StringIO()):  # viser announces its server, which nobody is to visit
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
-            page = _recorded(server, found, shapes, _title(found, magnify))
+            page = _recorded(server, found, shapes, _title(found, magnify), progress)
         finally:
             server.stop()
-    replace_text(out, page)
+    with one_file(out) as part:
+        part.write_text(page, encoding="utf-8", newline="\n")
     return found.trial
 
 
@@ -59,7 +61,9 @@ def _title(found: Moments, magnify: float) -> str:
     return f"{found.trial}: motion of the base, errors x {magnify:g}; {hands}"
 
 
-def _recorded(server: viser.ViserServer, found: Moments, shapes: dict[str, trimesh.Trimesh], title: str) -> str:
+def _recorded(
+    server: viser.ViserServer, found: Moments, shapes: dict[str, trimesh.Trimesh], title: str, progress: Progress
+) -> str:
     """The page: the scene at the first moment, then its changes."""
     centre = next(iter(found.links.values()))[0, :3, 3] if found.links else found.hand[0, :3, 3]
     server.scene.set_up_direction("+z")
@@ -75,6 +79,7 @@ def _recorded(server: viser.ViserServer, found: Moments, shapes: dict[str, trime
             for name, values in node.changes.items():
                 setattr(node.handle, name, values[k])
         recording.insert_sleep(float(dt))
+        progress("view", found.trial, (k + 1) / len(found.t))
     return recording.as_html()
 
 
