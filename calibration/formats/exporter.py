@@ -3,7 +3,7 @@
 A dataset as laboratory files, one set a trial, and the mapping that reads them back.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +100,9 @@ def _tables(
     return tuple(tables)
 
 
-def export_trials(kind: str, dataset: Dataset, folder: Path, ros: int = 1) -> tuple[Mapping, tuple[str, ...]]:
+def export_trials(
+    kind: str, dataset: Dataset, folder: Path, ros: int = 1, progress: Callable[[str, float], None] | None = None
+) -> tuple[Mapping, tuple[str, ...]]:
     """Write all trials of a dataset into a folder; return the mapping and the trials the format has nothing of.
 
     Args:
@@ -108,12 +110,15 @@ def export_trials(kind: str, dataset: Dataset, folder: Path, ros: int = 1) -> tu
         dataset: What to write.
         folder: Where to.
         ros: Version of ROS of a bag, 1 or 2.
+        progress: Called with each trial and the share written before it.
 
     Raises:
         InputError: The format cannot hold a trial, or no trial has anything for it.
     """
     written, notes = [], []
-    for entry in dataset.description.trials:
+    for k, entry in enumerate(dataset.description.trials):
+        if progress is not None:
+            progress(entry.id, k / len(dataset.description.trials))
         trial = dataset.read_means(entry) if dataset.has_means(entry) else dataset.read(entry)
         why = _write(kind, dataset, folder, trial, ros)
         if why:

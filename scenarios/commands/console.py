@@ -106,7 +106,7 @@ def show_rows(rows: "Sequence[Row]", most: int = 5) -> None:
 
 
 def summary(run: Path) -> list[str]:
-    """Return the end of a run in seven lines: verdict, rows, budget, worst finding, next step, report."""
+    """Return the end of a run in six lines: verdict, rows, budget if known, worst finding, next step, report."""
     from scenarios.report.results.formatting import cell
     from scenarios.report.results.headline import headline
     from scenarios.report.results.ladder import best_of_each
@@ -115,15 +115,15 @@ def summary(run: Path) -> list[str]:
 
     view = run_view(read(run))
     found, rows = headline(view.results, view.steps), best_of_each(view.steps)
-    mm = (f"{s.model} {cell(s.main.position_rmse_component_mm)}" for s in rows)
-    deg = (f"{s.model} {cell(s.main.orientation_rmse_deg)}" for s in rows)
+    figures = (
+        f"{s.model} {cell(s.main.position_rmse_component_mm)}, {cell(s.main.orientation_rmse_deg)}" for s in rows
+    )
     worst = [f"{n.level}, {n.stage}: {n.message}" for n in found.notices] or ["none"]
     more = f" ({len(worst) - 1} more in the report)" if len(worst) > 1 else ""
     following = [step.text for step in found.next_steps] or ["nothing more from these recordings"]
     lines = (
         f"{found.badge.capitalize()}. {found.sentence}",
-        f"RMSE per component [mm]: {', '.join(mm)}",
-        f"RMSE of orientation [deg]: {', '.join(deg)}",
+        f"RMSE per component [mm], of orientation [deg]: {'; '.join(figures)}",
         *([budget.sentence] if (budget := view.results.evaluation.budget) else []),
         f"Worst finding: {worst[0]}{more}",
         f"Next: {following[0]}",

@@ -35,8 +35,8 @@ def design(  # noqa: PLR0913  an option each
     for path in (p for p in (out, campaign) if p is not None and p.is_dir()):
         raise ScenarioError(f"{path}: is a folder; name a file")
     with console.progress() as progress:
-        progress("design", "", 0.0)
-        found = designed(steps.load(scenario, overriding(overrides, seed)), n, criterion, out, campaign, play)
+        loaded = steps.load(scenario, overriding(overrides, seed))
+        found = designed(loaded, n, criterion, out, campaign, play, progress)
     plan, against = found.plan, found.comparison
     typer.echo(
         f"{n} postures, {plan.design.prospect.B.shape[2]} identifiable combinations; predicted error of the hand at "

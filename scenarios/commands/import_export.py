@@ -40,8 +40,7 @@ def import_(
     if mapping is None or out is None:
         raise ScenarioError("import: name a mapping with --map and a folder with --out; --init drafts a mapping")
     with console.progress() as progress:
-        progress("import", "", 0.0)
-        notes = import_export.import_files(kind, given, mapping, out, add_to)
+        notes = import_export.import_files(kind, given, mapping, out, add_to, progress=progress)
     for note in notes:
         typer.echo(note)
     typer.echo(f"Dataset: {out}")
@@ -58,8 +57,7 @@ def export(
     from scenarios.steps import import_export
 
     with console.progress() as progress:
-        progress("export", "", 0.0)
-        notes = () if kind == "urdf" else import_export.export_files(kind, source, out, ros)
+        notes = () if kind == "urdf" else import_export.export_files(kind, source, out, ros, progress)
     if kind == "urdf":
         import_export.export_urdf(source, out)
     for note in notes:

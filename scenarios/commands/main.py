@@ -72,12 +72,11 @@ def options(
 @app.command("list", epilog=_example("list"), rich_help_panel=_SIMULATE)
 def list_scenarios() -> None:
     """List the scenarios."""
-    from scenarios import steps
-    from scenarios.files import registry
+    from scenarios.files import registry, yaml_file
 
     width = max(map(len, registry.names()), default=0)
     for name in registry.names():
-        typer.echo(f"{name:{width}}  {steps.load(name).description}")
+        typer.echo(f"{name:{width}}  {yaml_file.mapping(registry.find(name))['description']}")
 
 
 @app.command(

@@ -52,7 +52,9 @@ def base(  # noqa: PLR0913  an option each
 
     if mapping is None and not (len(sources) == 1 and sources[0].is_dir()):
         raise ScenarioError("base: name a dataset folder, or log files with their mapping (--map)")
-    found = base_motion(sources, mapping, out, fit, None if steady is None else Cycles(steady, cycle))
+    cycles = None if steady is None else Cycles(steady, cycle)
+    with console.progress() as progress:
+        found = base_motion(sources, mapping, out, fit, cycles, progress)
     for note in found.notes:
         typer.echo(note)
     typer.echo(

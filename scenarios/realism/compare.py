@@ -13,6 +13,7 @@ from scenarios.files.scenario import Scenario
 from scenarios.realism.log import Recorded
 from scenarios.realism.replayed import AS_DRAWN, AXES, BAND, Condition, Inside, inside, replayed, together
 from scenarios.realism.swings import LOG, Figures, YawFromMoment, figures, matrix, swung, yaw_from_moment
+from scenarios.steps import Progress, silent
 from twin.errors import TwinError
 
 T = TypeVar("T")
@@ -73,7 +74,7 @@ class Replayed:
     share: tuple[float, ...]
 
 
-def compare_swings(scenario: Scenario, n: int) -> Swings:
+def compare_swings(scenario: Scenario, n: int, progress: Progress = silent) -> Swings:
     """Swing n sampled robots."""
     config = scenario.twin
 
@@ -84,18 +85,25 @@ def compare_swings(scenario: Scenario, n: int) -> Swings:
             return f"seed {seed}: {error}"
         return figures(s, config.campaign.rest), yaw_from_moment(s.slow(s.rotation)[:, 2], s.slow(s.wrench)[:, 5])
 
-    found = _each(one, range(scenario.seed, scenario.seed + n))
+    found = _each(one, range(scenario.seed, scenario.seed + n), partial(progress, "reality", "swings"))
     good = [f for f in found if not isinstance(f, str)]
     rows = _rows(matrix([f for f, _ in good]))
     linear, hysteretic = (_range([getattr(y, k) for _, y in good]) for k in ("linear", "hysteretic"))
     return Swings(len(good), tuple(f for f in found if isinstance(f, str)), rows, linear, hysteretic)
 
 
-def compare_replay(scenario: Scenario, trials: Sequence[Recorded], n: int, condition: Condition = AS_DRAWN) -> Replayed:
+def compare_replay(
+    scenario: Scenario,
+    trials: Sequence[Recorded],
+    n: int,
+    condition: Condition = AS_DRAWN,
+    progress: Progress = silent,
+) -> Replayed:
     """Replay the wrench of each trial on the bases of n sampled robots."""
     seeds, found = range(scenario.seed, scenario.seed + n), []
-    for trial in trials:
-        draws = _each(partial(_base, scenario, trial, condition), seeds)
+    for k, trial in enumerate(trials):
+        show = partial(_part, progress, f"{trial.trial_id}, {condition.name}", k, len(trials))
+        draws = _each(partial(_base, scenario, trial, condition), seeds, show)
         found.append(inside(trial, np.array(draws)))
     return Replayed(condition, n, tuple(found), tuple(map(float, together(found))))
 
@@ -104,10 +112,19 @@ def _base(scenario: Scenario, trial: Recorded, condition: Condition, seed: int) 
     return replayed(scenario.twin, seed, trial, condition)
 
 
-def _each(one: Callable[[int], T], seeds: range) -> list[T]:
+def _part(progress: Progress, at: str, k: int, n: int, share: float) -> None:
+    """Show how far the k-th of n parts is."""
+    progress("replay", at, (k + share) / n)
+
+
+def _each(one: Callable[[int], T], seeds: range, progress: Callable[[float], None]) -> list[T]:
     """Robots in threads: the simulation holds no interpreter lock."""
+    found: list[T] = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(one, seeds))
+        for made in pool.map(one, seeds):
+            found.append(made)
+            progress(len(found) / len(seeds))
+    return found
 
 
 def _range(values: Sequence[float]) -> tuple[float, float, float]:

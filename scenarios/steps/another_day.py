@@ -72,8 +72,7 @@ def predict(  # noqa: PLR0913  an option each
         raise ScenarioError(f"{estimate}: does not say in which laboratory it was found; calibrate again")
     with folder.replacing(out, SESSION) as new, one_blas_thread():
         dataset = new / "dataset"
-        progress("import", "", 0.0)
-        notes = import_files(None, files, mapping, dataset, later=known.laboratory)
+        notes = import_files(None, files, mapping, dataset, later=known.laboratory, progress=progress)
         today = on_another_day(known, dataset, register)
         save_estimate(today, new / "estimate")
         _write(new / PREDICTED, today, load(dataset))

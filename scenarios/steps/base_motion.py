@@ -15,6 +15,7 @@ import numpy as np
 
 from scenarios.files import output_folder as folder
 from scenarios.steps.import_export import import_files
+from scenarios.steps.run_steps import Progress, silent
 from scenarios.steps.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -56,8 +57,9 @@ class BaseMotionFound:
 
 
 def base_motion(
-    sources: Sequence[Path], mapping: Path | None, out: Path, until: float | None = None, cycles: Cycles | None = None
-) -> BaseMotionFound:
+    sources: Sequence[Path], mapping: Path | None, out: Path, until: float | None = None, cycles: Cycles | None = None,
+    progress: Progress = silent,
+) -> BaseMotionFound:  # fmt: skip
     """Fit the base to a log up to `until` [s since its start], predict the rest, and score both.
 
     Args:
@@ -66,6 +68,7 @@ def base_motion(
         out: The folder to write.
         until: End of the fit; the log's end unless given.
         cycles: Steady cycles to leave out in turn.
+        progress: Told what is fitted.
 
     Raises:
         ScenarioError: `out` must not be overwritten, or the mapping is malformed.
@@ -80,16 +83,20 @@ def base_motion(
     with folder.replacing(out, KIND) as new, one_blas_thread():
         new.mkdir(exist_ok=True)
         if mapping is not None:
-            notes = import_files(None, sources, mapping, new / "dataset")
+            notes = import_files(None, sources, mapping, new / "dataset", progress=progress)
         dataset = load(sources[0] if mapping is None else new / "dataset")
         log = log_of(Laboratory(dataset.urdf, dataset.description), _continuous(dataset))
         used = log.t < (log.t[-1] + 1.0 if until is None else until)
+        parts = 1 + (0 if cycles is None else 2)
+        progress("base", "fit", 0.0)
         base = fit_base(log, used)
         scores = {"fitted": score(base, log, used)}
         if not used.all():
             scores["predicted"] = score(base, log, ~used)
         if cycles is not None:
+            progress("base", "fit of the whole log", 1 / parts)
             whole = base if used.all() else fit_base(log, np.ones(len(log.t), dtype=bool))
+            progress("base", "left-out cycles", 2 / parts)
             scores["left-out cycles"] = left_out_cycles(whole, log, cycles.start, cycles.period)
         _write(new, log, used, base, scores)
     return BaseMotionFound(base, scores, notes)

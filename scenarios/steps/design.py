@@ -12,12 +12,14 @@ from pydantic import ValidationError
 
 from scenarios.files import output_folder
 from scenarios.files.errors import ScenarioError
+from scenarios.steps.run_steps import Progress, silent
 
 if TYPE_CHECKING:
     from calibration.design import Comparison, Criterion, Plan, Sample
     from scenarios.files.scenario import Scenario
 
 
+_CHOOSING = 0.85  # share of the time of a design that the choice of postures takes
 PLAYED = ("tour.csv", "tour_rests.csv", "tour_play_motion.yaml", "tour_trajectory.yaml")
 
 
@@ -36,6 +38,7 @@ def design(  # noqa: PLR0913  a file each
     out: Path,
     campaign: Path | None = None,
     play: Path | None = None,
+    progress: Progress = silent,
 ) -> Designed:
     """Choose n postures and write them to the file `out`.
 
@@ -55,7 +58,9 @@ def design(  # noqa: PLR0913  a file each
 
     description = describe_dataset(scenario.twin, ())
     rng = generator(scenario.seed, "design")
+    progress("design", "postures", 0.0)
     found = calibration.design.plan(nominal_task(mjcf.urdf(), description, rng, _work()), n, criterion, rng)
+    progress("design", "random sets beside them", _CHOOSING)
     against = compared(found, rng)
     worst, usual = 1e3 * against.designed, 1e3 * float(np.median(against.random))
     why = (

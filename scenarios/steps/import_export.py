@@ -2,6 +2,9 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +12,7 @@ from calibration.untrusted import checked_urdf, read_text
 from scenarios.files import output_folder, yaml_file
 from scenarios.files.errors import ScenarioError
 from scenarios.steps import drawing_file
+from scenarios.steps.run_steps import Progress, silent
 
 if TYPE_CHECKING:
     from calibration.formats import Mapping
@@ -20,6 +24,8 @@ PACKAGED = "tiago"
 MAPPING = "mapping.yaml"
 """The mapping file beside exported files."""
 
+_READING = 0.8  # share of the time of an import that reading takes; checking the rest
+
 
 def import_files(
     kind: str | None,
@@ -28,6 +34,7 @@ def import_files(
     out: Path,
     add_to: Path | None = None,
     later: "Description | None" = None,
+    progress: Progress = silent,
 ) -> tuple[str, ...]:
     """Write the dataset folder `out` from laboratory files; return what was recognised in them.
 
@@ -38,6 +45,7 @@ def import_files(
         out: The dataset folder; an earlier dataset there is replaced.
         add_to: A dataset imported before whose trials gain these files' channels.
         later: Laboratory of an estimate whose later session this is: its marker bodies, trials for validation.
+        progress: Told which file is read.
 
     Raises:
         ScenarioError: The mapping is malformed, or `out` must not be overwritten.
@@ -54,8 +62,15 @@ def import_files(
     source = MappingFile(mapping, described, _urdf(described, mapping))
     source = source if later is None else of_later_session(source, files, later)
     before = None if add_to is None else load(add_to)
+    reader = reader_of(kind, source)
+    n, stems = len({reader.stem(path) for path in files}), count()
+
+    def read(paths: Sequence[Path]) -> Any:
+        progress("import", paths[0].name, _READING * next(stems) / n)
+        return reader.read(paths)
+
     with output_folder.replacing(out, output_folder.DATASET) as new:
-        return write(files, reader_of(kind, source), source, new, before)
+        return write(files, replace(reader, read=read), source, new, before)
 
 
 def read_mapping(path: Path) -> "Mapping":
@@ -159,7 +174,7 @@ def _wheels() -> list[dict[str, Any]]:
     ]
 
 
-def export_files(kind: str, dataset: Path, out: Path, ros: int = 1) -> tuple[str, ...]:
+def export_files(kind: str, dataset: Path, out: Path, ros: int = 1, progress: Progress = silent) -> tuple[str, ...]:
     """Write the trials of a dataset as files of one format into the folder `out`, with the mapping that reads them.
 
     Returns:
@@ -174,7 +189,7 @@ def export_files(kind: str, dataset: Path, out: Path, ros: int = 1) -> tuple[str
 
     source = load(dataset)
     with output_folder.replacing(out, _exported(kind, [t.id for t in source.description.trials])) as new:
-        mapping, notes = export_trials(kind, source, new, ros)
+        mapping, notes = export_trials(kind, source, new, ros, partial(progress, "export"))
         yaml_file.write(new / MAPPING, mapping)
         drawing_file.write(new / drawing_file.NAME, source.description.bodies)
     return notes

@@ -52,8 +52,7 @@ def process(source: Path, out: Path, progress: Progress = silent) -> Processed:
             load(source)
             shutil.copytree(source, dataset)
         else:
-            progress("import", "", 0.0)
-            notes = import_files(None, (), source, dataset)
+            notes = import_files(None, (), source, dataset, progress=progress)
         estimate = run_steps.calibrate(dataset, new / "estimate", progress=progress)
         evaluated = estimate.calibrated and bool(load(dataset).entries("validation"))
         if evaluated:

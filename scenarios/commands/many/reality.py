@@ -32,15 +32,17 @@ def reality(  # noqa: PLR0913  an option each
 ) -> None:
     """Compare sampled robots with a recording of a real one."""
     from scenarios import steps
+    from scenarios.commands import console
     from scenarios.files import output_folder
     from scenarios.realism.compare import as_json, compare_replay, compare_swings
     from scenarios.realism.replayed import AS_DRAWN, CAUSES
 
     loaded = steps.load(scenario, overriding(overrides, seed))
     recordings = () if log is None else _recordings(log)
-    swung = [compare_swings(loaded, n)] if swings else []
     conditions = (AS_DRAWN, *CAUSES) if causes else (AS_DRAWN,)
-    replays = [compare_replay(loaded, recordings, n, condition) for condition in conditions if recordings]
+    with console.progress() as progress:
+        swung = [compare_swings(loaded, n, progress)] if swings else []
+        replays = [compare_replay(loaded, recordings, n, c, progress) for c in conditions if recordings]
     for one in swung:
         _show_swings(one)
     for each in replays:

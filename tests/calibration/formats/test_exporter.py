@@ -159,7 +159,12 @@ def test_importing_into_the_dataset_that_is_added_to_keeps_it_when_it_fails(csv,
     mapping = csv[0].parent / "mapping.yaml"
     mocap = [p for p in csv if p.name.endswith("mocap.csv")]
     robot = [tmp_path / p.name for p in csv if p.name.endswith("robot.csv")]
-    import_export.import_files("csv", mocap, mapping, tmp_path / "d")
+    shown = []
+    import_export.import_files("csv", mocap, mapping, tmp_path / "d", progress=lambda *now: shown.append(now))
+    assert [step for step, _, _ in shown] == ["import"] * len(mocap) and {at for _, at, _ in shown} == {
+        p.name for p in mocap
+    }
+    assert shown[0][2] == 0.0 and (np.diff([share for _, _, share in shown]) > 0.0).all() and shown[-1][2] < 1.0
     before = (tmp_path / "d/dataset.json").read_bytes()
     for path in robot:
         path.write_text("t\n1.0\n")

@@ -21,6 +21,14 @@ def test_help_and_import_touch_no_engine():
     assert done.stdout.split() == []
 
 
+def test_the_list_of_scenarios_needs_no_engine():
+    code = "import sys; from scenarios.commands import main; main.main(['list'])"
+    heavy = {"mujoco", "pinocchio", "scipy", "matplotlib", "netCDF4"}
+    script = f"try:\n    {code}\nfinally:\n    print('loaded', *({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert "humanoids2024  " in done.stdout and done.stdout.splitlines()[-1].split() == ["loaded"]
+
+
 def test_the_installed_command_is_this_one():
     done = subprocess.run([Path(sys.executable).parent / "tiago-twin", "--help"], capture_output=True, text=True)
     assert done.returncode == 0

@@ -97,10 +97,14 @@ def test_a_run_ends_in_six_lines(tmp_path):
     write_evaluation(tmp_path)
     write_score(tmp_path)
     write_estimate(tmp_path / "estimate", Verdict("geometry", "warning", "arm_3 never moved"))
+    evaluation = json.loads((tmp_path / "evaluation.json").read_text())
+    evaluation["budget"] = {"whole_mm": 3.0, "shares": [], "next_steps": [], "sentence": "Of the 3.00 mm: joints 3.00."}
+    (tmp_path / "evaluation.json").write_text(json.dumps(evaluation))
     lines = console.summary(tmp_path)
     assert len(lines) == 6
     assert lines[0].startswith("Calibrated. Error of the hand on unseen moving trials: ")
-    assert re.match(r"RMSE per component \[mm\]: nominal [\d.]+, .*model_2 [\d.]+", lines[1])
+    assert re.match(r"RMSE per component .*\[deg\]: nominal [\d.]+, [\d.]+; .*model_2 [\d.]+, [\d.]+", lines[1])
+    assert lines[2] == "Of the 3.00 mm: joints 3.00."
     assert lines[3] == "Worst finding: warning, geometry: arm_3 never moved"
     assert lines[4].startswith("Next: measure the base")
     assert lines[5] == f"Report: {tmp_path / 'report.html'}"
