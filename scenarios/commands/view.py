@@ -1,6 +1,7 @@
 """The command `view`."""
 
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -31,7 +32,7 @@ def view(
                 raise
             typer.echo(f"{error}; install the extra in a clone of the repository: pip install '.[view]'", err=True)
             raise typer.Exit(FAILED) from error
-        shown = write(run_folder, trial, page, magnify, progress)
+        shown = write(run_folder, trial, page, magnify, partial(progress, "view"))
     typer.echo(f"View of {shown}: {page}")
     if open_:
         webbrowser.open(page.resolve().as_uri())

@@ -4,6 +4,7 @@ viser records a scene and its changes and embeds both in its own viewer: one fil
 """
 
 import io
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +18,10 @@ import calibration
 from calibration.numerics.lie import inverse
 from calibration.prediction import NOMINAL
 from scenarios.files.output_folder import one_file
-from scenarios.steps import Progress, silent
 from scenarios.view.moment import Moments, moments
 from scenarios.view.shapes import joined, meshes, rigid_groups
+
+Progress = Callable[[str, float], None]
 
 _ROBOT, _MARKER, _FORCE = (205, 208, 214), (214, 40, 57), (20, 96, 190)
 _NOMINAL, _CALIBRATED = (120, 120, 120), (26, 95, 168)
@@ -35,7 +37,7 @@ class Node:
     changes: dict[str, np.ndarray]
 
 
-def write(run: Path, trial: str | None, out: Path, magnify: float, progress: Progress = silent) -> str:
+def write(run: Path, trial: str | None, out: Path, magnify: float, progress: Progress | None = None) -> str:
     """Write the page of a held-out trial, the first that moves unless named; return its name.
 
     Raises:
@@ -62,7 +64,7 @@ def _title(found: Moments, magnify: float) -> str:
 
 
 def _recorded(
-    server: viser.ViserServer, found: Moments, shapes: dict[str, trimesh.Trimesh], title: str, progress: Progress
+    server: viser.ViserServer, found: Moments, shapes: dict[str, trimesh.Trimesh], title: str, progress: Progress | None
 ) -> str:
     """The page: the scene at the first moment, then its changes."""
     centre = next(iter(found.links.values()))[0, :3, 3] if found.links else found.hand[0, :3, 3]
@@ -79,7 +81,8 @@ def _recorded(
             for name, values in node.changes.items():
                 setattr(node.handle, name, values[k])
         recording.insert_sleep(float(dt))
-        progress("view", found.trial, (k + 1) / len(found.t))
+        if progress is not None:
+            progress(found.trial, (k + 1) / len(found.t))
     return recording.as_html()
 
 
