@@ -24,15 +24,19 @@ def benchmark(  # noqa: PLR0913  an option each
     ] = None,
     tier: Tier = "quick",
     workers: Workers = 0,
+    python: Annotated[
+        Path | None, typer.Option("--peer", metavar="FILE", help="calibrate: FIGAROH's entry, by its interpreter.")
+    ] = None,
 ) -> None:
     """Make the frozen tasks bench-v1, or score calibrations of its robots."""
-    from scenarios.benchmarks import entry_of_ours, make, scoring
+    from scenarios.benchmarks import baselines, make, scoring
+    from scenarios.benchmarks.peer import Peer
     from scenarios.commands import console
     from scenarios.datasets import workers as engine
 
     if (action == "make") != (bench is None) or (action == "score") != bool(entries):
         raise ScenarioError(
-            "benchmark: make --out DIR; calibrate --in DIR --out ENTRY; score ENTRY... --in DIR --out DIR"
+            "benchmark: make --out DIR; calibrate --in DIR [--peer FILE] --out ENTRY; score ENTRY... --in DIR --out DIR"
         )
     with console.progress() as progress:
         if bench is None:
@@ -40,7 +44,8 @@ def benchmark(  # noqa: PLR0913  an option each
         elif action == "score":
             found = scoring.score(entries or (), bench, out, tier, progress)
         else:
-            found = entry_of_ours.calibrate(bench, out, tier, progress)
+            peer = None if python is None else Peer(python.absolute(), "map")
+            found = baselines.calibrate(bench, out, tier, progress, peer)
     for line in found:
         typer.echo(line, err=True)
     if action == "score":

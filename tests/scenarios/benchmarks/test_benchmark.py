@@ -16,6 +16,7 @@ from scenarios.benchmarks.make import make, runs
 from scenarios.benchmarks.tasks import TASKS
 from scenarios.datasets.index import Row
 from scenarios.datasets.reader import Run
+from scenarios.datasets.run_spec import seed_of
 from scenarios.datasets.workers import Workers
 from scenarios.files.errors import ScenarioError
 from twin.truth import Parameter, read_trial
@@ -72,6 +73,16 @@ def test_recordings_beyond_the_tolerance_are_named(run):
     x, *rest = robot.marks["xyz"]
     moved = replace(robot, marks=robot.marks | {"xyz": (x + 2.0 * frozen.TOLERANCE, *rest)})
     assert ["robot_00, xyz: marks differ" in line for line in frozen.differences(moved, run.dataset)] == [True]
+
+
+def test_a_recording_made_here_is_the_frozen_one(tmp_path):
+    """One trial of robot 0 on whatever machine this is: without the others before it, it differs by 5e-6."""
+    robot = frozen.robots("quick")[0]
+    series = robot.series()
+    alone = replace(series.twin.campaign, only=("around_x",), confirmation=False)
+    twin.record(replace(series.twin, campaign=alone), seed_of(series.seed, robot.id), tmp_path)
+    one = replace(robot, marks={"around_x": robot.marks["around_x"]})
+    assert list(frozen.differences(one, calibration.load(tmp_path / "dataset"))) == []
 
 
 @pytest.mark.parametrize("name", ["drive", "all"])
