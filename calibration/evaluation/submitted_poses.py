@@ -75,7 +75,7 @@ def _offsets(R: np.ndarray, e: np.ndarray, factor: float, unit: str) -> Iterator
     for axes, seen in (("lab", e), ("hand", (np.swapaxes(R, 1, 2) @ e[..., None])[..., 0])):
         if len(e):
             b = seen.mean(axis=0)
-            size = ", ".join(f"{factor * x:.1f}" for x in b)
+            size = ", ".join(f"{x:.1f}" for x in np.round(factor * b, 1) + 0.0)
             yield _square(seen - b), f"a constant offset ({size}) {unit} in the axes of the {axes}"
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calibration import Evaluation
 from scenarios.benchmarks.frozen import Robot
 from scenarios.benchmarks.make import runs
 from scenarios.benchmarks.tasks import TASKS, Task
@@ -87,7 +88,7 @@ def open_entry(folder: Path) -> Entry:
 
 
 def score(entries: Sequence[Path], bench: Path, out: Path, tier: str, progress: Progress) -> tuple[str, ...]:
-    """Write OUT/scores.json and OUT/scores.md; return warnings of what is missing or was rejected.
+    """Write OUT/scores.json and OUT/scores.md; return warnings of what is missing, doubtful or was rejected.
 
     Raises:
         ScenarioError: There is no benchmark or no entry.
@@ -104,7 +105,11 @@ def score(entries: Sequence[Path], bench: Path, out: Path, tier: str, progress: 
             warnings.append(f"{entry.name}: nothing for {task.name}, {robot.name}")
             continue
         try:
-            found |= dict.fromkeys(_figures(entry, task, robot, run, path))
+            scored, evaluation = _judged(task, run, path)
+            found |= dict.fromkeys(_figures(entry, task, robot, path.stem, scored, evaluation))
+            own = tuple(f"{row.model}: " for row in evaluation.rows)
+            doubts = (v.message for v in evaluation.verdicts if v.verdict == "warning" and v.message.startswith(own))
+            warnings += [f"{entry.name}, {task.name}, {robot.name}: {text}" for text in doubts]
         except _rejections() as error:
             warnings.append(f"{entry.name}, {task.name}, {robot.name}: rejected: {error}")
     out.mkdir(parents=True, exist_ok=True)
@@ -120,10 +125,15 @@ def _rejections() -> tuple[type[Exception], ...]:
     return CalibrationError, ScenarioError
 
 
-def _figures(entry: Entry, task: Task, robot: Robot, run: Run, path: Path) -> Iterator[Figure]:
+def _judged(task: Task, run: Run, path: Path) -> tuple[Score, Evaluation]:
     zeros = next((z for suffix in ("yaml", "csv") if (z := path.with_suffix(f".zeros.{suffix}")).is_file()), None)
     estimate, evaluation = evaluated(path, task.of(run.dataset), zeros)
-    scored = judged(estimate, evaluation, run.folder / "truth")
+    return judged(estimate, evaluation, run.folder / "truth"), evaluation
+
+
+def _figures(  # noqa: PLR0913
+    entry: Entry, task: Task, robot: Robot, file: str, scored: Score, evaluation: Evaluation
+) -> Iterator[Figure]:
     for model in dict.fromkeys(row.model for row in scored.rows):
         row = task.row(scored.rows, model)
         if row is None:
@@ -132,10 +142,10 @@ def _figures(entry: Entry, task: Task, robot: Robot, run: Run, path: Path) -> It
         own = model not in (NOMINAL, FLOOR)
         yield Figure(
             entry.name if own else "",
-            "" if model == path.stem else model,  # named after its file
+            "" if model == file else model,  # named after its file
             task.name,
             robot.id,
-            model in (scored.main, path.stem),
+            model in (scored.main, file),
             row.metrics.position_rmse_component_mm,
             row.metrics.orientation_rmse_deg,
             np.nan if again is None else again.metrics.position_rmse_component_mm,

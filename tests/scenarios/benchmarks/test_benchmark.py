@@ -132,18 +132,20 @@ def test_entries_are_scored_against_the_truth_and_tabulated(run, tmp_path, monke
     robot = frozen.Robot(0, "dead_zone", "", {})
     monkeypatch.setattr(scoring, "runs", lambda tier, bench: [(robot, run)])
     monkeypatch.setattr(scoring, "TASKS", (BY_NAME["geometry"], BY_NAME["drive"], BY_NAME["all"]))
-    mine = entry(tmp_path / "mine", lambda task: true_poses(run, task, 3e-3))
+    mine = entry(tmp_path / "mine", lambda task: true_poses(run, task, 6e-3))
     (mine / "drive" / "robot_00.nc").unlink()
     warnings = scoring.score([mine], tmp_path, tmp_path / "out", "quick", lambda *at: None)
-    assert warnings == ("mine: nothing for drive, robot_00",)
+    missing, *doubts = sorted(warnings, reverse=True)
+    assert missing == "mine: nothing for drive, robot_00"
+    assert len(doubts) == 2 and all("a constant offset (6.0, 0.0, 0.0) mm in the axes of the lab" in d for d in doubts)
     figures = json.loads((tmp_path / "out" / "scores.json").read_text())["figures"]
     found = {(f["task"], f["model"]): f["mm"] for f in figures}
-    assert [found["all", ""], found["geometry", ""]] == pytest.approx(2 * [3.0 / np.sqrt(3.0)], rel=1e-6)
-    assert found["all", "nominal"] > 3.0
+    assert [found["all", ""], found["geometry", ""]] == pytest.approx(2 * [6.0 / np.sqrt(3.0)], rel=1e-6)
+    assert found["all", "nominal"] > 6.0
     again = [f["again_mm"] for f in figures if f["entry"] == "mine" and f["task"] == "all"]
-    assert again == [pytest.approx(3.0 / np.sqrt(3.0), rel=0.2)], "the second session counts, against the markers"
+    assert again == [pytest.approx(6.0 / np.sqrt(3.0), rel=0.2)], "the second session counts, against the markers"
     text = (tmp_path / "out" / "scores.md").read_text()
-    assert "| mine | 1.73 | - | 1.73 |" in text
+    assert "| mine | 3.46 | - | 3.46 |" in text
     assert text.index("| nominal |") < text.index("| mine |"), "the best of `all` is last"
 
 

@@ -17,6 +17,16 @@ from scenarios.testing.pytest_plugin import TwinResult
 ROOT = Path(__file__).parents[3]
 EXAMPLE = ROOT / "examples" / "validate_my_calibration"
 
+FAILS = """
+from pathlib import Path
+from tiago_twin_pytest import TwinResult
+
+def test_fails(assert_within):
+    names = {"model": "mine", "trials": "dynamic", "base": "fixed", "encoder": "motor"}
+    result = TwinResult(Path(), "mine", (names | {"position_rmse_norm_mm": 8.0},), {})
+    assert_within(result, mm=5.0)
+"""
+
 
 def row(model, base, mm, deg=1.0):
     names = {"model": model, "trials": "dynamic", "base": base, "encoder": "motor"}
@@ -113,6 +123,12 @@ def test_a_project_with_a_package_of_our_name_passes_with_the_wheel_and_an_empty
         done = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True)
         took.append(cpu_seconds() - before)
         assert (done.returncode, "4 passed" in done.stdout) == (0, True), done.stdout[-3000:] + done.stderr[-2000:]
+    (project / "test_fails.py").write_text(FAILS)
+    only = ["test_fails.py", "--junitxml", str(tmp_path / "junit.xml")]
+    assert subprocess.run([*command, *only], cwd=project, env=environment, capture_output=True).returncode == 1
+    assert (
+        'message="Failed: mine (dynamic trials, base fixed, motor encoders): ' in (tmp_path / "junit.xml").read_text()
+    )
     print(f"first session {took[0]:.1f} s, with the cache {took[1]:.1f} s of one core")
     assert took[0] <= 60.0 and took[1] <= 5.0
 
