@@ -17,6 +17,7 @@ from calibration.checks.plates import moved_by
 from calibration.errors import NotEnoughData
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.rows import NOMINAL
+from calibration.evaluation.bands import Bands, place_noise
 from calibration.evaluation.budget import Causes, budget, causes
 from calibration.evaluation.joint_regimes import TrialResiduals, residuals, validation_qualities
 from calibration.evaluation.ladder import Row, TrialErrors, ladder, trial_errors
@@ -92,7 +93,9 @@ def evaluate(
     estimate = estimate if estimate.registered else registered(estimate, dataset)
     predict, report = predictor(estimate, dataset), progress or (lambda at, share: None)
     remarks += tuple(departures(estimate, dataset, predict.robot, read)) if role == "validation" else ()
-    scored = tuple(_each(predict, dataset, read, report, submitted))
+    scored = tuple(
+        _each(predict, Bands(estimate, dataset.description, predict.robot), dataset, read, report, submitted)
+    )
     if submitted is not None:
         pairs = (zip(one.predicted.rows, one.errors, strict=True) for one in scored)
         own = [(p, e.errors) for of_trial in pairs for p, e in of_trial if p.base == "submitted"]
@@ -104,7 +107,7 @@ def evaluate(
     later = tuple(e for e in dataset.entries("confirmation") if e not in registering)
     if registering and later:
         again, others = reregistered(predict, dataset), tuple(recorded(dataset, e) for e in later)
-        confirmed = [error for one in _each(again, dataset, others, report, submitted) for error in one.errors]
+        confirmed = [error for one in _each(again, None, dataset, others, report, submitted) for error in one.errors]
     errors = [error for one in scored for error in one.errors]
     rows = tuple(ladder(errors, "mocap"))
     remarks += () if estimate.robot else tuple(of_another_robot(rows))
@@ -125,6 +128,7 @@ def evaluate(
 
 def _each(
     predict: Predictor,
+    promised: Bands | None,
     dataset: Dataset,
     read: tuple[Recorded, ...],
     report: Progress,
@@ -135,17 +139,23 @@ def _each(
         if isinstance(trial, PostureMeans):
             yield _of_means(predict, dataset, (entry, trial), submitted)
         else:
-            yield _of_trial(predict, dataset, (entry, trial), submitted)
+            yield _of_trial(predict, promised, dataset, (entry, trial), submitted)
 
 
 def _of_trial(
-    predict: Predictor, dataset: Dataset, read: tuple[TrialEntry, MeasuredTrial], submitted: Submission | None
+    predict: Predictor,
+    promised: Bands | None,
+    dataset: Dataset,
+    read: tuple[TrialEntry, MeasuredTrial],
+    submitted: Submission | None,
 ) -> _Scored:
     entry, trial = read
     T_measured, predicted = poses_of(dataset.description.hand_body, trial).T, predict(entry, trial)
+    predicted = predicted if promised is None else promised.on(predicted, entry, trial)
     own = None if submitted is None else submitted.row(entry, trial.t_mocap, T_measured)
     predicted = predicted if own is None else replace(predicted, rows=(*predicted.rows, own))
-    errors = [trial_errors(p, T_measured, predicted.dwells) for p in predicted.rows]
+    noise = place_noise(dataset.description, trial)
+    errors = [trial_errors(p, T_measured, predicted.dwells, noise) for p in predicted.rows]
     moved = "" if entry.kind in MOVES else _moved(predicted)
     left = None
     if predict.joints is not None and predict.robot is not None and predicted.corrected is not None:

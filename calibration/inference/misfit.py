@@ -12,7 +12,10 @@ of the residuals r = y - J (...), theta integrated out,
 by Fisher scoring. Where that hardly exceeds the evidence of no departure, there is none. Else each size in
 the covariance is not the best one, which is 0 as soon as a group is hardly visible, but averaged over the evidence,
 
-    s_g^2 = int s^2 p(s) ds / int p(s) ds               the other groups at their best
+    s_g^2 = int s^2 p(s) e^(-s / a) ds / int p(s) e^(-s / a) ds           the other groups at their best
+
+a the size expected beforehand: what a model leaves out is as large as the random errors it had to allow its readings
+(exponential: of all sizes with that mean the one that states nothing else).
 
 A group is called seen where the evidence without it, all others at their best, is lower by `PRICE`.
 Reference: Kennedy, O'Hagan, JRSS B 2001.
@@ -40,11 +43,13 @@ class Departures:
         N: (n, d, m) [as the residuals] by unit size.
         group: (m,) number of each one's group.
         names: Of the groups.
+        expected: a, size expected beforehand.
     """
 
     N: np.ndarray
     group: np.ndarray
     names: tuple[str, ...]
+    expected: float
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,7 @@ def misfit(fit: Fit, parameters: ParameterSet, departures: Departures) -> Misfit
         gain[g] = best - problem.value(off)
         if gain[g] >= PRICE:
             gain[g] = best - problem.value(problem.maximised(off > 0.0, off))
-    size = np.sqrt([problem.averaged(variance, g) for g in range(problem.groups)])
+    size = np.sqrt([problem.averaged(variance, g, departures.expected) for g in range(problem.groups)])
     spread = moved * size[departures.group]
     return Misfit(departures.names, size, gain, fit.covariance + spread @ spread.T)
 
@@ -142,12 +147,12 @@ class _Evidence:
                 break
         return variance
 
-    def averaged(self, variance: np.ndarray, g: int) -> float:
-        """Square of the size of group g, averaged over the evidence, the others' variances (g,) given."""
+    def averaged(self, variance: np.ndarray, g: int, expected: float) -> float:
+        """Square of the size of group g, averaged over evidence and expectation, the others' variances (g,) given."""
         others = np.arange(self.groups) != g
         trials = [np.where(others, variance, size**2) for size in _SIZES]
         value = np.array([self.value(trial) for trial in trials])
-        weight = np.exp(value - value.max()) * _SIZES  # ds of evenly spread logarithms
+        weight = np.exp(value - value.max() - _SIZES / expected) * _SIZES  # ds of evenly spread logarithms
         return float(weight @ _SIZES**2 / weight.sum())
 
     def _slope(self, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

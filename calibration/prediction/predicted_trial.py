@@ -39,6 +39,8 @@ class Prediction:
         kind: Its kind: static, sweep, swing, spin, drive.
         t: (n,) [s, mocap clock].
         T_lab_hand: (n, 4, 4), NaN where it cannot be predicted.
+        base_variance: (6,) or (n, 6) of the base's displacement in frame 0 [m2, rad2]; None where it is measured.
+        covariance: (n, 3, 3) of the hand's place [m2, lab]; None where the row states none.
     """
 
     model: str
@@ -48,6 +50,8 @@ class Prediction:
     kind: str
     t: np.ndarray
     T_lab_hand: np.ndarray
+    base_variance: np.ndarray | None = None
+    covariance: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,16 @@ class Predictor:
         still = np.broadcast_to(mean(_start(T_lab_B, trial)), T_lab_B.shape)
         poses = TrialPoses(self, entry, trial, T_lab_B, still, self._base(entry, trial, still[0]), corrected)
         rows = tuple(
-            Prediction(row.name, source, encoder, entry.id, entry.kind, trial.t_mocap, T @ poses.in_base(row, encoder))
+            Prediction(
+                row.name,
+                source,
+                encoder,
+                entry.id,
+                entry.kind,
+                trial.t_mocap,
+                T @ poses.in_base(row, encoder),
+                poses.base_variance(row, source),
+            )
             for row, _, encoder in self._rows()
             for source in row.bases
             if (T := poses.base(row, source)) is not None
@@ -235,6 +244,16 @@ class TrialPoses:
         if bundled is None or not bundled.trains.trains or not len(self.trial.t_robot):
             return None
         return self._once(("geared",), lambda: bundled.corrected(self.trial))
+
+    def base_variance(self, row: LadderRow, source: Base) -> np.ndarray | None:
+        """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known."""
+        if self.loaded is None or source not in SOURCES:
+            return None
+        if row.bundle and source != "fixed" and (slipped := self.slipped(source)) is not None:
+            return slipped.motion.variance
+        known = dict(self.loaded.suspension.held_out)
+        tried = known.get(source) or next(iter(known.values()))
+        return tried.variance(tried.moves & (source != "fixed"))
 
     def delivered(self) -> Delivered | None:
         """Parts of the row that is delivered; None where it has no prediction of this trial."""

@@ -82,9 +82,14 @@ class Predicted:
     @property
     def radius_95(self) -> np.ndarray:
         """(n, m) distance from the prediction within which 95 % are [m]."""
-        mean = np.trace(self.covariance, axis1=2, axis2=3)
-        half = (self.covariance**2).sum(axis=(2, 3))
-        return np.asarray(np.sqrt(gamma.ppf(0.95, 0.5 * mean**2 / half, scale=2.0 * half / mean)))
+        return radius_95(self.covariance)
+
+
+def radius_95(covariance: np.ndarray) -> np.ndarray:
+    """(...) distance from a prediction within which 95 % are [m], by covariances (..., 3, 3)."""
+    mean = np.trace(covariance, axis1=-2, axis2=-1)
+    half = (covariance**2).sum(axis=(-2, -1))
+    return np.asarray(np.sqrt(gamma.ppf(0.95, 0.5 * mean**2 / half, scale=2.0 * half / mean)))
 
 
 def predicted_points(

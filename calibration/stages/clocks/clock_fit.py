@@ -1,13 +1,15 @@
 """Epoch of an instrument on the motion-capture clock, from lags of several trials.
 
     t_mocap = s (1 + drift) + offset                      s on the instrument's clock [s]
-    lag_k = offset + drift s_k + noise_k                  s_k the middle of trial k
+    lag_k = offset + drift s_k + m wound_k + noise_k      s_k the middle of trial k, m ~ N(0, 1)
     drift_k = drift + noise'_k                            where a trial is long enough to show its own
     var noise_k = B^2 (sigma_k^2 + floor^2)               B^2 = max(1, chi2 / degrees of freedom)   (Birge ratio)
 
-The model errors of a trial grow with its own sigma: what moves little shows little, and most of it wrong. What all
-trials share is added at the end. A trial far off the median line is left out and named. Times are centred
-before the line is fitted.
+The model errors of a trial grow with its own sigma: what moves little shows little, and most of it wrong. wound_k is
+the lateness that the fit of trial k laid to gears wound by friction, less its weighted mean: a share m of it, any up to
+all, is the clock's. Sweeps wind little and are recorded first, swings that fold much and last: without m that share is
+taken for drift. What all trials share is added at the end. A trial far off the median line is left out and named.
+Times are centred before the line is fitted.
 
 How late an instrument shows a motion, alike in all trials, where no recording can tell it from its clock.
 
@@ -41,6 +43,7 @@ from calibration.recording.schema import Tolerances
 _DRIFT = 1e-4  # prior standard deviation of a clock's drift [-]: 100 ppm
 _FAR = 5.0  # robust standard deviations
 _TRIAL = 5e-5  # [s] floor of a trial's sigma; twice it over the trial is that of its own drift
+_MISLAID = 1.0  # share of what the fit laid to gears wound by friction that is the clock's, standard deviation [-]
 _LEFT = 0.2  # at most, of what dry friction winds
 _PLATE = 3e-4  # [s]
 
@@ -91,7 +94,8 @@ def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> t
     sigma = np.array([np.hypot(t.lag.sigma, _TRIAL) for t in trials])
     kept = _inliers(s, lag, sigma)
     within = np.array([(t.drift, np.hypot(t.drift_sigma, 2.0 * _TRIAL / t.duration)) for t in trials])[kept]
-    (offset, drift), (var_lag, var_drift), centre = _line(s[kept], lag[kept], sigma[kept], within)
+    wound = np.array([t.wound for t in trials])[kept]
+    (offset, drift), (var_lag, var_drift), centre = _line(s[kept], lag[kept], sigma[kept], within, wound)
     var_lag += common**2
     J = np.array([[1.0, -centre], [0.0, 1.0]])
     covariance = J @ np.diag([var_lag, var_drift]) @ J.T
@@ -111,21 +115,23 @@ def _inliers(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> np.ndarray:
 
 
 def _line(
-    s: np.ndarray, lag: np.ndarray, sigma: np.ndarray, within: np.ndarray
+    s: np.ndarray, lag: np.ndarray, sigma: np.ndarray, within: np.ndarray, wound: np.ndarray
 ) -> tuple[tuple[float, float], tuple[float, float], float]:
     """(lag at the centre, drift), their variances, and the centre: weighted least squares, a prior on the drift.
 
-    `within` (n, 2) is each trial's own drift and its sigma [-].
+    `within` (n, 2) is each trial's own drift and its sigma [-], `wound` (n,) what was laid to gears [s].
     """
     w, w_drift = sigma**-2.0, within[:, 1] ** -2.0
-    centre, reference = float(w @ s / w.sum()), float(w @ lag / w.sum())
-    d = s - centre
-    information = float(w @ d**2 + w_drift.sum()) + _DRIFT**-2
-    drift = float(w @ (d * (lag - reference)) + w_drift @ within[:, 0]) / information
-    chi2 = float(w @ (lag - reference - drift * d) ** 2 + w_drift @ (within[:, 0] - drift) ** 2)
+    centre, reference, mean = (float(w @ x / w.sum()) for x in (s, lag, wound))
+    A = np.column_stack([s - centre, wound - mean])
+    information = (A.T * w) @ A + np.diag([float(w_drift.sum()) + _DRIFT**-2, _MISLAID**-2])
+    drift, mislaid = np.linalg.solve(information, A.T @ (w * (lag - reference)) + [w_drift @ within[:, 0], 0.0])
+    left = lag - reference - A @ [drift, mislaid]
+    chi2 = float(w @ left**2 + w_drift @ (within[:, 0] - drift) ** 2 + (mislaid / _MISLAID) ** 2)
     dof = len(s) + int((w_drift > 0.0).sum()) - 2
     birge = max(1.0, chi2 / dof) if dof > 0 else 1.0
-    return (reference, drift), (birge / float(w.sum()), birge / information), centre
+    variance = float(np.linalg.inv(information)[0, 0])
+    return (reference, float(drift)), (birge / float(w.sum()), birge * variance), centre
 
 
 def allowance(instrument: str, lags: Sequence[TrialLag], known: Tolerances) -> tuple[float, float]:

@@ -65,7 +65,8 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
     used = postures.rows(kept)
     in_time = _in_time(found, parameters, used.motion)
     departed = with_departures(hand_model(chain, parameters.nominal), parameters, in_time, used)
-    model = replace(model_of(STAGE, chain, parameters, departed.fit), random=in_time.covariance)
+    left = np.sqrt((found.at.r.reshape(kept.sum(), -1, 3) ** 2).mean(axis=(0, 2)))  # place and, where seen, rotation
+    model = replace(model_of(STAGE, chain, parameters, departed.fit), random=in_time.covariance, hand_error=left)
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
     message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from nominal"
     said = [Verdict(STAGE, "ok", "; ".join((message, *departed.shown)))]

@@ -68,7 +68,7 @@ def test_rows_of_a_ladder_are_complete_and_named_as_in_the_contract(evaluation, 
     assert set(found["rows"][0]) == {
         "model", "trials", "base", "encoder", "against", "n", "position_rmse_component_mm", "position_rmse_norm_mm",
         "position_p95_norm_mm", "position_max_norm_mm", "orientation_rmse_deg", "orientation_rmse_component_deg",
-        "orientation_max_deg", "per_axis_mm",
+        "orientation_max_deg", "per_axis_mm", "inside_95", "band_95_mm",
     }  # fmt: skip
     assert set(found["rows"][0]["per_axis_mm"]) == {"x", "y", "z"}
 

@@ -12,7 +12,7 @@ P, ROWS = 8, 60
 RNG = np.random.default_rng(0)
 J, N = RNG.normal(size=(ROWS, 3, P)), RNG.normal(size=(ROWS, 3, 12))
 N = 100.0 * (N + 1.5 * np.concatenate([J[:, :, :6], 0.0 * J[:, :, :6]], axis=2))  # parameters absorb much of it
-WHAT = Departures(N, np.repeat([0, 1], 6), ("load", "wobble"))
+WHAT = Departures(N, np.repeat([0, 1], 6), ("load", "wobble"), 1e-2)
 PARAMETERS = ParameterSet(tuple("abcdefgh"), ("m",) * P, np.zeros(P), np.full(P, np.inf))
 NONE = Noise(("markers",), np.zeros(3, dtype=int), np.ones(1), np.ones(1), np.zeros(1, bool), np.ones(1, bool))
 

@@ -9,7 +9,7 @@ import mjcf
 from calibration.numerics.time_delay import Lag
 from calibration.recording.clock import Clock
 from calibration.robot.chain import chain_of
-from calibration.stages.clocks.clock_fit import TrialLag, allowance
+from calibration.stages.clocks.clock_fit import TrialLag, allowance, fit_clock
 from calibration.stages.clocks.pose_refinement import provisional, refined_lags
 from tests.doubles import geared_robot, rigid_robot
 
@@ -40,6 +40,21 @@ def test_trials_count_by_what_they_tell_of_the_clock_and_a_plate_is_not_geared()
 def test_play_that_is_early_widens_and_does_not_shift():
     early, none = allowance("robot", [lag(-4e-4)], KNOWN), allowance("robot", [lag(0.0)], KNOWN)
     assert early[0] == none[0] and early[1] == allowance("robot", [lag(4e-4)], KNOWN)[1] > none[1]
+
+
+def test_what_was_laid_to_winding_in_the_later_trials_is_not_taken_for_drift():
+    rng, z = np.random.default_rng(0), []
+    for _ in range(200):
+        s, mislaid = np.linspace(100.0, 700.0, 9), rng.normal()
+        wound = 5e-7 * s - 1e-4 + 1e-4 * rng.normal(size=9)  # sweeps come first, swings that fold last
+        noise = 7e-5 * rng.normal(size=9)
+        lags = [
+            TrialLag("swing", at, Lag(3.9 + 12e-6 * at + mislaid * w + e, 5e-5, 1.0), wound=w)
+            for at, w, e in zip(s, wound, noise, strict=True)
+        ]
+        clock, _ = fit_clock("robot", lags)
+        z.append((clock.drift - 12e-6) / np.sqrt(clock.covariance[1, 1]))
+    assert 0.92 <= (np.abs(z) < 1.96).mean() <= 0.99
 
 
 def test_friction_that_winds_the_gears_is_found_and_not_where_there_is_none():
