@@ -81,8 +81,9 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:
     """The fit of the postures that agree, from nominal values; none whose markers do not have their body's shape."""
-    n = len(postures)
-    rigid = np.flatnonzero(of_one_shape(postures.misfit))
+    n, shape, means = len(postures), np.ones(len(postures), dtype=bool), postures.motion < 0
+    shape[means] = of_one_shape(postures.misfit[means])  # single samples of a motion have no misfit
+    rigid = np.flatnonzero(shape)
     found = robust_fit(
         lambda some: hand_problem(hand, parameters, postures.rows(rigid[some]), errors),
         len(rigid),
