@@ -5,10 +5,8 @@
     covariance of the hand's twist by what the arm adds:
         J_joint diag(V + (sigma_c tau)^2) J_joint' + J_column diag((sigma_b M)^2) J_column'
 
-V the square of the interval of a link behind its mesh over 12 (`LinkAngles`) and that of the reading's random error, as
-the hand's markers showed it beside those intervals at the calibration postures: what link encoders left of trials that
-were left out, between kinds of motion, is up to three times as much, and the band 1.3 times too wide by it. sigma_c,
-sigma_b the standard deviations of the meshes' and the column's compliance.
+V that of `LinkAngles`, with the readings' random error as the hand's markers showed it where that is more than what
+link encoders showed; sigma_c, sigma_b the standard deviations of the meshes' and the column's compliance.
 
 The base is taken to be level and at rest. Readings of which no motion is known are each taken to be at rest: the load
 decides the side of a mesh, else the link is anywhere in what friction holds.
@@ -119,13 +117,14 @@ class BundledArm:
         return np.asarray(self.bends(hand, positions) @ hand.poses(positions.q))
 
     def variance(self, hand: HandModel, positions: ArmPositions, reading_sigma: np.ndarray) -> np.ndarray:
-        """(n, m) of the chain's joints: interval of the link, reading, compliance under the torque."""
+        """(n, m) of the chain's joints: random error of the reading where there is no drive train."""
         known = {q.name: q.sigma for train in self.trains.trains for q in train.parameters if np.isfinite(q.sigma)}
         sigma = np.array([known.get(f"gear.{joint}.compliance", 0.0) for joint in hand.chain.joints])
         residual = {train.joint: train.residual for train in self.trains.trains}
-        left = np.array([residual.get(joint, 0.0) for joint in hand.chain.joints])
+        driven = np.isin(hand.chain.joints, list(residual))
+        unseen = reading_sigma**2 - np.array([residual.get(joint, 0.0) for joint in hand.chain.joints]) ** 2
         own, torque = (x[:, hand.chain.columns] for x in (positions.variance, positions.torque))
-        return np.maximum(own - left**2, 0.0) + reading_sigma**2 + (sigma * torque) ** 2
+        return np.where(driven, own + np.maximum(unseen, 0.0) + (sigma * torque) ** 2, reading_sigma**2)
 
     def column_covariance(self, hand: HandModel, positions: ArmPositions, T_base_hand: np.ndarray) -> np.ndarray:
         """(n, 6, 6) of the local twist of the hand at T_base_hand (n, 4, 4), by the column's compliance."""

@@ -249,11 +249,14 @@ class TrialPoses:
         """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known."""
         if self.loaded is None or source not in SOURCES:
             return None
-        if row.bundle and source != "fixed" and (slipped := self.slipped(source)) is not None:
-            return slipped.motion.variance
         known = dict(self.loaded.suspension.held_out)
-        tried = known.get(source) or next(iter(known.values()))
-        return tried.variance(tried.moves & (source != "fixed"))
+        tried = next(iter(known.values()))
+        if source != "plate" and source != "dynamics":
+            return tried.variance(np.zeros(6, dtype=bool))
+        if row.bundle and (slipped := self.slipped(source)) is not None:
+            return slipped.motion.variance
+        tried = known.get(source, tried)
+        return tried.variance(tried.moves)
 
     def delivered(self) -> Delivered | None:
         """Parts of the row that is delivered; None where it has no prediction of this trial."""

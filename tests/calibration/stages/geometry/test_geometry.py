@@ -11,7 +11,7 @@ from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.guards import distinct
-from calibration.stages.geometry.hand_residual import fit, linearised
+from calibration.stages.geometry.hand_residual import NoiseModel, fit, linearised
 from calibration.stages.geometry.parameters import (
     geometry_parameters,
     reading_floor,
@@ -20,7 +20,7 @@ from calibration.stages.geometry.parameters import (
     registration_parameters,
 )
 from calibration.stages.geometry.registration import register
-from calibration.stages.geometry.stage import calibrate_geometry
+from calibration.stages.geometry.stage import calibrate_geometry, fit_robustly
 from tests.doubles import rigid_robot
 
 TINY = np.full(8, 1e-12)
@@ -47,6 +47,19 @@ def with_play(truth, q, seed=0):
 
 def selected(postures, rows):
     return Postures(postures.q[rows], postures.T_base_hand[rows], postures.covariance[rows], postures.misfit[rows])
+
+
+def test_static_postures_count_beside_more_samples_of_motions(chain):
+    description, rng = rigid_robot.described(), np.random.default_rng(4)
+    found = rigid_robot.postures(rigid_robot.defects(1), rigid_robot.random_angles(rng, 40), 2e-5, 4)
+    moving = np.arange(40) >= 12
+    postures = replace(found, misfit=np.where(moving, 0.0, 2.6e-4), motion=np.where(moving, 0, -1))
+    hand, parameters = (
+        nominal_hand(chain, nominal_frames(chain, description)),
+        geometry_parameters(chain, description),
+    )
+    kept = fit_robustly(hand, parameters, postures, NoiseModel(TINY, TINY, np.zeros(0), True)).kept
+    assert kept.sum() >= 38 and kept[~moving].all()
 
 
 @pytest.mark.parametrize("torso, rank", [(True, 36), (False, 34)])
