@@ -64,7 +64,9 @@ def _setup(session: Session, wheels: str | None) -> Iterator[str]:
         place = [float(x) if np.isfinite(x) else "CHOOSE" for x in np.round(p.centre, 4) + 0.0]
         size = [float(x) if np.isfinite(x) else "CHOOSE" for x in np.round(p.size, 4)]
         known = np.isfinite([*p.centre, *p.size]).all()
-        note = "" if known else f"  {CHOOSE}: centre of its surface in the lab, its edges [m]"
+        pressed = any(p.name == q.name for v in session.views if v.kind == "csv" for q in v.plates)
+        note = "  # its edges are not in the file: as far as the pressure went" if pressed else ""
+        note = note if known else f"  {CHOOSE}: centre of its surface in the lab, its edges [m]"
         axes = np.round(p.axes, 6) + 0.0
         yield f"  - {flow({'name': p.name, 'centre': place, 'axes': axes.tolist(), 'size': size})}{note}"
     yield (
