@@ -41,8 +41,8 @@ def view_bag(path: Path, robot: UrdfRobot) -> FileView:
     poses = {_body(t): {"topic": t} | SIGMAS for t, (kind, _) in topics.items() if kind in POSES}
     if poses:
         layout = BagLayout.model_validate(layout.model_dump() | {"poses": poses})
-        said = (f"  {flow(name)}: {flow(p)}  {CHOOSE}: how well it is measured, per axis" for name, p in poses.items())
-        lines += ["poses:", *said]
+        rows = (f"  {flow(name)}: {flow(p)}  {CHOOSE}: how well it is measured, per axis" for name, p in poses.items())
+        lines += ["poses:", *rows]
     used = {motor, link, command, *(p["topic"] for p in poses.values())}
     left = tuple(sorted(t for t in topics if t not in used and t not in (NAMES, VALUES)))
     return FileView(path, "bag", read_bag([path], layout), (), tuple(lines), left)

@@ -74,8 +74,8 @@ def lines_of(poses: Sequence[PoseColumns]) -> Iterator[str]:
     for p in poses:
         known = p.channels.order.startswith("quat")
         what = "" if known else "which three numbers (rotation_vector, euler_XYZ, euler_zyx, ...); "
-        said = flow(p.channels.model_dump(exclude_defaults=True))
-        yield f"  {flow(p.name)}: {said}  {CHOOSE}: {what}how well it is measured, per axis [m, rad]"
+        fields = flow(p.channels.model_dump(exclude_defaults=True))
+        yield f"  {flow(p.name)}: {fields}  {CHOOSE}: {what}how well it is measured, per axis [m, rad]"
 
 
 def _of(pattern: re.Pattern[str], columns: list[str]) -> dict[str, dict[str, str]]:
