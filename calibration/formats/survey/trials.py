@@ -50,7 +50,8 @@ def kind_of(recorded: Recorded, bodies: Sequence[FoundBody]) -> str:
     """static, sweep, swing, spin or drive."""
     if recorded.means is not None or recorded.dwells is not None:
         return "static"
-    if bodies and recorded.markers is not None:
+    base_is_seen = len(bodies) > 1 or (bodies and recorded.joints is None)  # one body beside readings is the hand
+    if base_is_seen and recorded.markers is not None:
         moved = _base_motion(recorded.markers, bodies[0])
         if moved[1] > _TURNED:
             return "spin"
