@@ -11,7 +11,7 @@ from calibration.formats.bag.read import read_bag
 from calibration.formats.mapping.layouts import BagLayout
 from calibration.formats.mapping.poses import shape_of
 from calibration.mocap.cluster_pose import body_poses
-from scenarios.steps.import_export import import_files, init_mapping
+from scenarios.steps.import_export import init_mapping, read_mapping
 from tests.calibration.formats.test_poses import SIGMA_P, SIGMA_R, mapping
 from tests.doubles.six_axis_arm import ARM, JOINTS, measured
 
@@ -124,8 +124,7 @@ def test_an_arm_is_calibrated_from_a_bag_alone(lab):
 
 
 def test_a_draft_of_a_bag_names_its_poses(lab):
-    log = write(lab.folder / "log", "PoseStamped", 12)
+    log = write(lab.folder / "log", "PoseStamped", 8)
     text = init_mapping([log], lab.folder / "lab.yaml", ARM)
     assert "poses: {topic: '/poses', sigma_position:" in text and "name: poses, link: tool0, pose: true" in text
-    import_files(None, [log], lab.folder / "lab.yaml", lab.out)
-    assert load(lab.out).description.hand_body.name == "poses"
+    assert "static: [log]" in text and read_mapping(lab.folder / "lab.yaml").hand_name == "poses"
