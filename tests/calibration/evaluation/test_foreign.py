@@ -17,7 +17,7 @@ from calibration.evaluation.pose_errors import pose_errors
 from calibration.evaluation.submitted_poses import check_poses, doubts
 from calibration.numerics.lie import compose, inverse
 from calibration.prediction import predict
-from calibration.prediction.foreign import check_names
+from calibration.prediction.foreign import check_names, registered
 
 ROW = ("model_2", "measured", "motor")
 
@@ -143,20 +143,20 @@ def test_predicted_poses_score_as_the_row_they_are_of(poses, dataset, ours, tmp_
             assert mm(found, "mine", "submitted", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=1e-9)
 
 
-def test_a_urdf_scores_as_its_parameters_and_as_the_poses_that_it_predicts(saved, dataset, tmp_path):
-    """The three ways in, each with the same information: zeros and geometry, marker frames registered by us."""
-    model = load_estimate(saved / "calibrated.urdf", saved / "master_calibration.yaml")
-    found = evaluate(model, dataset)
-    rows = [
-        (t.trial_id, t.t, r.T_lab_hand)
-        for t in found.predicted
-        for r in t.rows
-        if (r.model, r.base) == ("calibrated", "measured")
-    ]
-    same = evaluate(read_submission(write_netcdf(tmp_path / "mine.nc", rows)), dataset)
+def test_a_urdf_scores_as_its_parameters_and_as_the_poses_that_it_predicts(dataset, tmp_path):
+    """The three ways in with the same information: the datasheet's geometry, zeros, frames fitted to the postures."""
+    (tmp_path / "mine.urdf").write_text(dataset.urdf)
+    (tmp_path / "zeros.csv").write_text("joint,offset\narm_5_joint,0.1\n")
+    urdf = load_estimate(tmp_path / "mine.urdf", tmp_path / "zeros.csv")
+    found, known = evaluate(urdf, dataset), registered(urdf, dataset)
+    rows = ((t.trial_id, t.t, r) for t in found.predicted for r in t.rows if (r.model, r.base) == ("mine", "measured"))
+    path = write_netcdf(tmp_path / "mine.nc", [(trial, t, row.T_lab_hand) for trial, t, row in rows])
+    poses = evaluate(read_submission(path), dataset)
+    parameters = [{"name": p.name, "value": p.value, "unit": p.unit} for p in known.models[0].parameters]
+    json_file = evaluate(replace(written(tmp_path, mine=parameters), clocks=known.clocks), dataset)
     for trials in ("dynamic", "static"):
-        one, other = mm(found, "calibrated", "measured", trials), mm(same, "mine", "submitted", trials)
-        assert one == pytest.approx(other, rel=1e-9)
+        same = mm(poses, "mine", "submitted", trials), mm(json_file, "mine", "measured", trials)
+        assert same == pytest.approx(2 * (mm(found, "mine", "measured", trials),), rel=1e-9)
 
 
 def test_missing_trials_and_poses_are_warned_of(poses, dataset, tmp_path):

@@ -19,7 +19,7 @@ from scenarios.datasets.reader import Run
 from scenarios.datasets.run_spec import seed_of
 from scenarios.datasets.workers import Workers
 from scenarios.files.errors import ScenarioError
-from twin.truth import Parameter, read_trial
+from twin.truth import Parameter, read_parameters, read_trial
 
 BY_NAME = {task.name: task for task in TASKS}
 SMALL = (
@@ -147,6 +147,27 @@ def test_entries_are_scored_against_the_truth_and_tabulated(run, tmp_path, monke
     text = (tmp_path / "out" / "scores.md").read_text()
     assert "| mine | 3.46 | - | 3.46 |" in text
     assert text.index("| nominal |") < text.index("| mine |"), "the best of `all` is last"
+
+
+def test_a_urdf_with_zeros_is_scored_against_the_truth(run, tmp_path, monkeypatch):
+    """It has no covariance and no marker frames: no interval, frames registered."""
+    robot = frozen.Robot(0, "dead_zone", "", {})
+    monkeypatch.setattr(scoring, "runs", lambda tier, bench: [(robot, run)])
+    monkeypatch.setattr(scoring, "TASKS", (BY_NAME["geometry"], BY_NAME["all"]))
+    mine = entry(tmp_path / "mine", lambda task: true_poses(run, task))
+    for task in ("geometry", "all"):
+        (mine / task / "robot_00.nc").unlink()
+    (mine / "geometry" / "robot_00.urdf").write_text(run.dataset.urdf)
+    zeros = {p.name: p.value for p in read_parameters(run.folder / "truth" / "truth.json")}
+    lines = [f"arm_{k}_joint,{zeros[f'encoder.arm_{k}_joint.motor.offset']!r}" for k in range(1, 8)]
+    (mine / "geometry" / "robot_00.zeros.csv").write_text("\n".join(["joint,offset", *lines, ""]))
+    assert scoring.score([mine], tmp_path, tmp_path / "out", "quick", lambda *at: None) == (
+        "mine: nothing for all, robot_00",
+    )
+    figures = json.loads((tmp_path / "out" / "scores.json").read_text())["figures"]
+    found = {f["entry"]: f for f in figures if f["model"] in ("", "nominal")}
+    assert (found["mine"]["zeros_mrad"], found["mine"]["covered"]) == (pytest.approx(0.0, abs=1e-9), None)
+    assert 0.0 < found["mine"]["mm"] < 0.7 * found[""]["mm"]
 
 
 def test_a_rejected_file_costs_its_robot_only_and_is_named(run, tmp_path, monkeypatch):

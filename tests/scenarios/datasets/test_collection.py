@@ -298,6 +298,8 @@ def test_a_collection_is_read_lazily_with_numpy_and_xarray(recorded):
     with pytest.raises(ScenarioError, match="around_y"):
         runs[0].trial("nothing")
     assert list(recorded.runs("test")) == []
+    card = (recorded.folder / "datasheet.md").read_text()
+    assert "Splits are by robot" in card and "splits: 2 train" in card and "| marker_position |" in card
 
 
 def test_a_run_is_repeated_from_its_own_scenario(tmp_path, recorded):
