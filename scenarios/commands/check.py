@@ -99,7 +99,7 @@ def _json(path: Path) -> dict[str, Any]:
     content = read_json(path, "make it with tiago-twin evaluate")
     rows = content.get("rows", []) if isinstance(content, dict) else None
     if not isinstance(rows, list) or not all(_is_row(row) for row in rows):
-        raise ScenarioError(f"{path}: holds no results; make it with tiago-twin evaluate")
+        raise ScenarioError(f"{path}: contains no results; make them with tiago-twin evaluate")
     return content
 
 

@@ -196,13 +196,13 @@ def frames(results: Path) -> Table | None:
 
 
 def remarks(results: Path) -> list[str]:
-    """Return what an evaluation says of its trials and rows, to know before its figures are used."""
+    """Return an evaluation's findings on its trials and rows."""
     evaluation = json.loads((results / "evaluation.json").read_text(encoding="utf-8"))
     return [v["message"] for v in evaluation.get("verdicts", [])]
 
 
 def verdicts(found: Sequence[Any]) -> Table:
-    """Return the table of what each stage says of its own result."""
+    """Return the table of each stage's findings."""
     table = _table("stage", "verdict", "message")
     for verdict in found:
         table.add_row(*(escape(str(text)) for text in (verdict.stage, verdict.verdict, verdict.message)))

@@ -188,7 +188,7 @@ def evaluate(
 
 @app.command(epilog=_example("report runs/short"), rich_help_panel=_LOOK)
 def report(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, or an estimate.")]) -> None:
-    """Write report.html from what a run folder or an estimate holds."""
+    """Write report.html from a run folder or an estimate."""
     from scenarios import steps
     from scenarios.commands import console
 

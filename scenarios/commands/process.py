@@ -66,7 +66,7 @@ def base(  # noqa: PLR0913  an option each
             "part": name,
             "s": f"{s.seconds:.1f}",
             "hand [mm]": f"{1e3 * s.hand:.2f}",
-            "base that stays": f"{1e3 * s.still:.2f}",
+            "base at rest": f"{1e3 * s.still:.2f}",
             "about its mean": f"{1e3 * s.about_mean:.2f}",
             "yaw R2": f"{s.yaw_r2:.2f}",
             "yaw R2, mean off": f"{s.yaw_r2_about_mean:.2f}",

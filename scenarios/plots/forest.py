@@ -26,7 +26,7 @@ class Interval:
 
     @property
     def covers(self) -> bool:
-        """Whether the 95 % interval holds what it is compared with."""
+        """Whether the 95 % interval contains what it is compared with."""
         return abs(self.error) <= Z95 * self.sigma
 
 

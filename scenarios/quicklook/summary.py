@@ -1,4 +1,4 @@
-"""What one trial holds, in a few lines of figures: rates, holes, hidden markers, the plates' load, missing readings."""
+"""Content of one trial, in a few lines of figures: rates, holes, hidden markers, the plates' load, missing readings."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Looked:
 
 
 def looked_at(dataset: Dataset, entry: TrialEntry) -> Looked:
-    """Read a trial and say what it holds.
+    """Read a trial and state its content.
 
     Raises:
         InputError: The file cannot be read, or is not what dataset.json says.
@@ -142,7 +142,7 @@ def _at_rest(trial: Trial) -> Iterator[str]:
 
 
 def _felt(trial: Trial) -> Iterator[str]:
-    """What motors and wrist felt."""
+    """Efforts of motors, wrench at the wrist."""
     if not len(trial.t_robot):
         return
     known = np.isfinite(trial.effort).any(axis=0)

@@ -45,7 +45,7 @@ def _role(run_folder: Path, trial_id: str) -> str:
     """The session a trial belongs to."""
     for name in ("scenario.yaml", "dataset/dataset.json", "truth/trials"):
         if not (run_folder / name).exists():
-            raise ScenarioError(f"{run_folder}: holds no {name}; a picture is made of a run that was simulated here")
+            raise ScenarioError(f"{run_folder}: contains no {name}; pictures need a run simulated here")
     content = read_json(run_folder / "dataset" / "dataset.json")
     trials = content.get("trials") if isinstance(content, dict) else None
     roles = {str(t.get("id")): str(t.get("role")) for t in trials or () if isinstance(t, dict)}

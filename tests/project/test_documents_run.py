@@ -1,5 +1,6 @@
 """Every command and every Python block of a document runs, in its order, in an empty folder."""
 
+import json
 import os
 import re
 import subprocess
@@ -9,10 +10,32 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/tutorials.md", "docs/python.md")
-LANGUAGES = {"bash": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}
-
-pytestmark = pytest.mark.slow
+PAGES = ("README.md", *(f"docs/{p}.md" for p in "tutorials python geometry frames commands scale reality".split()))
+ELSEWHERE = {
+    "docs/recording.md": "tests/acceptance/test_recording_page.py",
+    "docs/benchmark.md": "tests/scenarios/benchmarks",
+    "CONTRIBUTING.md": "tests/project/test_recipes_twin.py",
+}
+FEWER = {  # the same commands on less data
+    r"-n (1000|200|50)\b": "-n 2",
+    r"=14,20,30\b": "=14,20",
+    r"(tiago-twin reality)\b": r"\1 -n 5",
+    r"(tiago-twin run humanoids2024)\b": r"\1 --quick",
+}
+DRIVER = """
+import json, subprocess, sys
+from pathlib import Path
+known = {"__name__": "__main__"}
+for language, block in json.load(sys.stdin):
+    print(block, file=sys.stderr, flush=True)
+    if language == "bash":
+        subprocess.run(["bash", "-euo", "pipefail", "-c", block], check=True)
+    elif "def test_" in block:
+        Path("test_block.py").write_text(block)
+        subprocess.run([sys.executable, "-m", "pytest", "-q", "test_block.py"], check=True)
+    else:
+        exec(compile(block, "block", "exec"), known)
+"""
 
 
 @pytest.fixture
@@ -22,22 +45,39 @@ def folder(tmp_path):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / ".venv").mkdir()
     (tmp_path / ".venv" / "bin").symlink_to(Path(sys.executable).parent)
+    log, table = (
+        ROOT / "tests/data" / f"{n}.csv" for n in ("vicon_forceplate_2023-09-20", "qualisys_2021-11-30_postures")
+    )
+    (tmp_path / log.name).symlink_to(log)
+    (tmp_path / "postures.csv").symlink_to(table)
+    head, *rows = table.read_text(encoding="utf-8").splitlines()
+    for name, part in (("day1", [r for k, r in enumerate(rows) if k % 4]), ("day2", rows[::4])):
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *part]) + "\n", encoding="utf-8")
     return tmp_path
 
 
-def commands(page):
-    """Blocks of a page, each with its language; targets of make have tests of their own."""
+def blocks(page):
+    """Blocks of a page, each with its language; targets of make have tests of their own, dask's programs too."""
     for language, block in re.findall(r"```(bash|python)\n(.*?)```", (ROOT / page).read_text(), re.DOTALL):
-        lines = block if language == "python" else re.sub(r"^make .*\n", "", block, flags=re.MULTILINE)
-        if lines.strip() and "def test_" not in lines:
-            yield language, lines
+        if language == "bash":
+            block = re.sub(r"^(make|dask) .*\n", "", block, flags=re.MULTILINE)
+            for pattern, fewer in FEWER.items():
+                block = re.sub(pattern, fewer, block)
+        if block.strip():
+            yield language, block
 
 
+def test_every_page_with_code_is_run_by_a_test():
+    found = (p.relative_to(ROOT).as_posix() for pattern in ("*.md", "docs/*.md") for p in ROOT.glob(pattern))
+    assert {page for page in found if list(blocks(page))} == {*PAGES, *ELSEWHERE}
+    assert all((ROOT / test).exists() for test in ELSEWHERE.values())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_every_line_of_a_page_runs(page, folder):
     bin_ = Path(sys.executable).parent
     environment = os.environ | {"PATH": f"{bin_}{os.pathsep}{os.environ['PATH']}", "MPLBACKEND": "Agg"}
-    for language, block in commands(page):
-        options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": 900}
-        done = subprocess.run([*LANGUAGES[language], block], **options)
-        assert done.returncode == 0, f"{block}\n{done.stdout[-500:]}\n{done.stderr[-2000:]}"
+    options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": 1800}
+    done = subprocess.run([sys.executable, "-c", DRIVER], input=json.dumps(list(blocks(page))), **options)
+    assert done.returncode == 0, f"{done.stdout[-500:]}\n{done.stderr[-3000:]}"

@@ -170,7 +170,7 @@ def _judged(direction: Direction) -> Verdict:
     """What the axes are worth on trials that were left out."""
     r2 = np.maximum(direction.held_out.r2, -9.99)
     worth = ", ".join(f"{a} {v:.2f}" for a, v in zip(_AXES, r2, strict=True))
-    message = f"from {direction.source}, left-out trials: R2 against a base that stays {worth}"
+    message = f"from {direction.source}, left-out trials: R2 against a base at rest {worth}"
     if direction.linear.any():
         linear = [a for a, is_linear in zip(_AXES, direction.linear, strict=True) if is_linear]
         message += f"; linear, as the 6x6 compliance has them: {', '.join(linear)}"

@@ -88,7 +88,7 @@ def refusal(springs: Springs, tried: HeldOut, reduced: HeldOut) -> str:
         return f"it drifts, its slowest mode takes {settling:.1f} s to settle"
     worse = _axes((tried.r2 < 0.0) & ~np.isnan(tried.explained))
     if worse:
-        return f"run forward it is worse than a base that stays along {worse}"
+        return f"run forward it is worse than a base at rest along {worse}"
     worse = _axes((tried.r2 < reduced.r2 - _WORSE) & ~np.isnan(tried.explained))
     if worse:
         return f"run forward it is worse than the compliance along {worse}"

@@ -159,7 +159,7 @@ def _judged(source: Source, tried: HeldOut) -> Verdict:
     """What the axes are worth."""
     listed = ", ".join(f"{a} {r2:.2f}" for a, r2 in zip(AXES, np.maximum(tried.r2, -9.99), strict=True))
     still = [a for a, moves in zip(AXES, tried.moves, strict=True) if not moves]
-    message = f"from {source}, left-out trials: R2 against a base that stays {listed}"
+    message = f"from {source}, left-out trials: R2 against a base at rest {listed}"
     if still:
         message += f"; left still: {', '.join(still)} (they slip, or do not move visibly)"
     return Verdict(STAGE, "ok" if tried.moves[3:5].all() else "warning", message)

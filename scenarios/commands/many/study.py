@@ -31,7 +31,7 @@ def study(  # noqa: PLR0913  an option each
         str | None, typer.Option(metavar="PATH=V1,V2,...", help="power: a value of the scenario and what it is set to.")
     ] = None,
     matched: Annotated[
-        bool, typer.Option("--matched", help="Robots that are what the geometric model says, without physics.")
+        bool, typer.Option("--matched", help="Robots that follow the geometric model exactly, without physics.")
     ] = False,
     workers: Workers = 0,
     scheduler: Scheduler = None,

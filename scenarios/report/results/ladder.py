@@ -90,7 +90,7 @@ def best_of_each(steps: Iterable[Step]) -> tuple[Step, ...]:
 
 
 def readable(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """The rows a boxplot can hold: every prediction, and of the oracles the ones with the base measured."""
+    """The rows of a boxplot: every prediction, and of the oracles the ones with the base measured."""
     return tuple(s for s in steps if s.encoder == "motor" or s.base == "measured")
 
 

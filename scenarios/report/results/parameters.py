@@ -72,7 +72,7 @@ class Known:
 
     @property
     def label(self) -> str:
-        """A short name for a figure; `+ 3` stands for three further terms."""
+        """A short name for a figure; `+ 3` means three further terms."""
         parts = [part.removesuffix("_joint") for part in self.name.split(".")[1:] if part != "motor"]
         if self.name.startswith("frame.") and len(parts) == 3:
             parts = [f"{parts[0]}→{parts[1]}", parts[2]]
@@ -135,9 +135,9 @@ def groups(found: Iterable[Known]) -> dict[tuple[str, str], list[Known]]:
 
 
 def coverage(found: Iterable[Known]) -> tuple[int, int]:
-    """How many 95 % intervals hold the truth, and of how many."""
-    held = [k.interval.covers for k in found]
-    return sum(held), len(held)
+    """How many 95 % intervals contain the truth, and of how many."""
+    inside = [k.interval.covers for k in found]
+    return sum(inside), len(inside)
 
 
 def left_out(score: Score | None, estimate: Estimate | None) -> dict[str, dict[str, int]]:

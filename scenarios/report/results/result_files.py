@@ -165,20 +165,20 @@ class Score(Entry):
 
 
 class Derived(Entry):
-    """What follows from the true parameters; K and C (6, 6), see `calibration.suspension`, None where nothing gives."""
+    """What follows from the true parameters; K and C (6, 6), see `calibration.suspension`, None where rigid."""
 
     K: tuple[tuple[float | None, ...], ...] | None = None
     C: tuple[tuple[float | None, ...], ...] | None = None
 
 
 class Truth(Entry):
-    """What a report says of truth.json."""
+    """What a report shows of truth.json."""
 
     derived: Derived = Derived()
 
 
 class ScenarioNote(Entry):
-    """What a report says of scenario.yaml."""
+    """What a report shows of scenario.yaml."""
 
     name: str = ""
     description: str = ""

@@ -1,4 +1,4 @@
-"""What a run folder holds, read for its report: every file but evaluation.json or an estimate may be missing."""
+"""Content of a run folder, read for its report: every file but evaluation.json or an estimate may be missing."""
 
 import hashlib
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Results:
         traces: Errors of each row in each trial, in the order of the file.
         score: Errors against the truth, where it is known.
         estimate: What the calibration found.
-        stiffness: The true K of the base on its wheels, where it is known; NaN where nothing gives.
+        stiffness: The true K of the base on its wheels, where it is known; NaN where rigid.
         damping: The true C.
         scenario: Name, seed and versions.
         dataset: The recordings.
@@ -69,7 +69,7 @@ def read(run: Path) -> Results:
     estimate = run if (run / "estimate.json").is_file() else run / "estimate"
     evaluated = evaluation.is_file()
     if not evaluated and not (estimate / "estimate.json").is_file():
-        raise ScenarioError(f"{run}: holds no evaluation.json; make it with tiago-twin evaluate, see its --help")
+        raise ScenarioError(f"{run}: contains no evaluation.json; make it with tiago-twin evaluate, see its --help")
     loaded = calibration.load(dataset) if (dataset / "dataset.json").is_file() else None
     trials = loaded.description.trials if loaded else ()
     truth = run / "truth" / "truth.json"

@@ -23,7 +23,7 @@ class RunView:
     """A run as its report orders it.
 
     Attributes:
-        results: What the run folder holds.
+        results: Content of the run folder.
         ladders: Rows by kind of trial, `dynamic` and `static`, else `all`.
         parameters: What the main model's data fix.
     """
@@ -78,7 +78,7 @@ class Section(Protocol):
 
 
 def run_view(results: Results) -> RunView:
-    """Order what a run folder holds."""
+    """Order the content of a run folder."""
     ladders = {trials: ladder(results, trials) for trials in ("dynamic", "static")}
     ladders = {trials: steps for trials, steps in ladders.items() if steps} or {"all": ladder(results, "all")}
     return RunView(results, ladders, known(results))

@@ -47,7 +47,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Structure:
-    """What the richest motion could tell of the wheels' stiffnesses: n of them, `rank` combinations, by their point."""
+    """What the richest motion identifies of the wheels' stiffnesses: n of them, `rank` combinations, by their point."""
 
     point: str
     n: int
@@ -66,7 +66,7 @@ class WheelCombination:
 
 @dataclass(frozen=True)
 class AxisLine:
-    """R2 of one axis of the base on left-out trials, against a base that stays, and whether it is moved, by source."""
+    """R2 of one axis of the base on left-out trials, against a base that does not move, and whether it is moved, by source."""
 
     axis: str
     found: tuple[tuple[float, bool], ...]

@@ -1,7 +1,7 @@
 """The base's motion in one held-out trial: measured by its markers, predicted by the suspension.
 
 x = (t, theta)  displacement of the base frame since the first second [mm, mrad], axes of the base at rest
-R2_a = 1 - sum (x - x_hat)_a^2 / sum x_a^2         zero is a base that stays; the first second does not count
+R2_a = 1 - sum (x - x_hat)_a^2 / sum x_a^2         zero is a base that does not move; the first second does not count
 """
 
 from collections.abc import Mapping

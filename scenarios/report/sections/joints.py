@@ -116,7 +116,7 @@ def _rms(x: np.ndarray) -> float:
 class JointLine:
     """What the joint model of one joint is: degree (none: no correction), rho [s/rad], R2, discrepancy rms [mrad].
 
-    `rho` says so where the search for it ended at a limit.
+    `rho` is marked where the search for it ended at a limit.
     """
 
     joint: str

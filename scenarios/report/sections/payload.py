@@ -1,4 +1,4 @@
-"""Rows of the ladder trial by trial, where trials differ by what the hand carries or by a push."""
+"""Rows of the ladder trial by trial, where trials differ by payload or by a push."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scenarios.report.results.traces import PUSH
 
 @dataclass(frozen=True)
 class LoadedTrial:
-    """A trial and what its hand carries [kg], None where that is not declared; whether it is pushed."""
+    """A trial and its payload [kg], None where that is not declared; whether it is pushed."""
 
     trial: str
     payload: float | None

@@ -96,7 +96,7 @@ class Slip:
 
 
 def line(one: Slipped) -> SlipLine:
-    """What the band of a trial holds."""
+    """Share of a trial inside the band."""
     rows = one.t > _REFERENCE
     seen, axes = rows & np.isfinite(one.measured[:, 0]), [one.axis(k) for _, _, k in _AXES]
     measured = np.stack([a.measured[seen] for a in axes], axis=1)

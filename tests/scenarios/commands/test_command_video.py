@@ -42,7 +42,7 @@ def test_what_is_written_has_the_ending_of_its_format(run_folder, tmp_path, caps
 
 def test_a_folder_that_is_no_simulated_run_is_told(tmp_path, capsys):
     assert exit_code(tmp_path, "--still", tmp_path / "a.png") == 2
-    assert "holds no scenario.yaml; a picture is made of a run that was simulated here" in capsys.readouterr().err
+    assert "contains no scenario.yaml; pictures need a run simulated here" in capsys.readouterr().err
 
 
 def test_an_unknown_trial_is_answered_with_those_there_are(run_folder, tmp_path, capsys):

@@ -282,7 +282,7 @@ def test_what_cannot_be_read_is_named(run, file, content, said):
 def test_neither_evaluation_nor_estimate_is_named(run):
     (run / "evaluation.json").unlink()
     (run / "estimate" / "estimate.json").unlink()
-    with pytest.raises(ScenarioError, match=r"holds no evaluation\.json"):
+    with pytest.raises(ScenarioError, match=r"contains no evaluation\.json"):
         write(run)
 
 

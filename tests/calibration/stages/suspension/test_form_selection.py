@@ -121,7 +121,7 @@ def test_a_printed_fit_that_cannot_be_used_is_refused():
     wrong[3, 3] = -50.0
     assert "damping" in not_positive(springs(K, wrong))
     slips, poor = judged([0.9] * 5 + [-20.0]), judged([0.9, 0.5] + [0.9] * 4)
-    assert "worse than a base that stays along rz" in refusal(springs(K, C), slips, good)
+    assert "worse than a base at rest along rz" in refusal(springs(K, C), slips, good)
     assert "worse than the compliance along y" in refusal(springs(K, C), poor, good)
 
 
