@@ -66,7 +66,7 @@ class WheelCombination:
 
 @dataclass(frozen=True)
 class AxisLine:
-    """R2 of one axis of the base on left-out trials, against a base that does not move, and whether it is moved, by source."""
+    """R2 of one axis of the base on left-out trials, against a base at rest, and whether it is predicted, by source."""
 
     axis: str
     found: tuple[tuple[float, bool], ...]

@@ -167,6 +167,7 @@ def test_parameters_stand_beside_their_truth_with_what_was_left_out(whole):
         "headline.svg",
         "joint.svg",
         "parameters.svg",
+        "residuals.svg",
         "traces.svg",
         "twin.png",
         "wheels.svg",
