@@ -41,6 +41,8 @@ from calibration.recording.trial import REST, Trial
 from calibration.stages.frames.base_rests import MOVES
 from calibration.verdict import Verdict
 
+_UNITS = 1e3  # [mm] of another unit, not of another robot
+
 Progress = Callable[[str, float], None]
 NOTHING = Estimate("calibrated", (), (), (), "")
 """An estimate without a model: the nominal robot is all there is."""
@@ -209,9 +211,8 @@ def of_another_robot(rows: tuple[Row, ...]) -> Iterator[Verdict]:
     nominal = max(mm.pop(NOMINAL, [np.inf]))
     for model, found in mm.items():
         if min(found) > nominal:
-            message = (
-                f"{model}: {min(found):.2f} mm, the nominal robot {nominal:.2f} mm; is it a calibration of this robot?"
-            )
+            question = "is it a calibration of this robot" if min(found) < _UNITS else "are its lengths in m"
+            message = f"{model}: {min(found):.2f} mm, the nominal robot {nominal:.2f} mm; {question}?"
             yield Verdict(STAGE, "warning", message)
 
 

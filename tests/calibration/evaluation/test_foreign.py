@@ -302,7 +302,16 @@ def test_matrices_that_are_no_poses_are_rejected(poses, tmp_path):
         read_submission(path)
 
 
-def test_calibrations_of_another_robot_are_warned_of(poses, dataset, tmp_path):
+def test_a_urdf_in_mm_is_warned_of(dataset, tmp_path):
+    text = re.sub(
+        r'xyz="(.*?)"', lambda m: f'xyz="{" ".join(str(1e3 * float(x)) for x in m[1].split())}"', dataset.urdf
+    )
+    (tmp_path / "mine.urdf").write_text(text)
+    messages = [v.message for v in evaluate(load_estimate(tmp_path / "mine.urdf"), dataset).verdicts]
+    assert any(m.startswith("mine: ") and m.endswith("are its lengths in m?") for m in messages), messages
+
+
+def test_calibrations_of_another_robot_are_warned_of(dataset, tmp_path):
     offsets = {f"arm_{k}_joint": 0.04 * (-1.0) ** k for k in range(1, 8)}
     zeros = [{"name": f"encoder.{joint}.motor.offset", "value": x} for joint, x in offsets.items()]
     found = {v.message for v in evaluate(written(tmp_path, mine=zeros), dataset).verdicts}
