@@ -20,6 +20,7 @@ from calibration.design.next_postures import record_next
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
 from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.estimate.rows import MAIN
+from calibration.inference.parameters import widened
 from calibration.mocap.dwells import resting
 from calibration.mocap.labels import relabelled_trials
 from calibration.mocap.measured_trial import MeasuredTrial
@@ -37,6 +38,7 @@ from calibration.stages.frames.base_stage import BASE_FRAME
 from calibration.stages.geometry.cross_validation import cross_validated
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.registration import REGISTRATION
+from calibration.stages.geometry.remounted import remounted
 from calibration.stages.geometry.rows import GEOMETRY
 from calibration.stages.joints.correction import JointModels
 from calibration.stages.joints.stage import JOINTS
@@ -183,7 +185,8 @@ def _changed(data: StageInput) -> Iterator[Verdict]:
     hand = hand_of(model, data.lab.chain, data.lab.nominal_frames)
     yield from wrong_mounts(hand, model, data.lab.description)
     left = unexplained(hand, model, passed(trials, robot))
-    yield from changes(left, data.lab.description, [t.id for t in trials])
+    changed = [*changes(left, data.lab.description, [t.id for t in trials])]
+    yield from changed or remounted(hand, model, data.static, data.lab.description)
     yield from exchanged_sides(left, data.lab.description)
 
 
@@ -210,8 +213,11 @@ def _with_plans(context: Context, wanted: set[str]) -> Context:
 
 
 def _concluded(context: Context) -> Estimate:
-    """Whether the estimate may be used, and by which row."""
+    """Whether the estimate may be used, and by which row; intervals include what warnings say may have moved."""
     estimate = context.estimate
+    moved = [direction for v in estimate.verdicts if v.verdict == "warning" for direction in v.moves]
+    if moved:
+        estimate = replace(estimate, models=tuple(widened(m, moved) for m in estimate.models))
     names = [m.name for m in estimate.models]
     rows = (
         MAIN if _bundled(estimate) or not context.data.moving else MAIN[1:]

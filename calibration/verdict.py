@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
+Direction = tuple[tuple[str, float], ...]
+"""Parameters by name, and how far one cause may have moved them together: a standard deviation each [their unit]."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -12,8 +15,10 @@ class Verdict:
         stage: Name of the stage.
         verdict: `ok`; `warning`, usable with care; `missing`, data for it were not there; `refused`, must not be used.
         message: What was found and what to do.
+        moves: Of a warning, what its cause may have moved; intervals include it, see `inference.parameters.widened`.
     """
 
     stage: str
     verdict: Literal["ok", "warning", "missing", "refused"]
     message: str
+    moves: tuple[Direction, ...] = ()

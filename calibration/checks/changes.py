@@ -24,7 +24,7 @@ from calibration.numerics.lie import adjoint, inverse
 from calibration.recording.schema import Description
 from calibration.robot.blocks import Frames
 from calibration.robot.hand import HandModel
-from calibration.verdict import Verdict
+from calibration.verdict import Direction, Verdict
 
 STAGE = "reading"
 _FEWEST = 30  # samples
@@ -48,6 +48,8 @@ class Change:
         limit: (g,) sizes that are explained otherwise.
         unit: In which a single one is written.
         factor: Of that unit.
+        moves: Parameters that are as much off on one side of the change, one for each size.
+        each: What a unit of the size moves them [-].
     """
 
     text: str
@@ -55,6 +57,12 @@ class Change:
     limit: np.ndarray
     unit: str = ""
     factor: float = 1e3
+    moves: tuple[str, ...] = ()
+    each: float = 1.0
+
+    def moved(self, value: np.ndarray) -> Direction:
+        """What a size (g,) may have moved."""
+        return tuple((name, self.each * float(x)) for name, x in zip(self.moves, value, strict=True))
 
     def size(self, value: np.ndarray) -> str:
         """A size (g,) as it is written."""
@@ -65,8 +73,11 @@ class Change:
 
 def changes(left: Unexplained, description: Description, ids: Sequence[str]) -> Iterator[Verdict]:
     """The change that explains the residuals of a calibration's trials best, if it is one; `ids` are their names."""
-    for message, over in _best(left, _possible(left, description, ids)):
-        yield Verdict(STAGE, "refused" if over > _WRONG else "warning", f"{message}; correct it, or record again")
+    for message, over, moved in _best(left, _possible(left, description, ids)):
+        if over > _WRONG:
+            yield Verdict(STAGE, "refused", f"{message}; correct it, or record again")
+        else:
+            yield Verdict(STAGE, "warning", f"{message}; intervals include it; correct it, or record again", (moved,))
 
 
 def constants(left: Unexplained, description: Description, trial: str) -> Iterator[Verdict]:
@@ -75,21 +86,23 @@ def constants(left: Unexplained, description: Description, trial: str) -> Iterat
         message = f"{trial}: the hand is {1e3 * left.rms:.0f} mm (rms) from where the calibrated robot has it"
         yield Verdict(STAGE, "warning", f"{message}: labels, base markers, clocks, or another robot or session?")
     always = [("", np.ones(len(left.x.t)))]
-    for message, _ in _best(left, _otherwise(left, description, always)):
+    for message, *_ in _best(left, _otherwise(left, description, always)):
         yield Verdict(STAGE, "warning", f"{trial}: against the calibration, {message}; its errors are not the model's")
 
 
-def _best(left: Unexplained, possible: Iterable[Change]) -> Iterator[tuple[str, float]]:
-    """What explains the residuals best, and how many times it exceeds what is explained otherwise."""
+def _best(left: Unexplained, possible: Iterable[Change]) -> Iterator[tuple[str, float, Direction]]:
+    """What explains the residuals best, how many times it exceeds what is explained otherwise, and what it moves."""
     if len(left.x.t) < _FEWEST:
         return
-    best, found = 0.0, ("", 0.0)
+    best: float = 0.0
+    found: tuple[str, float, Direction] = ("", 0.0, ())
     for change in possible:
         value, S, gain = left.fitted(change.columns, len(change.limit))
         square = float(value @ np.linalg.solve(S, value))
         over = float(np.abs(value / change.limit).max())
         if square > _CLEAR * chi2.isf(_CHANCE, len(value)) and over > 1.0 and gain > best:
-            best, found = gain, (f"{change.text} by {change.size(value)} (+- {100.0 / np.sqrt(square):.0f} %)", over)
+            text = f"{change.text} by {change.size(value)} (+- {100.0 / np.sqrt(square):.0f} %)"
+            best, found = gain, (text, over, change.moved(value))
     if best > 0.0:
         yield found
 
@@ -107,7 +120,17 @@ def wrong_mounts(hand: HandModel, model: Model, description: Description) -> Ite
                 f"{np.degrees(np.linalg.norm(off[3:])):.1f} deg from where they are drawn on {body.link}, {over:.0f} "
                 "times the tolerance: correct the drawing or the placement in dataset.json"
             )
-            yield Verdict(STAGE, "refused" if over > 1.5 * _MOUNTED else "warning", message)
+            pulled = _pulled(model, names, off, np.repeat([tol.body_translation, tol.body_rotation], 3))
+            yield Verdict(STAGE, "refused" if over > 1.5 * _MOUNTED else "warning", message, (pulled,))
+
+
+def _pulled(model: Model, names: Sequence[str], off: np.ndarray, tolerance: np.ndarray) -> Direction:
+    """How far a prior off by `off` (6,) moves all parameters: S[:, names] off / tolerance^2."""
+    every = [p.name for p in model.parameters]
+    known = [k for k, name in enumerate(names) if name in every]
+    columns = [every.index(names[k]) for k in known]
+    shift = model.random_covariance[:, columns] @ (off / tolerance**2)[known]
+    return tuple(zip(every, map(float, shift), strict=True))
 
 
 def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Verdict]:
@@ -143,8 +166,10 @@ def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -
         centred = (q - q.mean())[:, None, None]
         if (spread := float(centred.std())) > 10.0 * play:
             limit = np.array([play / spread])
-            yield Change(f"readings of {name} are off in scale", J[:, :, j, None] * centred, limit, "%", 100.0)
-        yield Change(f"readings of {name} drift", J[:, :, j, None] * ago[:, None, None], np.array([2.0 * play]), unit)
+            moves = (_zero(name),), spread
+            yield Change(f"readings of {name} are off in scale", J[:, :, j, None] * centred, limit, "%", 100.0, *moves)
+        columns, limit = J[:, :, j, None] * ago[:, None, None], np.array([2.0 * play])
+        yield Change(f"readings of {name} drift", columns, limit, unit, moves=(_zero(name),))
     yield from _otherwise(left, description, [(_when(x, ids, m), (x.t >= m).astype(float)) for m in moments])
 
 
@@ -154,22 +179,28 @@ def _otherwise(
     """What may be otherwise in the samples of each step (n,) of 0 and 1."""
     hand, x, J, tol = left.hand, left.x, left.J, description.tolerances
     mount = np.repeat([0.4 * tol.body_translation, 0.4 * tol.body_rotation], 3)
-    in_base = adjoint(inverse(x.T))
+    in_base, frames = adjoint(inverse(x.T)), hand.block(Frames).names
     for when, step in steps:
         rows = step[:, None, None]
         for j, name in enumerate(hand.nominal.joints):
             play, unit = _play(left, description, j)
-            yield Change(f"readings of {name} slipped{when}", J[:, :, j, None] * rows, np.array([play]), unit)
+            columns, moves = J[:, :, j, None] * rows, (_zero(name),)
+            yield Change(f"readings of {name} slipped{when}", columns, np.array([play]), unit, moves=moves)
         yield _late(left, when, step)
-        yield Change(f"markers of the hand are elsewhere{when}", np.eye(6) * rows, mount)
-        yield Change(f"markers of the base are elsewhere{when}", in_base * rows, mount)
+        yield Change(f"markers of the hand are elsewhere{when}", np.eye(6) * rows, mount, moves=frames[6:])
+        yield Change(f"markers of the base are elsewhere{when}", in_base * rows, mount, moves=frames[:6])
 
 
 def _late(left: Unexplained, when: str, step: np.ndarray) -> Change:
     """Readings that come late; a link behind backlash does so as well, by a constant angle against the motion."""
     v = left.x.v[:, None, left.hand.nominal.columns]
     late, behind = -(left.J * v).sum(axis=2, keepdims=True) * step[:, None, None], left.J * np.tanh(v / _SLOW)
-    return Change(f"readings are late{when}", np.concatenate([late, behind], axis=2), np.array([_LATE]), "ms")
+    columns, limit = np.concatenate([late, behind], axis=2), np.array([_LATE])
+    return Change(f"readings are late{when}", columns, limit, "ms", moves=("clock.robot.offset",))
+
+
+def _zero(joint: str) -> str:
+    return f"encoder.{joint}.motor.offset"
 
 
 def _play(left: Unexplained, description: Description, j: int) -> tuple[float, str]:

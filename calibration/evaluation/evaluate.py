@@ -15,6 +15,7 @@ import numpy as np
 
 from calibration.checks.plates import moved_by
 from calibration.errors import NotEnoughData
+from calibration.estimate.drawings import redrawn
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.rows import NOMINAL
 from calibration.evaluation.bands import Bands, place_noise
@@ -93,6 +94,8 @@ def evaluate(
     read = tuple(recorded(dataset, entry) for entry in entries)
     remarks = (*check_names(estimate, dataset), *believable(dataset, role, read))
     estimate = estimate if estimate.registered else registered(estimate, dataset)
+    estimate, redrawn_bodies = redrawn(estimate, dataset.description)
+    remarks += redrawn_bodies
     predict, report = predictor(estimate, dataset), progress or (lambda at, share: None)
     remarks += tuple(departures(estimate, dataset, predict.robot, read)) if role == "validation" else ()
     scored = tuple(

@@ -1,12 +1,13 @@
 """Parameters with their priors, and models as tables of estimated parameters."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from calibration.inference.absorption import Absorption
+from calibration.verdict import Direction
 
 Status = Literal["estimated", "combined", "not_identifiable"]
 
@@ -89,6 +90,29 @@ class Model:
     def value(self, name: str, default: float) -> float:
         """Estimate of a parameter, `default` where the model has none of that name."""
         return next((p.value for p in self.parameters if p.name == name), default)
+
+
+def widened(model: Model, directions: Iterable[Direction]) -> Model:
+    """The model with errors that the data do not show: S + sum_d c_d c_d', c_d (p,) one standard deviation of each."""
+    index = {p.name: k for k, p in enumerate(model.parameters)}
+    S = model.covariance.copy()
+    known = [[(index[name], size) for name, size in direction if name in index] for direction in directions]
+    if not any(known) or S.shape != (len(index), len(index)):
+        return model
+    C = np.zeros((len(index), len(known)))
+    for k, direction in enumerate(known):
+        for i, size in direction:
+            C[i, k] += size
+    sigma = np.hypot([p.sigma for p in model.parameters], np.linalg.norm(C, axis=1))
+    return replace(
+        model,
+        parameters=tuple(replace(p, sigma=float(s)) for p, s in zip(model.parameters, sigma, strict=True)),
+        combinations=tuple(
+            replace(c, sigma=float(np.hypot(c.sigma, np.linalg.norm(c.coefficients @ C)))) for c in model.combinations
+        ),
+        covariance=S + C @ C.T,
+        random=model.random if len(model.random) else S,
+    )
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration.errors import NotEnoughData
+from calibration.estimate.drawings import redrawn
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.rows import row_of
 from calibration.inference.parameters import Model
@@ -52,6 +53,7 @@ def on_another_day(estimate: Estimate, folder: Path, register: int = 0) -> Estim
         clocks = synchronise(Laboratory(dataset.urdf, dataset.description), trials)[0] if trials else ()
     except NotEnoughData:
         clocks = ()
+    estimate, _ = redrawn(estimate, dataset.description)
     today = replace(estimate, clocks=clocks, laboratory=dataset.description.alone)
     postures = registration_trials(dataset)
     if not postures:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calibration.errors import NotCalibrated
+from calibration.estimate.drawings import redrawn
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.rows import LADDER, PARTS
 from calibration.mocap.labels import relabelled_trial
@@ -68,7 +69,7 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
 
 def predict(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[PredictedTrial]:
     """Every trial of a role, read once and predicted by every row."""
-    prepared = predictor(estimate, dataset)
+    prepared = predictor(redrawn(estimate, dataset.description)[0], dataset)
     for entry in dataset.entries(role):
         if dataset.has_means(entry):
             means = dataset.read_means(entry)
