@@ -21,6 +21,7 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body
 from calibration.recording.trial import Trial
 
+_WHOLE, _MANY = 50, 400  # samples that show a cluster's shape, at least; of which so many are looked at
 _FLAT = 1e-6  # second singular value of a cluster over its first [-] below which it is a line
 
 
@@ -56,6 +57,22 @@ def body_poses(xyz: np.ndarray, positions: np.ndarray) -> BodyPoses:
     return BodyPoses(T, np.where(seen[..., None], positions, np.nan) - fitted, covariance)
 
 
+def poses_as_seen(xyz: np.ndarray, positions: np.ndarray, every: np.ndarray) -> BodyPoses:
+    """Poses from positions (n, m, 3) [m, lab] by the shape that a trial's samples `every` (k, m, 3) show.
+
+    The shape is that of the samples with all markers, laid upon the drawing xyz (m, 3) [m, body]: a pose from some of
+    the markers is the one that all of them would show, however far the drawing is off. Residuals are from the drawing,
+    which is the shape where no marker is ever hidden, or too few samples show all.
+    """
+    whole = np.flatnonzero(np.isfinite(every).all(axis=(1, 2)))
+    if len(whole) < _WHOLE or len(whole) == len(every):
+        return body_poses(xyz, positions)
+    shown = body_poses(xyz, every[whole[:: max(1, len(whole) // _MANY)]])
+    off = np.median(np.einsum("nji,nmj->nmi", shown.T[:, :3, :3], shown.residual), axis=0)
+    found = body_poses(xyz + off, positions)
+    return replace(found, residual=found.residual + np.einsum("nij,mj->nmi", found.T[:, :3, :3], off))
+
+
 def poses_of(body: Body, trial: Trial) -> BodyPoses:
     """Poses of a marker body throughout a trial, at its `t_mocap`; a body without markers is the positions' own frame.
 
@@ -68,8 +85,8 @@ def poses_of(body: Body, trial: Trial) -> BodyPoses:
     markers = [m for m in body.markers if m.name in recorded]
     if len(markers) < 3:
         raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {[m.name for m in markers]} are recorded")
-    columns = [recorded[m.name] for m in markers]
-    return body_poses(np.array([m.xyz for m in markers]), trial.marker_position[:, columns])
+    positions = trial.marker_position[:, [recorded[m.name] for m in markers]]
+    return poses_as_seen(np.array([m.xyz for m in markers]), positions, positions)
 
 
 def poses_of_means(body: Body, means: PostureMeans) -> BodyPoses:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import BodyPoses, body_poses, point_of_means, poses_of_means, still_poses
+from calibration.mocap.cluster_pose import BodyPoses, point_of_means, poses_as_seen, poses_of_means, still_poses
 from calibration.mocap.dwells import inner_windows
 from calibration.mocap.measured_trial import MeasuredTrial, hand_covariance
 from calibration.numerics.lie import compose, inverse, skew, to_vector
@@ -204,7 +204,7 @@ def mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
     for k, rows in enumerate(groups):
         often = seen[rows].sum(axis=0) > _SEEN * len(rows)
         means[k, often] = np.nanmean(p[rows][:, often], axis=0)
-    return body_poses(xyz, means)
+    return poses_as_seen(xyz, means, p)
 
 
 def inflation(quarters: np.ndarray, unit: np.ndarray) -> float:
