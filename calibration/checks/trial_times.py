@@ -29,18 +29,24 @@ def wrong_dwells(trials: Sequence[MeasuredTrial]) -> Iterator[Verdict]:
 
 
 def holes(trials: Sequence[MeasuredTrial]) -> Iterator[Verdict]:
-    """Trials in which an instrument lost samples."""
+    """Trials in which an instrument, or one joint's encoder, lost samples."""
     for trial in trials:
         for name, what in _CLOCKS:
-            t = getattr(trial, name)
-            steps = np.diff(t)
-            long = np.flatnonzero(steps > _LONG)
-            if len(long):
-                k = int(long[np.argmax(steps[long])])
-                message = (
-                    f"{trial.id}: {len(long)} holes in the {what}, the longest {steps[k]:.2f} s after {t[k]:.2f} s"
-                )
-                yield Verdict(STAGE, "warning", f"{message} of their clock; what was lost is not used")
+            yield from _hole(trial.id, what, getattr(trial, name), "what was lost is not used")
+        for name, read in zip(trial.joint, np.isfinite(trial.q_link).T, strict=True):
+            if read.any() and not read.all():
+                t = np.unique([trial.t_robot[0], *trial.t_robot[read], trial.t_robot[-1]])
+                yield from _hole(trial.id, f"joint readings of {name}", t, "its joint models lose that time")
+
+
+def _hole(trial: str, what: str, t: np.ndarray, cost: str) -> Iterator[Verdict]:
+    """Samples at t (n,) [s] that are too far apart."""
+    steps = np.diff(t)
+    long = np.flatnonzero(steps > _LONG)
+    if len(long):
+        k = int(long[np.argmax(steps[long])])
+        message = f"{trial}: {len(long)} holes in the {what}, the longest {steps[k]:.2f} s after {t[k]:.2f} s"
+        yield Verdict(STAGE, "warning", f"{message} of their clock; {cost}")
 
 
 def listed_twice(entries: Sequence[TrialEntry]) -> Iterator[str]:

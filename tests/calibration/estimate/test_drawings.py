@@ -1,6 +1,5 @@
 """The same markers drawn in other axes are the same cluster."""
 
-
 import numpy as np
 import pytest
 
@@ -16,7 +15,9 @@ def drawn_by(description, name, change):
 
     def other(body):
         xyz = change(np.array([m.xyz for m in body.markers]))
-        markers = tuple(m.model_copy(update={"xyz": tuple(map(float, x))}) for m, x in zip(body.markers, xyz))
+        markers = tuple(
+            m.model_copy(update={"xyz": tuple(map(float, x))}) for m, x in zip(body.markers, xyz, strict=True)
+        )
         return body.model_copy(update={"markers": markers})
 
     bodies = tuple(other(b) if b.name == name else b for b in description.bodies)

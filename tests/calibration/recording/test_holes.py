@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 import mjcf
+from calibration.checks.trial_times import holes
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import even
 from calibration.recording.holes import without_holes
 from calibration.robot.laboratory import Laboratory
@@ -22,6 +24,21 @@ def test_lost_samples_leave_holes_and_a_whole_trial_is_itself(truth):
     np.testing.assert_array_equal(found.t_plate, np.delete(trial.t_plate, np.r_[100:300]))
     assert np.isfinite(found.q_motor).all() and np.isfinite(found.plate_wrench).all()
     assert np.isnan(found.marker_position[7, 2]).all() and np.isfinite(found.marker_position).sum() == p.size - 3
+
+
+def test_a_joint_lost_where_its_link_is_read_costs_that_joint_alone(truth):
+    trial = rigid_robot.record(truth, rigid_robot.sweep(3, seconds=6.0), 12.0, np.random.default_rng(0))
+    trial = replace(trial, q_link=trial.q_motor - 0.1)
+    q, j = trial.q_motor.copy(), 4
+    q[200:400, j] = np.nan
+    found = without_holes(replace(trial, q_motor=q))
+    np.testing.assert_array_equal(found.t_robot, trial.t_robot)
+    np.testing.assert_allclose(found.q_motor, trial.q_motor, atol=1e-12)
+    lost = np.isnan(found.q_link) & np.isfinite(trial.q_link)
+    np.testing.assert_array_equal(np.argwhere(lost), [(k, j) for k in range(200, 400)])
+    lab = MeasuredTrial.of(Laboratory(mjcf.urdf(), rigid_robot.described()).description, found)
+    (said,) = (v.message for v in holes([lab]))
+    assert f"holes in the joint readings of {trial.joint[j]}, the longest 2.01 s" in said
 
 
 def test_nothing_swings_across_a_hole():
