@@ -115,6 +115,26 @@ def replaced(path: str, old: str, new: str, count: int = 1) -> Callable[[Path], 
     return spoil
 
 
+def pipe(path: str) -> Callable[[Path], None]:
+    """Put a pipe in place of a file."""
+
+    def spoil(folder: Path) -> None:
+        (folder / path).unlink()
+        os.mkfifo(folder / path)
+
+    return spoil
+
+
+def linked(path: str, to: str) -> Callable[[Path], None]:
+    """Put a link in place of a file."""
+
+    def spoil(folder: Path) -> None:
+        (folder / path).unlink()
+        (folder / path).symlink_to(to)
+
+    return spoil
+
+
 def _ours(path: str) -> bool:
     return path.partition("/")[0] in ("out", ".config", ".cache")
 

@@ -27,7 +27,7 @@ _COLUMNS = (
     "kind", "cases", "refused by name", "done", "tracebacks or crashes", "written outside", "other faults",
     "most memory [MB]", "longest [s]",
 )  # fmt: skip
-_TABLES = ("files", "folders", "wrong_data")
+_TABLES = ("datasets", "results_and_tables", "folders", "wrong_data")
 
 
 def tables() -> Iterator[tuple[str, Sequence[Case]]]:

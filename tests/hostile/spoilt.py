@@ -10,7 +10,8 @@ from calibration import Estimate, calibrate, load
 from calibration.errors import CalibrationError
 from calibration.evaluation.evaluate import evaluate
 from calibration.recording.dataset import Dataset
-from tests.hostile.wrong_data import Campaign, Mistake
+from tests.hostile.campaign import Campaign
+from tests.hostile.wrong_data import Mistake
 
 STAGES = ("registration", "geometry")
 ROW = "model_2"

@@ -8,8 +8,9 @@ from calibration.checks import judged
 from calibration.mocap import relabelled_trials
 from calibration.robot.laboratory import Laboratory
 from tests.doubles import rigid_robot
+from tests.hostile.campaign import Campaign
 from tests.hostile.spoilt import reference_of, tried
-from tests.hostile.wrong_data import FAST, TABLE, VALIDATION, Campaign, drawn
+from tests.hostile.wrong_data import FAST, TABLE, VALIDATION, drawn
 
 DRAWN, ALLOWED = 300, 3
 
