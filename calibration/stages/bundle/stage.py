@@ -126,9 +126,9 @@ def _run(data: StageInput) -> StageResult:
 
 
 def _lacks(data: StageInput) -> str:
-    if data.clock("robot") is None:
+    if not data.trials:
         return "posture means show no motion; record motor and link readings continuously"
-    return has_postures(data)
+    return has_postures(data) or ("" if data.clock("robot") else "no readings on a known clock")
 
 
 BUNDLE = Stage(STAGE, _run, _lacks, needs="geometry")

@@ -79,6 +79,7 @@ def test_an_arm_is_calibrated_by_poses(lab):
     assert estimate.calibrated and estimate.model("model_2").rank == 30
     (said,) = [v.message for v in estimate.verdicts if "left-out postures" in v.message]
     error, base = (float(said.split(word)[1].split()[0]) for word in ("left-out postures ", "registration "))
+    assert [v.verdict for v in estimate.verdicts if "twice as many postures would leave 0." in v.message] == ["ok"]
     assert error < 0.8 < base  # sqrt(3) 0.2 mm of noise in what is compared, some in the fit
 
 
