@@ -178,7 +178,8 @@ def _worth_looking_at(model: Model) -> tuple[Verdict, ...]:
 def _more(mine: LeftOut) -> Verdict:
     """What more postures are worth at least.
 
-    With p parameters and n postures the squares of residual and error are s^2 (1 - p / n) and s^2 (1 + p / n). From halves of 37 postures of a real robot it expects 3.1 mm; 2.1 are left.
+    With p parameters and n postures the squares of residual and error are s^2 (1 - p / n) and s^2 (1 + p / n).
+    From halves of 37 postures of a real robot this expects 3.1 mm; 2.1 are left.
     """
     twice = np.sqrt(0.25 * mine.residual**2 + 0.75 * mine.rmse**2)
     message = f"to record next: twice as many postures would leave {1e3 * twice:.2f} mm or less"
