@@ -3,7 +3,7 @@
 Arrays are nested lists, NaN is null. A class needs no code of its own to stand in estimate.json.
 """
 
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -58,7 +58,8 @@ def _restored(kind: Any, value: Any) -> Any:
         return tuple(_restored(k, x) for k, x in zip(kinds, value, strict=True))
     if is_dataclass(kind):
         hints = get_type_hints(kind)
-        return kind(**{f.name: _restored(hints[f.name], value[f.name]) for f in fields(kind) if f.init})  # type: ignore[operator]
+        given = [f for f in fields(kind) if f.init and (f.name in value or f.default_factory is MISSING)]
+        return kind(**{f.name: _restored(hints[f.name], value[f.name]) for f in given})  # type: ignore[operator]
     if origin is Literal and value not in arguments:
         raise ValueError(f"{value!r} is none of {arguments}")
     return value

@@ -7,7 +7,7 @@ the action on the floor; its first second is the rest it changes from. A recordi
 back; sample by sample the wrench is taken as it comes, and the springs' modes are carried from one to the next.
 
 Variances of x are what the suspension left of trials it had not seen, of each axis; of a base taken to stand still,
-what those trials moved. Both less the noise of motion capture.
+what the one of those trials moved that moved most. Both less the noise of motion capture.
 
 Where the base's markers are in a trial, predicted: its first second and a wrench, nothing else.
 
@@ -98,7 +98,7 @@ class LoadedBase:
     def covariance(self, T_base_hand: np.ndarray, moves: bool) -> np.ndarray:
         """Covariance (n, 6, 6) that the base adds to the hand's local twist, at T_base_hand (n, 4, 4)."""
         tried = dict(self.suspension.held_out).get("plate") or self.suspension.held_out[0][1]
-        return self.carried(tried.variance(tried.moves & moves), T_base_hand)
+        return self.carried(tried.variance(tried.moves) if moves else tried.still, T_base_hand)
 
     def carried(self, variance: np.ndarray, T_base_hand: np.ndarray) -> np.ndarray:
         """Covariance (n, 6, 6) of the hand's local twist by variances (6,) or (n, 6) of displacements in frame 0."""

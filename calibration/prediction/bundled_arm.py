@@ -6,7 +6,8 @@
         J_joint diag(V + (sigma_c tau)^2) J_joint' + J_column diag((sigma_b M)^2) J_column'
 
 V that of `LinkAngles`, with the readings' random error as the hand's markers showed it where that is more than what
-link encoders showed; sigma_c, sigma_b the standard deviations of the meshes' and the column's compliance.
+link encoders showed; of a joint at rest at least what they showed in dwells. sigma_c, sigma_b are the standard
+deviations of the meshes' and the column's compliance.
 
 The base is taken to be level and at rest. Readings of which no motion is known are each taken to be at rest: the load
 decides the side of a mesh, else the link is anywhere in what friction holds.
@@ -23,6 +24,8 @@ from calibration.stages.drive_trains.column_bending import ColumnBending, moved
 from calibration.stages.drive_trains.drive_trains import DriveTrains, Stream, StreamState, stream_of
 from calibration.stages.drive_trains.torques import LinkLoads
 
+_RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
+
 
 @dataclass(frozen=True)
 class ArmPositions:
@@ -33,12 +36,14 @@ class ArmPositions:
         variance: (n, k) of them [rad2]; 0 of joints without a drive train.
         moment: (n, 2) on the column [N.m].
         torque: (n, k) on the joints [N.m, N].
+        rests: (n, k) whether a joint is at rest.
     """
 
     q: np.ndarray
     variance: np.ndarray
     moment: np.ndarray
     torque: np.ndarray
+    rests: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -65,10 +70,12 @@ class BundledArm:
     Attributes:
         trains: With the payload in the hand.
         bending: Of the column.
+        rest_sigma: (k,) rms error of each joint's angle in dwells [rad]; 0 where not known.
     """
 
     trains: DriveTrains
     bending: ColumnBending
+    rest_sigma: np.ndarray
 
     def along(self, t: np.ndarray, q_motor: np.ndarray, velocity: np.ndarray | None = None) -> ArmPositions:
         """Of readings q_motor (n, k) [rad, m] at t (n,) [s]; velocity (n, k) where it is known.
@@ -84,14 +91,15 @@ class BundledArm:
             found = robot.evaluated(q_motor, velocity, a, None, True)
             loads = LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
         angles = self.trains.of_loads(loads)
-        return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque)
+        return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < _RESTS)
 
     def at_rest(self, q_motor: np.ndarray) -> ArmPositions:
         """Of readings (n, k) at rest, each for itself."""
         still = np.zeros(q_motor.shape[1])
         found = [self._stream.begin(0.0, q, still, still)[1] for q in q_motor]
         q, variance = (np.array([getattr(f, name)[0] for f in found]) for name in ("q", "variance"))
-        return ArmPositions(q, variance, *self._loads(q_motor, np.zeros_like(q_motor), np.zeros_like(q_motor)))
+        loads = self._loads(q_motor, np.zeros_like(q_motor), np.zeros_like(q_motor))
+        return ArmPositions(q, variance, *loads, np.ones(q.shape, dtype=bool))
 
     def stepped(self, t: float, q_motor: np.ndarray, velocity: np.ndarray | None, before: ArmState | None) -> ArmState:
         """One sample q_motor (k,) on; accelerations are differences of the velocities (k,).
@@ -106,7 +114,7 @@ class BundledArm:
                 a = (v - before.v) / (t - before.drives.t)
             drives, angles = self._stream.step(before.drives, t, q_motor, v, a)
         loads = self._loads(q_motor[None], v[None], a[None])
-        return ArmState(v, a, drives, ArmPositions(angles.q, angles.variance, *loads))
+        return ArmState(v, a, drives, ArmPositions(angles.q, angles.variance, *loads, np.abs(v[None]) < _RESTS))
 
     def bends(self, hand: HandModel, positions: ArmPositions) -> np.ndarray:
         """Q (n, 4, 4) in the base's marker body."""
@@ -123,7 +131,8 @@ class BundledArm:
         residual = {train.joint: train.residual for train in self.trains.trains}
         driven = np.isin(hand.chain.joints, list(residual))
         unseen = reading_sigma**2 - np.array([residual.get(joint, 0.0) for joint in hand.chain.joints]) ** 2
-        own, torque = (x[:, hand.chain.columns] for x in (positions.variance, positions.torque))
+        own, torque, rests = (x[:, hand.chain.columns] for x in (positions.variance, positions.torque, positions.rests))
+        own = np.maximum(own, np.where(rests, self.rest_sigma[hand.chain.columns] ** 2, 0.0))
         return np.where(driven, own + np.maximum(unseen, 0.0) + (sigma * torque) ** 2, reading_sigma**2)
 
     def column_covariance(self, hand: HandModel, positions: ArmPositions, T_base_hand: np.ndarray) -> np.ndarray:

@@ -120,7 +120,7 @@ class Compensator:
         if parts is None or laboratory is None or not parts.trains or not row_of(estimate.main).bundle:
             return self
         robot = BundledRobot.of(self.hand, parts, urdf, laboratory)
-        arm, slipping = BundledArm(robot.trains.carrying(payload), robot.bending), None
+        arm, slipping = BundledArm(robot.trains.carrying(payload), robot.bending, robot.at_rest), None
         if robot.stick_slip is not None and robot.knows("plate"):
             slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)))
         return replace(self, joints=None, arm=arm, slipping=slipping)

@@ -122,7 +122,7 @@ class Predictor:
         """T_B_H (n, 4, 4) at motor readings (n, n_joints), each at rest for itself."""
         if self.side(row, "motor") != "bundled" or self.bundled is None:
             return hand.poses(q)
-        arm = BundledArm(self.bundled.trains, self.bundled.bending)
+        arm = BundledArm(self.bundled.trains, self.bundled.bending, self.bundled.at_rest)
         return arm.poses(hand, arm.at_rest(q))
 
     def _rows(self) -> Iterator[tuple[LadderRow, HandModel, Encoder]]:
@@ -252,7 +252,7 @@ class TrialPoses:
         known = dict(self.loaded.suspension.held_out)
         tried = next(iter(known.values()))
         if source != "plate" and source != "dynamics":
-            return tried.variance(np.zeros(6, dtype=bool))
+            return tried.still
         if row.bundle and (slipped := self.slipped(source)) is not None:
             return slipped.motion.variance
         tried = known.get(source, tried)

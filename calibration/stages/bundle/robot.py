@@ -5,7 +5,7 @@ M       moment that bends the column
 T_lab_B(t)  marker body of the base that sticks and slips, from its first second and a wrench
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -37,12 +37,14 @@ class BundleParts:
         offset: (k,) zeros of the motor readings [rad, m].
         bending: Of the column.
         stick_slip: The base; None where it was not identified.
+        at_rest: (m,) rms error of each train's angle in dwells, by link encoders [rad]; 0 where not known, or empty.
     """
 
     trains: tuple[DriveTrain, ...]
     offset: np.ndarray
     bending: ColumnBending
     stick_slip: StickSlip | None
+    at_rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -54,12 +56,14 @@ class BundledRobot:
         trains: Its drive trains with the dynamics that load them; none where none was identified.
         bending: Of the column.
         stick_slip: Its base; None where it was not identified.
+        at_rest: (k,) rms error of each joint's angle in dwells [rad]; 0 where not known.
     """
 
     hand: HandModel
     trains: DriveTrains
     bending: ColumnBending
     stick_slip: StickSlip | None
+    at_rest: np.ndarray
 
     @classmethod
     def of(cls, hand: HandModel, parts: BundleParts, urdf: str, description: Description) -> "BundledRobot":
@@ -67,7 +71,8 @@ class BundledRobot:
         zero = np.zeros(len(parts.offset))
         loads = dynamics(urdf, description, parts.offset)
         trains = DriveTrains(loads, parts.trains, zero, urdf, description)
-        return cls(hand, trains, parts.bending, parts.stick_slip)
+        at_rest = trains.by_joint(parts.at_rest) if len(parts.at_rest) else zero
+        return cls(hand, trains, parts.bending, parts.stick_slip, at_rest)
 
     def hand_in_base(self, trial: Trial, robot: Clock) -> np.ndarray:
         """T_B_H (n, 4, 4) at a trial's mocap times by motor readings, NaN where one is missing."""

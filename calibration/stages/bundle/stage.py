@@ -83,11 +83,11 @@ def fit_bundle(
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
     trains, findings = fit_drive_trains(lab.urdf, description, trials, robot, hand)
-    bending, quantities, found = rigid(chain.joints[0]), trains.parameters, list(findings)
+    bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
     geometry = replace(geometry, name="full")
     if trains.trains:
         refitted, more = completed(chain, description, trials, robot, hand, trains)
-        geometry, bending, trains = refitted.model, refitted.bending, refitted.trains
+        geometry, bending, trains, at_rest = refitted.model, refitted.bending, refitted.trains, refitted.at_rest
         hand = refitted.hand(chain)
         found += [*more, *(Verdict(STAGE, "warning", message) for message in refitted.shown)]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
@@ -97,7 +97,7 @@ def fit_bundle(
         sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
         base, more = fit_stick_slip(sources, trials, suspension)
         found += more
-    parts = BundleParts(trains.trains, _offsets(hand), bending, base)
+    parts = BundleParts(trains.trains, _offsets(hand), bending, base, at_rest)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
 
 

@@ -86,6 +86,12 @@ class DriveTrains:
         """Of all joints."""
         return tuple(q for train in self.trains for q in train.parameters)
 
+    def by_joint(self, of_trains: np.ndarray) -> np.ndarray:
+        """(k,) of all joints from values (m,) of the drive trains; 0 of joints without one."""
+        found = np.zeros(len(self.joints))
+        found[[self.joints.index(train.joint) for train in self.trains]] = of_trains
+        return found
+
     def train(self, joint: str) -> DriveTrain:
         """The drive train of a joint.
 

@@ -4,7 +4,10 @@
 
 Static postures of all calibration trials, and some a second of those in which the arm moves, in one problem of the
 existing solver: base and hand frames, placements and zeros; joints' own random errors, as the evidence has them. Where
-the side of a mesh is not known, its interval widens the posture's covariance along that joint.
+the side of a mesh is not known, its interval widens the posture's covariance along that joint, and at rest so does what
+link encoders show there: a joint that no load holds on a side stops on either one, and its drive train may be wrong.
+
+    s_j^2 = mean over dwells of (q_link - q_read)^2         of joint j [rad2]
 """
 
 from collections.abc import Iterator, Sequence
@@ -61,12 +64,15 @@ class RefittedGeometry:
         model: Parameters of the geometry.
         bending: Of the column.
         trains: The drive trains; `dynamics.offset` are the new zeros.
+        at_rest: (m,) rms error of each train's angle in dwells, by link encoders [rad], as of predictions, which read
+            no base marker; 0 where not known.
         shown: Effects that the residuals show and the model leaves out, as messages.
     """
 
     model: Model
     bending: ColumnBending
     trains: DriveTrains
+    at_rest: np.ndarray
     shown: tuple[str, ...] = ()
 
     def hand(self, chain: Chain) -> HandModel:
@@ -80,7 +86,8 @@ def refit_geometry(
     """The geometry on link angles of the calibration trials; `hand` is the one the drive trains were fitted with."""
     corrected = [corrected_trial(trains, trial, robot, hand) for trial in trials]
     bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
-    parts = list(_postures(description, corrected, robot, hand, bending))
+    at_rest = trains.by_joint(rest_errors(trains, corrected, robot))
+    parts = list(_postures(description, corrected, robot, hand, bending, at_rest))
     postures = parts[0]
     for part in parts[1:]:
         postures = postures.joined(part)
@@ -97,7 +104,9 @@ def refit_geometry(
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset
     referred = tuple(_referred(train, model, trains) for train in trains.trains)
-    return RefittedGeometry(model, bending, replace(trains, trains=referred).with_offset(offset), departed.shown)
+    trains = replace(trains, trains=referred).with_offset(offset)
+    static = [corrected_trial(trains, trial, None, fitted) for trial in trials if len(trial.dwell_start)]
+    return RefittedGeometry(model, bending, trains, rest_errors(trains, static, robot), departed.shown)
 
 
 def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:
@@ -138,6 +147,20 @@ def by_link_encoders(trains: DriveTrains, corrected: CorrectedTrial) -> Correcte
     return replace(corrected, trial=replace(corrected.trial, q_motor=q))
 
 
+def rest_errors(trains: DriveTrains, corrected: Sequence[CorrectedTrial], robot: Clock) -> np.ndarray:
+    """(m,) rms over all dwells of each drive train's angle less its link encoder's [rad]; 0 without one."""
+    found = [np.zeros((0, len(trains.trains)))]
+    columns = [trains.joints.index(train.joint) for train in trains.trains]
+    for one in (one for one in corrected if len(one.trial.dwell_start)):
+        t, q = one.trial.t_robot, one.trial.q_motor - by_link_encoders(trains, one).trial.q_motor
+        for start, stop in robot.from_mocap(dwell_windows(one.trial)):
+            dwell = q[(t >= start) & (t <= stop)][:, columns]
+            dwell = dwell[np.isfinite(dwell).all(axis=1)]
+            found.append(dwell[:1] if len(dwell) == 0 else dwell.mean(axis=0, keepdims=True))
+    every = np.concatenate(found)
+    return np.sqrt((every**2).mean(axis=0)) if len(every) else np.zeros(len(columns))
+
+
 def hand_poses(hand: HandModel, bending: ColumnBending, corrected: CorrectedTrial, robot: Clock) -> np.ndarray:
     """T_B_H (n, 4, 4) at the trial's mocap times, NaN where it has no readings."""
     trial = corrected.trial
@@ -155,33 +178,44 @@ def _at(corrected: CorrectedTrial, robot: Clock, t: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(s, corrected.loads.t, m) for m in corrected.loads.moment.T], axis=1)
 
 
-def _postures(
-    description: Description, corrected: Sequence[CorrectedTrial], robot: Clock, hand: HandModel, bending: ColumnBending
+def _postures(  # noqa: PLR0913  the parts of one line
+    description: Description,
+    corrected: Sequence[CorrectedTrial],
+    robot: Clock,
+    hand: HandModel,
+    bending: ColumnBending,
+    at_rest: np.ndarray,
 ) -> Iterator[Postures]:
-    """Static postures, then those passed."""
+    """Static postures, then those passed; at_rest (n_joints,) widens the static ones [rad]."""
     for one in corrected:
         if len(one.trial.dwell_start):
-            yield from _widened(one, static_postures(description, [one.trial], robot), robot, hand, bending, True)
+            found = static_postures(description, [one.trial], robot)
+            yield _widened(one, found, robot, hand, bending, at_rest)
         elif np.ptp(one.loads.q, axis=0).max() > _MOVES:
-            yield from _widened(
-                one, passing_postures(description, [one.trial], robot, _SPACING), robot, hand, bending, False
-            )
+            found = passing_postures(description, [one.trial], robot, _SPACING)
+            yield _widened(one, found, robot, hand, bending, None)
 
 
-def _widened(
-    one: CorrectedTrial, postures: Postures, robot: Clock, hand: HandModel, bending: ColumnBending, static: bool
-) -> Iterator[Postures]:
+def _widened(  # noqa: PLR0913  the parts of one line
+    one: CorrectedTrial,
+    postures: Postures,
+    robot: Clock,
+    hand: HandModel,
+    bending: ColumnBending,
+    at_rest: np.ndarray | None,
+) -> Postures:
     """Postures with bending taken off and covariances widened along joints whose side is not known."""
-    t = _times(one, postures, static)
+    t = _times(one, postures, at_rest is not None)
     s = robot.from_mocap(t)
     k = np.clip(np.searchsorted(one.loads.t, s), 0, len(one.loads.t) - 1)
     variance = (one.angles.high - one.angles.low)[k] ** 2 / 12.0
+    variance = variance if at_rest is None else np.maximum(variance, at_rest**2)
     Q = moved(hand, bending, postures.q, _at(one, robot, t))
     J = hand.joint_jacobians(postures.q)
     along = J * variance[:, None, hand.chain.columns]
     wide = along @ np.swapaxes(J, 1, 2)
     n = postures.components
-    yield replace(
+    return replace(
         postures, T_base_hand=inverse(Q) @ postures.T_base_hand, covariance=postures.covariance + wide[:, :n, :n]
     )
 

@@ -65,8 +65,8 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
     used = postures.rows(kept)
     in_time = _in_time(found, parameters, used.motion)
     departed = with_departures(hand_model(chain, parameters.nominal), parameters, in_time, used)
-    left = np.sqrt((found.at.r.reshape(kept.sum(), -1, 3) ** 2).mean(axis=(0, 2)))  # place and, where seen, rotation
-    model = replace(model_of(STAGE, chain, parameters, departed.fit), random=in_time.covariance, hand_error=left)
+    model = replace(model_of(STAGE, chain, parameters, departed.fit), random=in_time.covariance)
+    model = replace(model, hand_error=_hand_error(found.at.r, used.motion))
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
     message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from nominal"
     said = [Verdict(STAGE, "ok", "; ".join((message, *departed.shown)))]
@@ -76,6 +76,15 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
         message = f"{len(outliers)} of {len(kept)} postures are outliers and were excluded from the registration"
         said.append(Verdict(STAGE, "warning", f"{message}, counted from 0: {names}"))
     return model, tuple(said)
+
+
+def _hand_error(r: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """Errors of the hand's place [m] and, where seen, rotation [rad], per component, of residuals r (n, d).
+
+    Those of the motion, or of the static postures, that fit worst: a new motion is not known to fit better.
+    """
+    squares = [(r[motion == k].reshape(-1, r.shape[1] // 3, 3) ** 2).mean(axis=(0, 2)) for k in np.unique(motion)]
+    return np.sqrt(np.max(squares, axis=0))
 
 
 def _in_time(found: Fit, parameters: ParameterSet, motion: np.ndarray) -> Fit:

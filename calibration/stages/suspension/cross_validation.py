@@ -53,6 +53,12 @@ class HeldOut:
         return np.maximum(left - self.noise.sum(axis=0), _UNKNOWN * left) / max(float(self.count.sum()), 1.0)
 
     @property
+    def still(self) -> np.ndarray:
+        """(6,) of a base taken to stay: mean square of the trial that moved it most; noise taken off."""
+        left = np.maximum(self.motion - self.noise, _UNKNOWN * self.motion)
+        return np.asarray((left / np.maximum(self.count, 1.0)[:, None]).max(axis=0))
+
+    @property
     def explained(self) -> np.ndarray:
         """(6,) share of the motion without noise; NaN where there is hardly any."""
         error, motion, noise = (a.sum(axis=0) for a in (self.error, self.motion, self.noise))
