@@ -75,10 +75,7 @@ class SlippingBase:
     def variance(self, state: BaseState) -> np.ndarray:
         """(6,) of the displacement in frame 0 [m2, rad2]."""
         found, own = np.empty(6), self._stream.direction
-        plane = np.zeros(3) if state.slip is None else state.slip.variance
-        still = own.held_out.variance(np.zeros(3, dtype=bool))
-        plane = np.where(own.held_out.moves, plane, still)
-        found[list(PLANE)] = np.where(own.linear, own.linear_variance, plane)
+        found[list(PLANE)] = np.zeros(3) if state.slip is None else state.slip.variance(own)
         found[list(HEAVE)] = own.heave_variance
         return found
 

@@ -9,13 +9,15 @@ at the start, about that without preload. L the path that the base went while wh
 
     e_k^2 ~ V_k t_nu^2,   (log s, r, p, l) ~ N(PRIOR, WIDTH^2)                 e_k rms of trial k when it was left out
 
-A dozen trials do not tell four numbers: PRIOR is what left-out trials of sampled robots have in common.
+A dozen trials do not tell four numbers: PRIOR is what left-out trials of sampled robots have in common. A trial that
+is left out is predicted by parameters that are less certain: its own shift (x_k - x_(-k))^2 is added to var_e.
 
 Where the band is wider than the slip that is predicted, that prediction is worth nothing:
 
     x <- x_el + w (x - x_el),   w = max(0, 1 - (V - s^2) / max_(t' < t) (x - x_el)^2),   x_el = K_0^-1 F
 
-x_el what springs alone would do under the force F: then no slip is predicted, and the band is no narrower.
+x_el what springs alone would do under the force F: then no slip is predicted, and the band is no narrower. An axis that
+the model does not move stays, or is linear, the better the less the base is shaken: V = s^2 + r^2 max_(t' < t) x_el^2.
 """
 
 from dataclasses import dataclass
@@ -32,9 +34,10 @@ _UNLIKELY = 26.2  # of -2 log of the posterior above its least: chi-square of 12
 _LEAST = np.array([5e-6, 5e-6, 2e-5])  # [m, rad]: nothing is known better
 _DEGREES = 6.0  # nu
 _WIDER = 1.2  # variance of the band over V: what a trial in twenty shows beyond the spread of most
-PRIOR = np.log([[13e-6, 1.0, 0.2, 13e-3], [13e-6, 1.0, 0.12, 6.5e-3], [60e-6, 1.0, 0.13, 3.9e-3]])  # x, y, yaw
-FURTHER = np.log([1.0, 1.0, 2.5, 2.5])  # where no plate corrects the prediction
-WIDTH = np.array([1.0, 0.5, 0.3, 0.7])
+PRIOR = np.log([[13e-6, 1.0, 0.8, 2e-3], [13e-6, 1.0, 0.24, 2e-3], [60e-6, 1.0, 0.29, 1e-3]])  # x, y, yaw
+FURTHER = np.log([1.1, 0.9, 2.0, 2.0])  # where no plate corrects the prediction
+WIDTH = np.array([1.0, 0.3, 0.4, 0.7])
+_PLAIN, _PLAIN_WIDTH = 0.3, np.array([1.5, 1.5])  # r, and what the logarithms of s and r are uncertain by
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,39 @@ class Band:
     def variance(self, ensemble: np.ndarray, preloaded: np.ndarray, path: np.ndarray) -> np.ndarray:
         """V (n, 3) of the variances by parameters and by preload (n, 3) and the slid path (n, 3)."""
         return self.floor**2 + self.spread**2 * ensemble + self.start**2 * preloaded + (self.slip * path) ** 2
+
+
+@dataclass(frozen=True)
+class PlainBand:
+    """The band of x, y, yaw where the stick-slip model does not move them.
+
+    Attributes:
+        floor: s (3,) [m, rad].
+        growth: r (3,) [-].
+    """
+
+    floor: np.ndarray
+    growth: np.ndarray
+
+    def variance(self, reached: np.ndarray) -> np.ndarray:
+        """V (n, 3) of the largest squares of x_el (n, 3)."""
+        return self.floor**2 + self.growth**2 * reached
+
+
+def reached(elastic: np.ndarray) -> np.ndarray:
+    """max_(t' < t) x_el^2 (n, 3) of x_el (n, 3)."""
+    return np.asarray(np.maximum.accumulate(elastic**2, axis=0))
+
+
+def plain_band(square: np.ndarray, reach: np.ndarray, noise: np.ndarray) -> PlainBand:
+    """The band by mean squares (k, 3) of what trials left, and of `reached` in them; noise (3,) of a block."""
+    ones = np.ones(len(square))
+    found = []
+    for a in range(3):
+        start = np.log([max(float(noise[a]), _LEAST[a]), _PLAIN])
+        found.append(_fitted(square[:, a], np.stack([ones, reach[:, a]]), start, _PLAIN_WIDTH, float(noise[a] ** 2)))
+    scale = np.sqrt(_WIDER)
+    return PlainBand(*(scale * np.array(found)).T)
 
 
 def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -106,12 +142,16 @@ def _axis(rows: LeftOut, a: int, prior: np.ndarray, noise: float) -> np.ndarray:
     """s, r, p, l of one axis."""
     known = np.isfinite(rows.square[:, a])
     parts = np.stack([np.ones(len(rows.square)), *(v[:, a] for v in (rows.ensemble, rows.preloaded, rows.path))])
-    square, parts = rows.square[known, a], parts[:, known]
+    return _fitted(rows.square[known, a], parts[:, known], prior, WIDTH, noise)
+
+
+def _fitted(square: np.ndarray, parts: np.ndarray, prior: np.ndarray, width: np.ndarray, noise: float) -> np.ndarray:
+    """Factors (p,) of parts (p, k) by which squares (k,) are as likely as they can be."""
 
     def cost(p: np.ndarray) -> float:
         V = noise + np.exp(2.0 * p) @ parts
         tail = (_DEGREES + 1.0) * np.log1p(square / V / _DEGREES)
-        return float((np.log(V) + tail).sum() + (((p - prior) / WIDTH) ** 2).sum())
+        return float((np.log(V) + tail).sum() + (((p - prior) / width) ** 2).sum())
 
     return np.exp(minimize(cost, prior, method="BFGS").x)
 

@@ -71,7 +71,8 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
     path = np.concatenate([slid_path(x[a:b], share[a:b]) for a, b in trials.spans])
     error, seen = trials.measured - block_means(trials, x), np.concatenate([m.valid for m in trials.motions])
     masked = np.where(seen[:, None], error, np.nan)
-    parts = (_over_trials(trials, block_means(trials, v)) for v in (spread, preloaded, path**2))
+    less_certain = spread + (members[0][0] - x) ** 2
+    parts = (_over_trials(trials, block_means(trials, v)) for v in (less_certain, preloaded, path**2))
     band = fitted_band(LeftOut(_over_trials(trials, masked**2), *parts), trials.noise, trials.corrected)
     return Direction(source, found.logarithms, found.covariance, ensemble, band, _held_out(trials, masked))
 

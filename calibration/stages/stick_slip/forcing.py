@@ -58,6 +58,12 @@ class PlanarForcing:
     rest: np.ndarray
     linear: np.ndarray
 
+    @property
+    def force(self) -> np.ndarray:
+        """(n, 3) change of Fx, Fy, Mz on the floor, by its source."""
+        first = PLATE if self.source == "plate" else 0
+        return np.asarray(self.drive[::STEPS, first : first + 3])
+
 
 @dataclass(frozen=True)
 class Tilting:

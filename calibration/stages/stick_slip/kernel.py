@@ -232,18 +232,18 @@ def banded(
     preloaded: np.ndarray,
     elastic: np.ndarray,
 ) -> np.ndarray:
-    """Band and believed motion of one sample, see `band`: rows mean, path, largest square of a slip, x, variance.
+    """Band and believed motion of one sample, see `band`: rows mean, path, largest square of a slip, x, variance, G.
 
     Args:
         moved: (3,) mean of the members.
-        before: (5, 3) as returned a sample ago.
+        before: (6, 3) as returned a sample ago.
         share: That slid.
         band: (4, 3) s, r, p, l.
         spread: (3,) variance of the members.
         preloaded: (3,) mean square by preload.
         elastic: (3,) what springs alone do.
     """
-    out = np.empty((5, 3))
+    out = np.empty((6, 3))
     for a in range(3):
         path = before[1, a] + share * abs(moved[a] - before[0, a])
         slip = moved[a] - elastic[a]
@@ -252,4 +252,5 @@ def banded(
         kept = 1.0 - min(excess / largest, 1.0) if largest > 0.0 else 0.0
         out[0, a], out[1, a], out[2, a] = moved[a], path, largest
         out[3, a], out[4, a] = elastic[a] + kept * slip, band[0, a] ** 2 + excess
+        out[5, a] = max(before[5, a], elastic[a] * elastic[a])
     return out

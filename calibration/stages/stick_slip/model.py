@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calibration.errors import NoSuchElement
-from calibration.stages.stick_slip.band import Band, slid_path
-from calibration.stages.stick_slip.forcing import HEAVE, PLANE, STEP, STEPS, PlanarForcing, Tilting
-from calibration.stages.stick_slip.kernel import PLATE, simulated
+from calibration.stages.stick_slip.band import Band, PlainBand, reached, slid_path
+from calibration.stages.stick_slip.forcing import HEAVE, PLANE, STEP, PlanarForcing, Tilting
+from calibration.stages.stick_slip.kernel import simulated
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -43,8 +43,8 @@ class Direction:
         band: Of the prediction.
         held_out: Trials left out, (k, 3) for x, y, yaw.
         linear: (3,) axes that the compliance predicts better.
-        linear_variance: (3,) what it left of trials it had not seen [m2, rad2].
-        heave_variance: (3,) the same of z, rx, ry.
+        plain: Band of the axes that are linear or stay.
+        heave_variance: (3,) of z, rx, ry, what the compliance left of trials it had not seen [m2, rad2].
     """
 
     source: Source
@@ -54,8 +54,13 @@ class Direction:
     band: Band
     held_out: HeldOut
     linear: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=bool))
-    linear_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    plain: PlainBand = field(default_factory=lambda: PlainBand(np.zeros(3), np.zeros(3)))
     heave_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def slips(self) -> np.ndarray:
+        """(3,) axes that the stick-slip model moves."""
+        return np.asarray(self.held_out.moves) & ~np.asarray(self.linear, dtype=bool)
 
     @property
     def parameters(self) -> SlipParameters:
@@ -103,15 +108,12 @@ class StickSlip:
         preloaded = np.mean([(self._motion(forcing, p, e)[0] - one) ** 2 for e in starts], axis=0)
         x = every.mean(axis=0)
         variance = found.band.variance(every.var(axis=0), preloaded, slid_path(x, share))
-        force = forcing.drive[::STEPS, PLATE:] if forcing.source == "plate" else forcing.drive[::STEPS, :3]
-        elastic = force @ np.linalg.inv(self.wheels.stiffness(p))
+        elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
         kept = believed(x - elastic, variance - found.band.floor**2)
         x = elastic + kept * (x - elastic)
-        moves, tried = found.held_out.moves, found.held_out
-        still = tried.variance(np.zeros(3, dtype=bool))
-        x, variance = np.where(moves, x, 0.0), np.where(moves, variance, still)
-        x = np.where(found.linear, forcing.linear, x)
-        return PlanarPrediction(x, np.where(found.linear, found.linear_variance, variance), share, kept)
+        plain = np.where(found.linear, forcing.linear, 0.0)
+        variance = np.where(found.slips, variance, found.plain.variance(reached(elastic)))
+        return PlanarPrediction(np.where(found.slips, x, plain), variance, share, kept)
 
     def _motion(
         self, forcing: PlanarForcing, p: SlipParameters, preload: np.ndarray | None = None

@@ -10,7 +10,7 @@ import numpy as np
 
 from calibration.recording.trial import Trial
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_forcing, wrenches_of
-from calibration.stages.stick_slip.kernel import PLATE, STATE, advance
+from calibration.stages.stick_slip.kernel import STATE, advance
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
@@ -59,7 +59,7 @@ def slipping_base_poses(model: StickSlip, sources: WrenchSources, trial: Trial, 
     """
     rest = rest_of(sources.lab.description, trial, sources.T_base_B)
     forcing = planar_forcing(wrenches_of(sources, trial, rest.T_lab_0), model.tilting, source)
-    moment = forcing.drive[::STEPS, PLATE + 2 if source == "plate" else 2][:, None]
+    moment = forcing.force[:, 2:]
     found = (*model.displacement(forcing), moment, friction_use(model, forcing))
     x, variance, moment, use = (_at(trial.t_mocap, forcing.t, columns) for columns in found)
     motion = SlippingMotion(x, variance, moment[:, 0], use, model.wheels.names)

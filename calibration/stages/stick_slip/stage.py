@@ -14,6 +14,7 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
+from calibration.stages.stick_slip.band import PlainBand, plain_band, reached
 from calibration.stages.stick_slip.fit import fit_direction
 from calibration.stages.stick_slip.forcing import (
     HEAVE,
@@ -25,10 +26,10 @@ from calibration.stages.stick_slip.forcing import (
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import joined
-from calibration.stages.stick_slip.measured import PlanarMotion, planar_motion
+from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.search import displaced
-from calibration.stages.stick_slip.wheels import wheel_set
+from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of
@@ -71,7 +72,8 @@ def fit_stick_slip(
         rows = _rows(description, read, tilting, source)
         if len(rows) >= _LEAST_TRIALS:
             start, campaign = directions[0].logarithms if directions else None, joined(wheels, rows)
-            directions.append(_linear(fit_direction(source, campaign, start), suspension))
+            found = _linear(fit_direction(source, campaign, start), suspension)
+            directions.append(replace(found, plain=_plain(found, wheels, rows)))
             if start is None:
                 calm = joined(wheels, [row for row, wild in zip(rows, _wild(directions[0]), strict=True) if not wild])
                 misplaced = tuple(_misplaced(wheels.names, displaced(calm, directions[0].logarithms)))
@@ -118,7 +120,18 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
         return replace(direction, heave_variance=heave)
     own = direction.held_out.variance(np.asarray(direction.held_out.moves))
     linear = tried.moves[list(PLANE)] & (plane < _BETTER * own)
-    return replace(direction, linear=linear, linear_variance=plane, heave_variance=heave)
+    return replace(direction, linear=linear, heave_variance=heave)
+
+
+def _plain(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]]) -> PlainBand:
+    """The band of axes that are linear or stay, by what that leaves of the trials."""
+    compliance, square, reach = np.linalg.inv(wheels.stiffness(direction.parameters)), [], []
+    for forcing, motion in rows:
+        if motion.valid.any():
+            left = motion.x - blocks(np.where(direction.linear, forcing.linear, 0.0))
+            square.append((left[motion.valid] ** 2).mean(axis=0))
+            reach.append(blocks(reached(forcing.force @ compliance))[motion.valid].mean(axis=0))
+    return plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
 
 
 def _wild(direction: Direction) -> np.ndarray:

@@ -53,7 +53,7 @@ class SlipState:
         before: (11,) the last sample as the kernel takes it.
         states: (e, STATE) of the members, then of the preloaded optimum.
         deflections: (e, m, 2).
-        found: (5, 3) see `kernel.banded`.
+        found: (6, 3) see `kernel.banded`.
         x: (3,) x, y, yaw [m, rad, frame 0].
     """
 
@@ -67,10 +67,9 @@ class SlipState:
     found: np.ndarray
     x: np.ndarray
 
-    @property
-    def variance(self) -> np.ndarray:
-        """(3,) of x."""
-        return np.asarray(self.found[4])
+    def variance(self, of: Direction) -> np.ndarray:
+        """(3,) of x, or of what the compliance makes of it."""
+        return np.where(of.slips, self.found[4], of.plain.variance(self.found[5]))
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class SlipStream:
         return SlipState(before.start, sample.t, before.rest, before.n, row, states, e, found, found[3] * self.moves)
 
     def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
-        none = np.zeros((5, 3))
+        none = np.zeros((6, 3))
         none[4] = self.band[0] ** 2
         states, e = np.zeros((len(self.wheels), STATE)), np.zeros((*self.wheels.shape[:2], 2))
         e[len(self.direction.ensemble) :] = preloads(self.wheel_set, self.direction.parameters, row[3:6])
@@ -142,7 +141,7 @@ def slip_stream(model: StickSlip) -> SlipStream:
         wheels,
         bodies,
         compliance,
-        found.held_out.moves & ~found.linear.astype(bool),
+        found.slips,
         np.array([found.band.floor, found.band.spread, found.band.start, found.band.slip]),
     )
 

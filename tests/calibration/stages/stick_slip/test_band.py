@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from calibration.stages.stick_slip.band import PRIOR, Band, LeftOut, ensemble_of, fitted_band, slid_path
+from calibration.stages.stick_slip.band import (
+    PRIOR,
+    Band,
+    LeftOut,
+    ensemble_of,
+    fitted_band,
+    plain_band,
+    reached,
+    slid_path,
+)
 from calibration.stages.stick_slip.model import believed
 from calibration.stages.stick_slip.wheels import NAMES
 from tests.calibration.stages.stick_slip import slipping
@@ -56,3 +65,14 @@ def test_members_are_draws_of_the_posterior_that_the_data_bear():
     drives = members[1:, NAMES.index("drive_mu")] - p[NAMES.index("drive_mu")]
     assert (drives > 0.0).mean() > 0.6  # less friction would slip, and none of the trials does
     np.testing.assert_array_equal(members, ensemble_of(trials, p, one_sided))
+
+
+def test_an_axis_that_is_not_moved_is_known_the_less_the_more_the_base_is_shaken():
+    """Trials that hardly move must not make the band of those that move much narrow."""
+    rng = np.random.default_rng(3)
+    reach = np.repeat([1e-10, 1e-6], [9, 4])[:, None] * np.ones(3)
+    square = 1e-10 + 0.25 * reach * rng.normal(size=reach.shape) ** 2
+    band = plain_band(square, reach, NOISE)
+    V = band.variance(reached(np.array([[1e-6], [3e-3], [-1e-6]]) * np.ones(3)))
+    assert np.all(V[0] < 1e-9) and np.all(np.abs(np.sqrt(V[1]) / 1.5e-3 - 1.0) < 0.6)
+    np.testing.assert_array_equal(V[2], V[1])
