@@ -54,7 +54,7 @@ class Direction:
     band: Band
     held_out: HeldOut
     linear: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=bool))
-    plain: PlainBand = field(default_factory=lambda: PlainBand(np.zeros(3), np.zeros(3)))
+    plain: PlainBand = field(default_factory=lambda: PlainBand(np.full(3, 1e-3), np.ones(3)))
     heave_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property

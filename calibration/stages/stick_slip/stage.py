@@ -42,7 +42,7 @@ _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _BETTER = 0.8  # mean square over that of the slipping base, below which the compliance takes an axis
 _WORTH, _LESS = 0.8, 0.1  # R2 of yaw; by which that of the plate may be less
 _WILD = 25.0  # mean square over the median of the trials
-_ELSEWHERE = 0.014  # [m] a wheel may seem off its place
+_ELSEWHERE = 0.009  # [m] a wheel may seem off its place
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
 _log = logging.getLogger(__name__)
 
@@ -76,7 +76,7 @@ def fit_stick_slip(
             directions.append(replace(found, plain=_plain(found, wheels, rows)))
             if start is None:
                 calm = joined(wheels, [row for row, wild in zip(rows, _wild(directions[0]), strict=True) if not wild])
-                misplaced = tuple(_misplaced(wheels.names, displaced(calm, directions[0].logarithms)))
+                misplaced = tuple(_misplaced(wheels.names, *displaced(calm, directions[0].logarithms)))
     if not directions:
         message = "no stick-slip base: it takes two trials that show the base and its wrench"
         return None, (Verdict(STAGE, "missing", message),)
@@ -140,11 +140,11 @@ def _wild(direction: Direction) -> np.ndarray:
     return np.asarray((square > _WILD * np.median(square, axis=0)).any(axis=1))
 
 
-def _misplaced(names: Sequence[str], shift: np.ndarray) -> Iterator[Verdict]:
-    """The wheel that the trials put elsewhere, by shifts (m, 2) [m]."""
-    far = np.abs(shift).max(axis=1)
-    k = int(far.argmax())
-    if far[k] > _ELSEWHERE:
+def _misplaced(names: Sequence[str], shift: np.ndarray, gain: np.ndarray) -> Iterator[Verdict]:
+    """The wheel that the trials put elsewhere, by shifts (m, 2) [m] and what they gain (m,)."""
+    far = np.abs(shift).max(axis=1) > _ELSEWHERE
+    if far.any():
+        k = int(np.where(far, gain, -np.inf).argmax())
         x, y = 1e3 * shift[k]
         message = (
             f"the base turns and slips as if {names[k]} stood {x:+.0f} mm along x, {y:+.0f} mm along y of its declared "

@@ -7,6 +7,7 @@ import pytest
 import mjcf
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses
+from calibration.stages.stick_slip.stage import _misplaced
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -108,3 +109,11 @@ def test_trials_that_contradict_the_wheels_are_named(recorded, suspension):
     model, said = fit([r[0] for r in recorded[:2]], suspension)
     assert [d.source for d in model.directions] == ["plate", "dynamics"]
     assert said[0].verdict == "warning" and "left still" in said[0].message and "plate's axes" in said[0].message
+
+
+def test_a_wheel_that_seems_elsewhere_is_named_with_its_shift():
+    shift, gain = np.zeros((3, 2)), np.array([5.0, 40.0, 3.0])
+    shift[0, 0], shift[1, 1], shift[2] = 0.012, -0.02, 0.008
+    (found,) = _misplaced(("left", "right", "front"), shift, gain)
+    assert found.verdict == "warning" and "as if right stood +0 mm along x, -20 mm along y" in found.message
+    assert not list(_misplaced(("left", "right", "front"), 0.4 * shift, gain))
