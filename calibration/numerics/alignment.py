@@ -10,6 +10,7 @@ scale between robot and laboratory and tells wrong units and mirrored axes; its 
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.spatial.transform import Rotation
 
 from calibration.errors import NotEnoughData
@@ -23,6 +24,7 @@ _TURNED = 1e-3  # second singular value of the arm's turns over the first, below
 _ODD = 3.0  # times the median distance left, beyond which a posture is wrong
 _FEWEST = 4  # postures
 _BELOW_PI = 2.8  # [rad] a rotation vector near pi may turn its sign
+_SWEEPS, _SMALL = 20, 1e-31  # of Jacobi's method; squares of what is off the diagonal over those on it
 
 
 @dataclass(frozen=True)
@@ -72,10 +74,72 @@ def registration_start(T_tool: np.ndarray, T_lab_hand: np.ndarray, oriented: boo
 
 
 def nearest_rotations(B: np.ndarray) -> np.ndarray:
-    """R (n, 3, 3) with the largest trace(R' B) of matrices B (n, 3, 3): U diag(1, 1, det(U V')) V' of B = U S V'."""
-    U, _, Vt = np.linalg.svd(B)
-    U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
-    return np.asarray(U @ Vt)
+    """R (n, 3, 3) with the largest trace(R' B) of matrices B (n, 3, 3).
+
+    Its quaternion is the eigenvector of the largest eigenvalue of a symmetric matrix of B's sums and differences.
+    Reference: Horn, J. Opt. Soc. Am. A 4 (1987).
+    """
+    return np.asarray(_turned(np.ascontiguousarray(B, dtype=float)))
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(B: np.ndarray) -> np.ndarray:
+    """`nearest_rotations`, by Jacobi's rotations."""
+    R, N, V = np.empty_like(B), np.empty((4, 4)), np.empty((4, 4))
+    for k in range(len(B)):
+        b = B[k]
+        N[0, 0] = b[0, 0] + b[1, 1] + b[2, 2]
+        for i in range(3):
+            m, n = (i + 1) % 3, (i + 2) % 3
+            N[0, 1 + i] = b[n, m] - b[m, n]
+            N[1 + i, 1 + i] = 2.0 * b[i, i] - N[0, 0]
+            for j in range(i + 1, 3):
+                N[1 + i, 1 + j] = b[i, j] + b[j, i]
+        for i in range(4):
+            for j in range(4):
+                V[i, j] = 1.0 * (i == j)
+        _diagonalised(N, V)
+        best = 0
+        for i in range(1, 4):
+            best = i if N[i, i] > N[best, best] else best
+        w, x, y, z = V[0, best], V[1, best], V[2, best], V[3, best]
+        R[k, 0, 0], R[k, 0, 1], R[k, 0, 2] = w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)
+        R[k, 1, 0], R[k, 1, 1], R[k, 1, 2] = 2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)
+        R[k, 2, 0], R[k, 2, 1], R[k, 2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z
+    return R
+
+
+@njit(cache=True, error_model="numpy")
+def _diagonalised(N: np.ndarray, V: np.ndarray) -> None:
+    """Turn the axes of symmetric N (4, 4), its upper half, until it is diagonal; V's columns turn with them."""
+    for _ in range(_SWEEPS):
+        off, size = 0.0, 0.0
+        for i in range(4):
+            size += N[i, i] ** 2
+            for j in range(i + 1, 4):
+                off += N[i, j] ** 2
+        if not off > _SMALL * size:
+            return
+        for i in range(3):
+            for j in range(i + 1, 4):
+                if N[i, j] == 0.0:
+                    continue
+                ratio = (N[j, j] - N[i, i]) / (2.0 * N[i, j])
+                t = 1.0 / (abs(ratio) + np.sqrt(1.0 + ratio * ratio))
+                t = t if ratio >= 0.0 else -t
+                c = 1.0 / np.sqrt(1.0 + t * t)
+                s = t * c
+                N[i, i] -= t * N[i, j]
+                N[j, j] += t * N[i, j]
+                N[i, j] = 0.0
+                for r in range(4):
+                    if r != i and r != j:
+                        a, b = min(r, i), max(r, i)
+                        d, e = min(r, j), max(r, j)
+                        x, y = N[a, b], N[d, e]
+                        N[a, b], N[d, e] = c * x - s * y, s * x + c * y
+                    x, y = V[r, i], V[r, j]
+                    V[r, i], V[r, j] = c * x - s * y, s * x + c * y
 
 
 def start(M: np.ndarray, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

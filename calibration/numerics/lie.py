@@ -24,6 +24,7 @@ Its turns are not seen. What they do to the geometry is: 33 of the 36 combinatio
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 from scipy.spatial.transform import Rotation
 
 _SMALL = 0.25  # t^2 below which series are used [rad^2]
@@ -150,8 +151,31 @@ def compose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 def from_vector(value: np.ndarray) -> np.ndarray:
-    """Transforms (..., 4, 4) whose translation [m] and rotation vector [rad] are `value` (..., 6), one axis at most."""
-    return compose(Rotation.from_rotvec(value[..., 3:]).as_matrix(), value[..., :3])
+    """Transforms (..., 4, 4) whose translation [m] and rotation vector [rad] are `value` (..., 6)."""
+    flat = np.array(value, dtype=float, order="C").reshape(-1, 6)
+    T = np.zeros((len(flat), 4, 4))
+    _from_vectors(flat, T)
+    return T.reshape(*value.shape[:-1], 4, 4)
+
+
+@njit(cache=True, error_model="numpy")
+def _from_vectors(x: np.ndarray, T: np.ndarray) -> None:
+    """`from_vector` into zeros T (n, 4, 4): R = I + sin t / t [w]x + (1 - cos t) / t^2 [w]x^2."""
+    for n in range(len(x)):
+        w, R = x[n, 3:], T[n]
+        square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+        t = np.sqrt(square)
+        if t > 1e-3:
+            a, b = np.sin(t) / t, 2.0 * (np.sin(0.5 * t) / t) ** 2
+        else:
+            a, b = 1.0 - square / 6.0 * (1.0 - square / 20.0), 0.5 - square / 24.0 * (1.0 - square / 30.0)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            R[i, i] = 1.0 - b * (w[j] * w[j] + w[k] * w[k])
+            R[i, j] = b * w[i] * w[j] - a * w[k]
+            R[j, i] = b * w[i] * w[j] + a * w[k]
+            R[i, 3] = x[n, i]
+        R[3, 3] = 1.0
 
 
 def to_vector(T: np.ndarray) -> np.ndarray:

@@ -9,8 +9,10 @@ Reference: Visintin, Differential Models of Hysteresis, 1994.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numba import njit
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
@@ -58,9 +60,13 @@ def even(t: np.ndarray, x: np.ndarray) -> Signal:
 
 def low_passed(signal: Signal, cutoff: float) -> Signal:
     """The signal without what is faster than `cutoff` [Hz]; zero phase."""
-    sos = butter(_ORDER, cutoff, fs=RATE, output="sos")
     pad = min(len(signal.t) - 1, int(2.0 * RATE))
-    return Signal(signal.t, sosfiltfilt(sos, signal.x, axis=0, padlen=pad), signal.valid)
+    return Signal(signal.t, sosfiltfilt(_sections(cutoff), signal.x, axis=0, padlen=pad), signal.valid)
+
+
+@lru_cache
+def _sections(cutoff: float) -> np.ndarray:
+    return np.asarray(butter(_ORDER, cutoff, fs=RATE, output="sos"))
 
 
 def interpolate_columns(at: np.ndarray, t: np.ndarray, x: np.ndarray, outside: float | None = None) -> np.ndarray:
@@ -81,9 +87,14 @@ def body_rates(t: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def play(q: np.ndarray, half_gap: np.ndarray) -> np.ndarray:
     """Output p of play operators of half gaps (k,) driven by columns q (n, k), starting centred on q[0]."""
-    p = np.empty_like(q)
-    last = q[0]
-    for k, (low, high) in enumerate(zip(q - half_gap, q + half_gap, strict=True)):
-        last = np.minimum(np.maximum(last, low), high)
-        p[k] = last
-    return p
+    return np.asarray(_played(np.array(q, dtype=float, order="C"), np.broadcast_to(half_gap, q.shape[1]).astype(float)))
+
+
+@njit(cache=True, error_model="numpy")
+def _played(q: np.ndarray, half_gap: np.ndarray) -> np.ndarray:
+    for j in range(q.shape[1]):
+        last = q[0, j]
+        for k in range(len(q)):
+            last = min(max(last, q[k, j] - half_gap[j]), q[k, j] + half_gap[j])
+            q[k, j] = last
+    return q

@@ -14,8 +14,9 @@ Where the base's markers are in a trial, predicted: its first second and a wrenc
 T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     x from the plate's wrench or from inverse dynamics along q_motor
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,12 +45,14 @@ class LoadedBase:
         T_lab_0: (4, 4) frame 0.
         T_0_base: (4, 4) the base frame at the start.
         centre: (3,) the point the wrench is about [m, lab]; NaN where the laboratory has no plate.
+        gravity: (3,) in frame 0 [m/s2].
     """
 
     suspension: Suspension
     T_lab_0: np.ndarray
     T_0_base: np.ndarray
     centre: np.ndarray
+    gravity: np.ndarray
 
     def moved(self, t: np.ndarray, wrench: np.ndarray) -> np.ndarray:
         """How the base moved in the lab (n, 4, 4) at t (n,) [s] under the wrench (n, 6) in lab axes.
@@ -79,21 +82,30 @@ class LoadedBase:
         Raises:
             NotEnoughData: Nothing says what point the wrench is about.
         """
-        self._need_centre()
+        state = self.sprung(t, wrench, before)
+        if state.n > (0 if before is None else before.n):
+            return state
+        return state._replace(moved=self.in_lab((state.x * self.suspension.moves("plate"))[None]))
+
+    def sprung(self, t: float, wrench: np.ndarray, before: "BaseState | None") -> "BaseState":
+        """The same as the springs alone have it; `moved` is left as it was."""
         if wrench.shape != (6,):
             raise ShapeError("wrench", wrench.shape, (6,))
-        w, modes = in_frame(wrench[None, None], self.centre[None], self.T_lab_0)[0], self.suspension.modes
+        w = self._action @ wrench
         if before is None:
-            none = np.zeros(len(modes.tau))
+            none = np.zeros(len(self.suspension.modes.tau), dtype=complex)
             return BaseState(t, t, w, w, 1, none, none, np.zeros(6), np.eye(4)[None])
         if t <= before.start + REST:
             n = before.n + 1
-            return replace(before, t=t, wrench=w, rest=before.rest + (w - before.rest) / n, n=n)
-        u = modes.b @ (w - before.rest)
-        y = modes.advanced(before.y, before.u, u, t - before.t)
-        x = (modes.a @ y).real
-        moved = self.in_lab((x * self.suspension.moves("plate"))[None])
-        return replace(before, t=t, wrench=w, u=u, y=y, x=x, moved=moved)
+            return before._replace(t=t, wrench=w, rest=before.rest + (w - before.rest) / n, n=n)
+        y, u, x = self.suspension.modes.advanced(before.y, before.u, w - before.rest, t - before.t)
+        return BaseState(before.start, t, w, before.rest, before.n, u, y, x, before.moved, before.slip)
+
+    @cached_property
+    def _action(self) -> np.ndarray:
+        """From a wrench about the centre, lab axes, to one in frame 0 (6, 6)."""
+        self._need_centre()
+        return in_frame(np.eye(6)[:, None], self.centre[None], self.T_lab_0).T
 
     def covariance(self, T_base_hand: np.ndarray, moves: bool) -> np.ndarray:
         """Covariance (n, 6, 6) that the base adds to the hand's local twist, at T_base_hand (n, 4, 4)."""
@@ -111,20 +123,24 @@ class LoadedBase:
 
     def in_lab(self, x: np.ndarray) -> np.ndarray:
         """Motions of the lab (n, 4, 4) by displacements x (n, 6) of frame 0."""
-        return Rest(self.T_lab_0, inverse(self.T_lab_0)).poses(x)
+        return self._rest.poses(x)
+
+    @cached_property
+    def _rest(self) -> Rest:
+        return Rest(self.T_lab_0, inverse(self.T_lab_0))
 
 
 def loaded_base(suspension: Suspension, description: Description, T_lab_base: np.ndarray | None) -> LoadedBase:
     """The base at its pose in the laboratory; where that is not given, the lab is the base frame."""
+    gravity = np.array(description.gravity)
     if T_lab_base is None:
-        return LoadedBase(suspension, np.eye(4), np.eye(4), np.zeros(3))
+        return LoadedBase(suspension, np.eye(4), np.eye(4), np.zeros(3), gravity)
     T_lab_0 = upright(T_lab_base, description)
     centre = np.array(description.plates[0].centre) if description.plates else np.full(3, np.nan)
-    return LoadedBase(suspension, T_lab_0, inverse(T_lab_0) @ T_lab_base, centre)
+    return LoadedBase(suspension, T_lab_0, inverse(T_lab_0) @ T_lab_base, centre, gravity @ T_lab_0[:3, :3])
 
 
-@dataclass(frozen=True)
-class BaseState:
+class BaseState(NamedTuple):
     """State of the base after a sample.
 
     Attributes:

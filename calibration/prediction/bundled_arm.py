@@ -15,6 +15,7 @@ decides the side of a mesh, else the link is anywhere in what friction holds.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +28,7 @@ from calibration.stages.drive_trains.torques import LinkLoads
 _RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
 
 
-@dataclass(frozen=True)
-class ArmPositions:
+class ArmPositions(NamedTuple):
     """What the geometry is evaluated at.
 
     Attributes:
@@ -46,19 +46,14 @@ class ArmPositions:
     rests: np.ndarray
 
 
-@dataclass(frozen=True)
-class ArmState:
+class ArmState(NamedTuple):
     """Drive trains after a sample.
 
     Attributes:
-        v: (k,) motor velocities [rad/s, m/s].
-        a: (k,) motor accelerations.
         drives: State of the drive trains.
         positions: Of the sample, n = 1.
     """
 
-    v: np.ndarray
-    a: np.ndarray
     drives: StreamState
     positions: ArmPositions
 
@@ -96,10 +91,10 @@ class BundledArm:
     def at_rest(self, q_motor: np.ndarray) -> ArmPositions:
         """Of readings (n, k) at rest, each for itself."""
         still = np.zeros(q_motor.shape[1])
-        found = [self._stream.begin(0.0, q, still, still)[1] for q in q_motor]
-        q, variance = (np.array([getattr(f, name)[0] for f in found]) for name in ("q", "variance"))
-        loads = self._loads(q_motor, np.zeros_like(q_motor), np.zeros_like(q_motor))
-        return ArmPositions(q, variance, *loads, np.ones(q.shape, dtype=bool))
+        states, angles = zip(*(self._stream.begin(0.0, q, still, still) for q in q_motor), strict=True)
+        q, variance = (np.concatenate([getattr(f, name) for f in angles]) for name in ("q", "variance"))
+        moment, torque = (np.concatenate([getattr(s, name) for s in states]) for name in ("moment", "torque"))
+        return ArmPositions(q, variance, moment, torque, np.ones(q.shape, dtype=bool))
 
     def stepped(self, t: float, q_motor: np.ndarray, velocity: np.ndarray | None, before: ArmState | None) -> ArmState:
         """One sample q_motor (k,) on; accelerations are differences of the velocities (k,).
@@ -111,10 +106,10 @@ class BundledArm:
             drives, angles = self._stream.begin(t, q_motor, v, a)
         else:
             if velocity is not None:
-                a = (v - before.v) / (t - before.drives.t)
+                a = (v - before.drives.moving[1]) / (t - before.drives.t)
             drives, angles = self._stream.step(before.drives, t, q_motor, v, a)
-        loads = self._loads(q_motor[None], v[None], a[None])
-        return ArmState(v, a, drives, ArmPositions(angles.q, angles.variance, *loads, np.abs(v[None]) < _RESTS))
+        rests = np.abs(v[None]) < _RESTS
+        return ArmState(drives, ArmPositions(angles.q, angles.variance, drives.moment, drives.torque, rests))
 
     def bends(self, hand: HandModel, positions: ArmPositions) -> np.ndarray:
         """Q (n, 4, 4) in the base's marker body."""
@@ -122,7 +117,7 @@ class BundledArm:
 
     def poses(self, hand: HandModel, positions: ArmPositions) -> np.ndarray:
         """T_B_H (n, 4, 4), the column bent."""
-        return np.asarray(self.bends(hand, positions) @ hand.poses(positions.q))
+        return hand.poses(positions.q, self.bending.turns(positions.moment))
 
     def variance(self, hand: HandModel, positions: ArmPositions, reading_sigma: np.ndarray) -> np.ndarray:
         """(n, m) of the chain's joints: random error of the reading where there is no drive train."""
@@ -141,11 +136,6 @@ class BundledArm:
         T_base_column = hand.chain.poses(hand.angles(positions.q), self.bending.joint)
         J = adjoint(inverse(T_base_hand) @ T_base_column)[:, :, 3:5]
         return np.asarray(J * (sigma * positions.moment)[:, None, :] ** 2 @ np.swapaxes(J, 1, 2))
-
-    def _loads(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Moments (n, 2) on the column and torques (n, k) on the joints."""
-        torque, _, _, moment = self.trains.dynamics.evaluated(q, v, a, None, False)
-        return moment, torque
 
     @cached_property
     def _stream(self) -> Stream:

@@ -28,12 +28,13 @@ from calibration.numerics.lie import from_vector, inverse
 from calibration.prediction.base_pose import LoadedBase, base_at, loaded_base
 from calibration.prediction.bundled_arm import ArmPositions, BundledArm
 from calibration.prediction.hand_pose import HandPose, RobotState, at_readings, in_lab, needed, uncertain
-from calibration.prediction.slipping_base import Motion, SlippingBase
+from calibration.prediction.slipping_base import SlippingBase
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, points_of
+from calibration.robot.kinematics import beyond
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.geometry.model_of_fit import hand_of
@@ -224,22 +225,20 @@ class Compensator:
         before, arm, motion = before or RobotState(), None, None
         if self.arm is not None:
             arm = self.arm.stepped(t, q[0], None if v is None else v[0], before.arm)
-            motion = None if v is None else Motion(q[0], arm.v, arm.a)
+            motion = None if v is None else arm.drives.moving
         in_base = self._hand(np.array([t]), q, v) if arm is None else self._on_links(arm.positions)
         if wrench is None:
-            return replace(in_lab(in_base, base, None, T_lab_base_start), state=RobotState(arm))
+            return in_lab(in_base, base, None, T_lab_base_start, state=RobotState(arm))
         w, there, variance = np.asarray(wrench, dtype=float), needed(base), None
         if self.slipping is None:
             state = there.stepped(t, w, before.base)
         else:
             state = self.slipping.stepped(there, t, w, motion, before.base)
             variance = partial(self.slipping.variance, state)
-        found = in_lab(in_base, base, state.moved, T_lab_base_start, variance)
-        return replace(found, state=RobotState(arm, state))
+        return in_lab(in_base, base, state.moved, T_lab_base_start, variance, RobotState(arm, state))
 
     def _refuse_impossible(self, q: np.ndarray) -> None:
-        low, high = self._limits
-        if ((q < low) | (q > high)).any() and (wrong := list(implausible_readings(self.hand.nominal, q))):
+        if beyond(q, *self._limits) and (wrong := list(implausible_readings(self.hand.nominal, q))):
             raise InputError("q_motor", "; ".join(wrong))
 
     @cached_property
@@ -274,7 +273,7 @@ class Compensator:
         """In the base frame, by link angles and with the column bent."""
         if self.arm is None:
             raise NotEnoughData("this estimate has no drive trains")
-        arm, T = self.arm, from_vector(self.hand.base) @ self.arm.poses(self.hand, positions)
+        arm, T = self.arm, self.hand.in_base_frame(positions.q, self.arm.bending.turns(positions.moment))
 
         def covariance() -> np.ndarray:
             variance = arm.variance(self.hand, positions, self.reading_sigma)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,7 @@ from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
 
 
-@dataclass(frozen=True)
-class RobotState:
+class RobotState(NamedTuple):
     """State after a sample.
 
     Attributes:
@@ -86,6 +86,7 @@ def in_lab(
     moved: np.ndarray | None,
     T_lab_base: np.ndarray | None,
     variance: Callable[[], np.ndarray] | None = None,
+    state: RobotState | None = None,
 ) -> HandPose:
     """A pose in the base frame from where the base is, which may have moved (n, 4, 4), of variance (6,) or (n, 6)."""
 
@@ -97,7 +98,7 @@ def in_lab(
         return in_base.covariance
 
     T = in_base.T if T_lab_base is None else np.asarray(T_lab_base, dtype=float) @ in_base.T
-    return HandPose(T if moved is None else moved @ T, covariance)
+    return HandPose(T if moved is None else moved @ T, covariance, state)
 
 
 def uncertain(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarray]:

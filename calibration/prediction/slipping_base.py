@@ -6,29 +6,22 @@ x, y, yaw by the stick-slip model, z and tilt by the compliance, as in the evalu
 wrench is taken as it comes, and inverse dynamics leave out the inertia of heave and tilt.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import pinocchio as pin
+from numba import njit
 
 from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase
-from calibration.robot.floating_base import configurations
 from calibration.robot.laboratory import Laboratory
+from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, planar_forcing, wrenches_along
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.stream import Sample, SlipStream, slip_stream
 from calibration.stages.suspension.floor_wrench import root_in_base
 
-
-@dataclass(frozen=True)
-class Motion:
-    """One sample of the arm: motor readings, velocities and accelerations, (k,) each [rad, m, s]."""
-
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
+_UPPER = tuple((PLANE[i], PLANE[j]) for i, j in UPPER)
 
 
 @dataclass(frozen=True)
@@ -57,20 +50,22 @@ class SlippingBase:
         return at.in_lab(x), variance
 
     def stepped(
-        self, at: LoadedBase, t: float, wrench: np.ndarray, motion: Motion | None, before: BaseState | None
+        self, at: LoadedBase, t: float, wrench: np.ndarray, moving: np.ndarray | None, before: BaseState | None
     ) -> BaseState:
-        """The base one sample on; without the arm's motion it has no inertia, and the plate alone moves it."""
-        state = at.stepped(t, wrench, before)
-        sample = Sample(t, state.wrench, state.x[3:5])
-        if motion is not None:
-            w, M = self._driven(at.T_lab_0, motion)
-            inertia = np.array([M[PLANE[i], PLANE[j]] for i, j in UPPER])
-            sample = replace(sample, driving=w[list(PLANE)], inertia=inertia)
-        slip = self._stream.stepped(sample, None if before is None else before.slip)
+        """The base one sample on; without the arm's motion (3, k) it has no inertia, and the plate alone moves it.
+
+        `moving` are motor readings, velocities and accelerations [rad, m, s].
+        """
+        state = at.sprung(t, wrench, before)
+        driving = None if moving is None else self._driven(at.gravity, moving)
+        slip = self._stream.stepped(
+            Sample(t, state.wrench, state.x[3:5], driving), None if before is None else before.slip
+        )
         x = state.x.copy()
-        linear = self._stream.direction.linear
-        x[list(PLANE)] = np.where(linear, x[list(PLANE)], slip.x)
-        return replace(state, moved=at.in_lab(x[None]), slip=slip)
+        for axis, own, linear in self._axes:
+            if not linear:
+                x[axis] = slip.x[own]
+        return state._replace(moved=at.in_lab(x[None]), slip=slip)
 
     def variance(self, state: BaseState) -> np.ndarray:
         """(6,) of the displacement in frame 0 [m2, rad2]."""
@@ -79,24 +74,49 @@ class SlippingBase:
         found[list(HEAVE)] = own.heave_variance
         return found
 
-    def _driven(self, T_lab_0: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-        """Wrench (6,) of inverse dynamics on the floor, and inertia (6, 6), both in frame 0."""
-        model, (order, T_0_root, dual, action, data) = self.lab.floating, self._root
-        root = (pin.SE3(T_lab_0) * T_0_root).homogeneous[None]
-        q = configurations(model, root, motion.q[None, order])[0]
-        v, a = (np.concatenate([np.zeros(6), x[order]]) for x in (motion.v, motion.a))
-        w = -dual @ pin.rnea(model, data, q, v, a)[:6]
-        M = pin.crba(model, data, q)[:6, :6]
-        return w, dual @ (np.triu(M) + np.triu(M, 1).T) @ action
+    def _driven(self, gravity: np.ndarray, moving: np.ndarray) -> np.ndarray:
+        """What the arm does to the base in the floor's plane (9,), see `Sample`; gravity (3,) in frame 0."""
+        tree, actions, work, found = self._robot
+        return np.asarray(driven(tree, actions, gravity, moving, work, found))
 
     @cached_property
-    def _root(self) -> tuple[list[int], pin.SE3, np.ndarray, np.ndarray, pin.Data]:
-        """Order of the joints, T_0_root, how it acts on wrenches and back on twists, scratch of the dynamics."""
-        model, description = self.lab.floating, self.lab.description
-        order = [description.joint_names.index(name) for name in list(model.names)[2:]]
-        T = root_in_base(model, description)
-        return order, T, T.dualAction, T.inverse().action, model.createData()
+    def _robot(self) -> tuple[RigidTree, tuple[np.ndarray, np.ndarray], np.ndarray, TreeDynamics]:
+        """The tree, how T_0_root acts on wrenches and back on twists (6, 6), scratch of the dynamics."""
+        T, tree = root_in_base(self.lab.floating, self.lab.description), self.lab.tree
+        actions = np.array(T.dualAction, order="C"), np.array(T.inverse().action, order="C")
+        return tree, actions, scratch(tree), room(1, len(tree.column))
+
+    @cached_property
+    def _axes(self) -> tuple[tuple[int, int, bool], ...]:
+        """Axis of the displacement, its place in the plane, whether the compliance has it."""
+        return tuple((axis, k, bool(self._stream.direction.linear[k])) for k, axis in enumerate(PLANE))
 
     @cached_property
     def _stream(self) -> SlipStream:
         return slip_stream(self.model)
+
+
+@njit(cache=True, error_model="numpy")
+def driven(
+    tree: RigidTree,
+    actions: tuple[np.ndarray, np.ndarray],
+    gravity: np.ndarray,
+    moving: np.ndarray,
+    work: np.ndarray,
+    found: TreeDynamics,
+) -> np.ndarray:
+    """`SlippingBase._driven` at readings, velocities and accelerations (3, k)."""
+    (dual, back), root, out = actions, np.zeros((1, 12)), np.zeros(9)
+    for i in range(3):
+        for c in range(3):
+            root[0, 6 + i] -= back[i, c] * gravity[c]
+    sample(tree, moving[0:1], moving[1:2], moving[2:3], root, work, found)
+    for i in range(3):
+        for r in range(6):
+            out[i] -= dual[PLANE[i], r] * found.root[0, r]
+    for k in range(6):
+        i, j = _UPPER[k]
+        for r in range(6):
+            for c in range(6):
+                out[3 + k] += dual[i, r] * found.composite[0, r, c] * back[c, j]
+    return out

@@ -103,14 +103,14 @@ class Chain:
         """T_base_frame (n, 4, 4) at q (n, n_measured) [rad, m]; the tool frame where none is named."""
         self._check(q)
         if frame is None:
-            return self.path.placed(q[:, self.columns]).T
+            return self.path.poses(q[:, self.columns])
         if frame not in self._ways:
             end = self._frame(frame)
             names = [self.model.names[i] for i in self.model.supports[self.model.frames[end].parentJoint] if i != 0]
             path = path_of(self.model, self._frame(self.base_frame), end)
             self._ways[frame] = path, [self.measured.index(name) for name in names]
         path, columns = self._ways[frame]
-        return path.placed(q[:, columns]).T
+        return path.poses(q[:, columns])
 
     def poses_and_derivatives(self, q: np.ndarray) -> ChainPoses:
         """Poses of the tool frame with d(pose)/d(xi) and d(pose)/dq, at q (n, n_measured) [rad, m]."""

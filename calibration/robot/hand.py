@@ -116,17 +116,19 @@ class HandModel:
 
     def angles(self, q: np.ndarray) -> np.ndarray:
         """Joint positions (n, n_measured) behind readings q."""
-        out, columns = np.array(q, dtype=float), self.nominal.columns
-        out[:, columns] -= self._reading_error(q[:, columns], self._torques(q, ()))
+        if self._constant is not None:
+            return np.asarray(q - self._constant)
+        out, columns = np.array(q, dtype=float), self._columns
+        out[:, columns] -= self._reading_error(q[:, columns], self.nominal.gravity_torques(q))
         return out
 
-    def in_base_frame(self, q: np.ndarray) -> np.ndarray:
-        """T_base_H (n, 4, 4) at readings q (n, n_measured), in the robot's base frame."""
-        return self.chain.poses(self.angles(q)) @ from_vector(self.hand)
+    def in_base_frame(self, q: np.ndarray, bend: np.ndarray | None = None) -> np.ndarray:
+        """T_base_H (n, 4, 4) at readings q (n, n_measured), in the robot's base frame; `bend` as of `Path.poses`."""
+        return self._in_base.poses(self.angles(q)[:, self._columns], bend)
 
-    def poses(self, q: np.ndarray) -> np.ndarray:
-        """T_B_H (n, 4, 4) at readings q, in the base marker body."""
-        return inverse(from_vector(self.base)) @ self.in_base_frame(q)
+    def poses(self, q: np.ndarray, bend: np.ndarray | None = None) -> np.ndarray:
+        """T_B_H (n, 4, 4) at readings q, in the base marker body; `bend` as of `Path.poses`."""
+        return self._path.poses(self.angles(q)[:, self._columns], bend)
 
     def joint_jacobians(self, q: np.ndarray) -> np.ndarray:
         """Derivatives of T_B_H by joint position (n, 6, k), local twists of the hand, at readings q."""
@@ -172,11 +174,31 @@ class HandModel:
         return np.asarray(sum(block.reading_error(q, tau) for block in self.blocks) + np.zeros_like(q))
 
     @cached_property
+    def _columns(self) -> np.ndarray:
+        return np.array(self.nominal.columns)
+
+    @cached_property
+    def _constant(self) -> np.ndarray | None:
+        """Reading minus angle (n_measured,) where it depends on no torque."""
+        if any(block.loaded and block.values.any() for block in self.blocks):
+            return None
+        constant = np.zeros(len(self.nominal.measured))
+        constant[self._columns] = self._reading_error(*np.zeros((2, 1, len(self._columns))))[0]
+        return constant
+
+    @cached_property
+    def _in_base(self) -> Path:
+        """From the base frame to the hand's marker body."""
+        fixed = np.array(self.chain.path.fixed)
+        fixed[-1] = fixed[-1] @ from_vector(self.hand)
+        return replace(self.chain.path, fixed=fixed)
+
+    @cached_property
     def _path(self) -> Path:
         """From the base's marker body to the hand's."""
-        fixed = np.array(self.chain.path.fixed)
-        fixed[0], fixed[-1] = inverse(from_vector(self.base)) @ fixed[0], fixed[-1] @ from_vector(self.hand)
-        return replace(self.chain.path, fixed=fixed)
+        fixed = np.array(self._in_base.fixed)
+        fixed[0] = inverse(from_vector(self.base)) @ fixed[0]
+        return replace(self._in_base, fixed=fixed)
 
 
 _READINGS: dict[str, type[ParameterBlock]] = {"offset": EncoderZeros, "compliance": Compliance, "gap": BacklashPreload}

@@ -16,8 +16,10 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
-from calibration.numerics.lie import compose, skew
+from calibration.errors import ShapeError
+from calibration.numerics.lie import skew
 
 
 @dataclass(frozen=True)
@@ -83,20 +85,94 @@ class Path:
 
     def placed(self, q: np.ndarray) -> Placed:
         """Frames at joint positions q (n, k) [rad, m]."""
-        n, k = q.shape
-        R, p = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
-        frames, origins = np.empty((3, n, k, 3)), np.empty((3, n, k))
-        for i in range(k + 1):
-            p = p + (R.reshape(-1, 3) @ self.fixed[i, :3, 3]).reshape(n, 3)
-            R = (R.reshape(-1, 3) @ self.fixed[i, :3, :3]).reshape(n, 3, 3)
-            if i == k:
+        T, (n, k) = self._room(q), q.shape
+        R, p = np.empty((3, n, k, 3)), np.empty((3, n, k))
+        _walk(self.fixed, self.axis, self.prismatic, np.array(q, dtype=float, order="C"), np.zeros((0, 3)), T, (R, p))
+        return Placed(T, R, p)
+
+    def poses(self, q: np.ndarray, bend: np.ndarray | None = None) -> np.ndarray:
+        """Poses of the end (n, 4, 4) at positions q (n, k) [rad, m].
+
+        `bend` (n, 3): rotation vectors [rad] by which all that the first joint carries is turned, in its frame.
+        """
+        T, turns = self._room(q), np.zeros((0, 3)) if bend is None else np.array(bend, dtype=float, order="C")
+        angles = np.array(q, dtype=float, order="C")
+        _walk(self.fixed, self.axis, self.prismatic, angles, turns, T, (np.empty((3, 0, 0, 3)), np.empty((3, 0, 0))))
+        return T
+
+    def _room(self, q: np.ndarray) -> np.ndarray:
+        if q.ndim != 2 or q.shape[1] != len(self.axis):
+            raise ShapeError("q", q.shape, ("n", len(self.axis)))
+        return np.zeros((len(q), 4, 4))
+
+
+@njit(cache=True, error_model="numpy")
+def _turn(T: np.ndarray, axis: np.ndarray, sine: float, versine: float) -> None:
+    """Turn the columns of T's rotation about its own unit axis: R (I + sin [a]x + (1 - cos) [a]x^2)."""
+    x, y, z = axis[0], axis[1], axis[2]
+    for i in range(3):
+        a, b, c = T[i, 0], T[i, 1], T[i, 2]
+        along = a * x + b * y + c * z
+        T[i, 0] = a + sine * (b * z - c * y) + versine * (along * x - a)
+        T[i, 1] = b + sine * (c * x - a * z) + versine * (along * y - b)
+        T[i, 2] = c + sine * (a * y - b * x) + versine * (along * z - c)
+
+
+@njit(cache=True, error_model="numpy")
+def _shift(T: np.ndarray, fixed: np.ndarray, own: np.ndarray) -> None:
+    """Multiply T by `fixed` on the right; `own` (3, 4) is scratch."""
+    for i in range(3):
+        for c in range(4):
+            own[i, c] = T[i, 0] * fixed[0, c] + T[i, 1] * fixed[1, c] + T[i, 2] * fixed[2, c]
+    for i in range(3):
+        for c in range(3):
+            T[i, c] = own[i, c]
+        T[i, 3] += own[i, 3]
+
+
+@njit(cache=True, error_model="numpy")
+def _bend(T: np.ndarray, turn: np.ndarray, unit: np.ndarray) -> None:
+    """Turn T about its own axes by a rotation vector; `unit` (3,) is scratch."""
+    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    if angle > 0.0:
+        for i in range(3):
+            unit[i] = turn[i] / angle
+        _turn(T, unit, np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2)
+
+
+@njit(cache=True, error_model="numpy")
+def _walk(
+    fixed: np.ndarray,
+    axis: np.ndarray,
+    prismatic: np.ndarray,
+    q: np.ndarray,
+    bend: np.ndarray,
+    T: np.ndarray,
+    frames: tuple[np.ndarray, np.ndarray],
+) -> None:
+    """Poses T (n, 4, 4) of a path's end; `frames` R, p of `Placed`, `bend` of `Path.poses`, empty where not wanted."""
+    R, p = frames
+    own = np.empty((3, 4))
+    for n in range(len(q)):
+        at = T[n]
+        at[0, 0] = at[1, 1] = at[2, 2] = at[3, 3] = 1.0
+        for k in range(len(fixed)):
+            _shift(at, fixed[k], own)
+            if k == len(axis):
                 break
-            frames[:, :, i], origins[:, :, i] = R.transpose(1, 0, 2), p.T
-            if self.prismatic[i]:
-                p = p + (R.reshape(-1, 3) @ self.axis[i]).reshape(n, 3) * q[:, i : i + 1]
+            if R.shape[1] > 0:
+                for i in range(3):
+                    p[i, n, k] = at[i, 3]
+                    for c in range(3):
+                        R[i, n, k, c] = at[i, c]
+            if prismatic[k]:
+                for i in range(3):
+                    along = at[i, 0] * axis[k, 0] + at[i, 1] * axis[k, 1] + at[i, 2] * axis[k, 2]
+                    at[i, 3] += along * q[n, k]
             else:
-                R = turned(R, self.axis[i], q[:, i])
-        return Placed(compose(R, p), frames, origins)
+                _turn(at, axis[k], np.sin(q[n, k]), 1.0 - np.cos(q[n, k]))
+            if k == 0 and len(bend) > 0:
+                _bend(at, bend[n], own[0, :3])
 
 
 def turned(R: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -127,3 +203,13 @@ def unit_twists(model: pin.Model) -> np.ndarray:
         J = pin.computeJointJacobian(model, data, neutral, i).reshape(6, model.nv)  # a vector where there is one joint
         S[i] = J[:, model.joints[i].idx_v]
     return S
+
+
+@njit(cache=True, error_model="numpy")
+def beyond(q: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:
+    """Whether any of q (n, k) is outside limits (k,)."""
+    for i in range(q.shape[0]):
+        for j in range(q.shape[1]):
+            if q[i, j] < low[j] or q[i, j] > high[j]:
+                return True
+    return False

@@ -16,6 +16,7 @@ from calibration.robot.chain import Chain, chain_of
 from calibration.robot.floating_base import floating_model
 from calibration.robot.gravity import gravity_torques
 from calibration.robot.nominal_frames import nominal_base_body, nominal_frames
+from calibration.robot.rigid_tree import RigidTree, tree_of
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,11 @@ class Laboratory:
     def floating(self) -> pin.Model:
         """Free-flyer model with the payload and gravity of the description."""
         return floating_model(self.urdf, self.description)
+
+    @cached_property
+    def tree(self) -> RigidTree:
+        """The floating model made ready for its dynamics, readings in the order of the description."""
+        return tree_of(self.floating, self.description.joint_names)
 
     @cached_property
     def nominal_frames(self) -> np.ndarray:

@@ -58,8 +58,10 @@ def without_nuisances(A: np.ndarray, B: np.ndarray, r: np.ndarray, S: np.ndarray
     size, b = np.linalg.norm(A, axis=0), B.shape[1]
     A = A[:, size > 0.0] / size[size > 0.0]
     D = np.block([[A, B], [np.zeros((b, A.shape[1])), np.eye(b)]])
-    U, values, _ = np.linalg.svd(D, full_matrices=False)
-    U = U[:, values > 1e-8 * values[0]]
+    U, R = np.linalg.qr(D)
+    turn, values, _ = np.linalg.svd(R)
+    if not (kept := values > 1e-8 * values[0]).all():
+        U = U @ turn[:, kept]
     y = np.concatenate([np.column_stack([r, S]), np.zeros((b, 1 + S.shape[1]))])
     y = y - U @ (U.T @ y)
     return Reduced(y[:, 0], y[:, 1:], U, t)

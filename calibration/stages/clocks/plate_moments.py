@@ -29,8 +29,8 @@ from calibration.numerics.signals import RATE, Signal, even, interpolate_columns
 from calibration.numerics.time_delay import Pair, coarse_lag
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import Trial
-from calibration.robot.floating_base import configurations, root_wrenches
 from calibration.robot.kinematics import path_of
+from calibration.robot.rigid_tree import dynamics_along, tree_of
 
 _CUTOFF = 4.0  # [Hz]
 _DECIMATED = 0.01  # [s] plate samples averaged together
@@ -121,9 +121,11 @@ def _carried(part: Carrier, trial: MeasuredTrial, q: Signal) -> tuple[np.ndarray
     T = T_lab_link @ inverse(_root_to_link(part, q.x))
     rates, turns, link_turns = np.gradient(q.x, 1.0 / RATE, axis=0), _body_twists(T), _body_twists(T_lab_link)
     accelerations, pushes, link_pushes = (np.gradient(v, 1.0 / RATE, axis=0) for v in (rates, turns, link_turns))
-    at = configurations(part.model, T[rows], q.x[rows])
-    v, a = np.hstack([turns, rates])[rows], np.hstack([pushes, accelerations])[rows]
-    whole = _action(T[rows], trial) @ root_wrenches(part.model, at, v, a)[..., None]
+    proper = pushes[rows]
+    proper[:, :3] -= part.model.gravity.linear @ T[rows, :3, :3]
+    tree, root = tree_of(part.model, tuple(list(part.model.names)[2:])), np.hstack([turns[rows], proper])
+    along = dynamics_along(tree, q.x[rows], rates[rows], accelerations[rows], root)
+    whole = _action(T[rows], trial) @ along.root[..., None]
     R = T_lab_link[rows, :3, :3]
     felt = link_pushes[rows]
     felt[:, :3] -= part.model.gravity.linear @ R
@@ -155,7 +157,7 @@ def _root_to_link(part: Carrier, q: np.ndarray) -> np.ndarray:
     model, link = part.model, part.model.getFrameId(part.body.link)
     path = path_of(model, model.getFrameId(model.names[1]), link)
     joints = list(model.supports[model.frames[link].parentJoint])[2:]
-    return path.placed(q[:, [i - 2 for i in joints]]).T
+    return path.poses(q[:, [i - 2 for i in joints]])
 
 
 def _body_twists(T: np.ndarray) -> np.ndarray:

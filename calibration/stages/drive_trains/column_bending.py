@@ -41,10 +41,11 @@ class ColumnBending:
     compliance: np.ndarray
     sigma: np.ndarray
 
-    def rotations(self, moment: np.ndarray) -> np.ndarray:
-        """(n, 3, 3) of what the column carries, in its frame, under moments (n, 2) [N.m]."""
-        turn = np.column_stack([-self.compliance * moment, np.zeros(len(moment))])
-        return np.asarray(Rotation.from_rotvec(turn).as_matrix())
+    def turns(self, moment: np.ndarray) -> np.ndarray:
+        """Rotation vectors (n, 3) [rad] of what the column carries, in its frame, under moments (n, 2) [N.m]."""
+        turn = np.zeros((len(moment), 3))
+        turn[:, :2] = -self.compliance * moment
+        return turn
 
     def parameters(self, link: str) -> tuple[Quantity, ...]:
         """Stiffness about both axes, of the column's link."""
@@ -86,14 +87,14 @@ def column_bending(
 
 def bent(hand: HandModel, bending: ColumnBending, q: np.ndarray, moment: np.ndarray) -> np.ndarray:
     """T_B_H (n, 4, 4) at link angles q (n, n_measured) with the column bent under moments (n, 2)."""
-    return moved(hand, bending, q, moment) @ hand.poses(q)
+    return hand.poses(q, bending.turns(moment))
 
 
 def moved(hand: HandModel, bending: ColumnBending, q: np.ndarray, moment: np.ndarray) -> np.ndarray:
     """The motion (n, 4, 4) of all the column carries, in the base's marker body."""
     T_base_column = hand.chain.poses(hand.angles(q), bending.joint)
     T_B_base = inverse(_base(hand))
-    turn = compose(bending.rotations(moment), np.zeros((len(q), 3)))
+    turn = compose(Rotation.from_rotvec(bending.turns(moment)).as_matrix(), np.zeros((len(q), 3)))
     return np.asarray(T_B_base @ T_base_column @ turn @ inverse(T_base_column) @ _base(hand))
 
 

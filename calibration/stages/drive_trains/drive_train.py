@@ -20,6 +20,7 @@ from calibration.stages.drive_trains.link_motion import (
     COMPLIANCE,
     COULOMB,
     HALF_GAP,
+    LIGHT,
     Drive,
     deflection,
     played,
@@ -33,7 +34,6 @@ VALUES = ("half_gap", "compliance", "coulomb", "viscous", "relaxation", "spring"
 HARMONICS = ("cos1", "sin1", "cos2", "sin2")
 LONGEST = 3.4e-3  # [s] step of the link's motion
 _RIGID = 1e-7  # [rad/(N.m)] least compliance that is simulated
-LIGHT = 1e-5  # [kg.m2] least inertia
 
 
 @dataclass(frozen=True)

@@ -15,32 +15,25 @@ those of the recording in one go.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from calibration.errors import NoSuchElement, ShapeError
 from calibration.recording.schema import Description
 from calibration.robot.floating_base import floating_model
+from calibration.robot.rigid_tree import TreeDynamics, room, scratch
 from calibration.stages.drive_trains import link_motion
-from calibration.stages.drive_trains.drive_train import (
-    LIGHT,
-    LONGEST,
-    DriveTrain,
-    Quantity,
-    drive_motion,
-    harmonic_terms,
-)
-from calibration.stages.drive_trains.link_motion import COMPLIANCE
-from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, inertials, regressor_columns
+from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
+from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Drives
+from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, inertials
 
 _SURE = 0.5  # share of the half gap
 _RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
 _WOUND = 3e-4  # [rad] an interval as narrow as this is of one side, however small the gap
 
 
-@dataclass(frozen=True)
-class LinkAngles:
+class LinkAngles(NamedTuple):
     """Joint angles behind motor readings, zeros of the readings included, all (n, k).
 
     Attributes:
@@ -165,135 +158,108 @@ def zeros_of(trains: DriveTrains, deltas: Sequence[np.ndarray]) -> np.ndarray:
     return np.mean(deltas, axis=0) if len(deltas) else np.zeros(len(trains.joints))
 
 
-@dataclass(frozen=True)
-class StreamState:
+class StreamState(NamedTuple):
     """Where m drive trains are.
 
     Attributes:
         t: [s].
-        q: (m,) motor readings [rad].
-        v: (m,) motor velocities [rad/s].
-        torque: (m,) [N.m].
-        inertia: (m,) [kg.m2].
+        moving: (3, k) readings, velocities and accelerations of all motors [rad, m, s].
+        samples: (4, m) motor readings [rad], velocities [rad/s], torques [N.m] and inertias [kg.m2].
         states: (m, 5, 3) delta, its rate and the slider of each run.
+        torque: (1, k) nominal, on all joints [N.m, N].
+        moment: (1, 2) on the column [N.m].
     """
 
     t: float
-    q: np.ndarray
-    v: np.ndarray
-    torque: np.ndarray
-    inertia: np.ndarray
+    moving: np.ndarray
+    samples: np.ndarray
     states: np.ndarray
+    torque: np.ndarray
+    moment: np.ndarray
 
 
 @dataclass(frozen=True)
 class Stream:
-    """Drive trains made ready for single samples, see `stream_of`; all of m drive trains.
+    """Drive trains made ready for single samples, see `stream_of`.
 
     Attributes:
-        trains: The drive trains.
-        columns: (m,) column of each in the readings.
-        values: (m, 7) as simulated.
-        inertials: (m, p) of each load.
-        link_inertia: (m,) [kg.m2].
-        offs: (m, 5) error of the torque in each run [N.m].
-        shifts: (m, 5) that it winds a mesh up by [rad].
-        motor: (m, 4) eccentricities [rad].
-        dynamic: (m,) whose links' inertia counts.
-        played: (m,) which are play operators.
-        one_side: (m,) width of an interval below which the side is known [rad].
-        residual: (m,) variance that trials left out kept [rad2].
-        eccentric: Whether any motor encoder is.
-        data: Scratch of the dynamics.
-        velocities: (k,) index of each measured joint's velocity.
-        wanted: Columns of the torque regressor.
+        trains: The drive trains, m of them.
+        prepared: Their parameters.
+        at_rest: (1, 12) twist and proper acceleration of a base that is level and at rest.
+        work: Scratch of the dynamics.
+        found: Room for the dynamics.
     """
 
     trains: DriveTrains
-    columns: np.ndarray
-    values: np.ndarray
-    inertials: np.ndarray
-    link_inertia: np.ndarray
-    offs: np.ndarray
-    shifts: np.ndarray
-    motor: np.ndarray
-    dynamic: np.ndarray
-    played: np.ndarray
-    one_side: np.ndarray
-    residual: np.ndarray
-    eccentric: bool
-    data: pin.Data
-    velocities: np.ndarray
-    wanted: np.ndarray
+    prepared: Drives
+    at_rest: np.ndarray
+    work: np.ndarray
+    found: TreeDynamics
 
     def begin(
         self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None = None
     ) -> tuple[StreamState, LinkAngles]:
         """The state at a first sample q, v, a (k,) of an unknown history, and its link angles (1, k)."""
-        torque, inertia = self._loads(q, v, a, base)
-        states = np.zeros((len(self.columns), _RUNS, 3))
-        for i, train in enumerate(self.trains.trains):
-            low, high = train.at_rest(float(torque[i]))
+        state, found, angles = self._room(t, q, v, a)
+        robot, drives, states = self.trains.dynamics, self.prepared, state.states
+        root = self.at_rest if base is None else robot.root(base[None])
+        link_motion.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
+        for i, (train, torque) in enumerate(zip(self.trains.trains, state.samples[TORQUE], strict=True)):
+            low, high = train.at_rest(float(torque))
             starts = [low + train.start[0] * (high - low)]
-            for off in self.offs[i, 1::2]:
-                starts += train.at_rest(float(torque[i] + off))
+            for off in drives.offs[i, 1::2]:
+                starts += train.at_rest(float(torque + off))
             states[i, :, 0] = states[i, :, 2] = starts
-        state = StreamState(t, q[self.columns], v[self.columns], torque, inertia, states)
-        return state, self._angles(state, q)
+        link_motion.link_angles(states, state.moving[0], drives, angles)
+        return state, _link_angles(angles)
 
     def step(
         self, before: StreamState, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None = None
     ) -> tuple[StreamState, LinkAngles]:
         """The state one sample q, v, a (k,) later and its link angles (1, k); base (6,) as `link_angles` has it."""
-        torque, inertia = self._loads(q, v, a, base)
-        states, m = before.states.copy(), len(self.columns)
-        state = StreamState(t, q[self.columns], v[self.columns], torque, inertia, states)
-        earlier, now = (link_motion.Drive(np.full(m, s.t), s.q, s.v, s.torque, s.inertia) for s in (before, state))
-        link_motion.stream(states, earlier, now, self.offs, LONGEST, self.values, self.played)
-        return state, self._angles(state, q)
+        state, found, angles = self._room(t, q, v, a)
+        robot, drives = self.trains.dynamics, self.prepared
+        state.states[:] = before.states
+        root = self.at_rest if base is None else robot.root(base[None])
+        link_motion.advanced_drives(
+            robot.tree, drives, root, self.work, found, state.moving, before.samples, state.states, t - before.t,
+            LONGEST, state.samples, angles,
+        )  # fmt: skip
+        return state, _link_angles(angles)
 
-    def _loads(
-        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Torque and inertia (m,) of each drive train."""
-        robot, c = self.trains.dynamics, self.columns
-        torque, inertia, R, _ = robot.at(self.data, self.velocities, self.wanted, q, v, a, base)
-        own = torque[c] + (R[c] * self.inertials).sum(axis=1) + self.link_inertia * a[c]
-        return own, np.where(self.dynamic, np.maximum(inertia[c] + self.link_inertia, LIGHT), LIGHT)
+    def _room(
+        self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray
+    ) -> tuple[StreamState, TreeDynamics, np.ndarray]:
+        """A state, dynamics and link angles (5, 1, k) to be filled."""
+        m, moving, scratch = len(self.prepared.columns), np.array([q, v, a], dtype=float), self.found
+        torque, moment, angles = np.empty((1, len(q))), np.empty((1, 2)), np.empty((5, 1, len(q)))
+        found = TreeDynamics(
+            torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.regressor
+        )
+        return StreamState(t, moving, np.empty((4, m)), np.zeros((m, _RUNS, 3)), torque, moment), found, angles
 
-    def _angles(self, state: StreamState, q: np.ndarray) -> LinkAngles:
-        delta, c = state.states[:, :, 0] - self.shifts, self.columns
-        top, bottom = delta.max(axis=1), delta.min(axis=1)
-        bare = state.q
-        if self.eccentric:
-            bare = bare - (harmonic_terms(state.q - self.trains.dynamics.offset[c]) * self.motor).sum(axis=1)
-        found, sure, variance = np.empty((3, 1, len(q))), np.ones((1, len(q)), dtype=bool), np.zeros((1, len(q)))
-        found[:, 0] = q
-        found[0, 0, c], found[1, 0, c], found[2, 0, c] = bare - delta[:, 0], bare - top, bare - bottom
-        sure[0, c], variance[0, c] = top - bottom < self.one_side, (top - bottom) ** 2 / 12.0 + self.residual
-        return LinkAngles(found[0], found[1], found[2], sure, variance)
+
+def _link_angles(angles: np.ndarray) -> LinkAngles:
+    return LinkAngles(angles[0], angles[1], angles[2], angles[4] > 0.0, angles[3])
 
 
 def stream_of(trains: DriveTrains) -> Stream:
     """Drive trains made ready for single samples."""
     of, robot = trains.trains, trains.dynamics
-    p = len(inertials(robot))
+    p, k = len(inertials(robot)), len(trains.joints)
     offs = np.array([[0.0, -s, -s, s, s] for s in (2.0 * t.torque_sigma for t in of)]).reshape(-1, _RUNS)
-    return Stream(
-        trains,
-        np.array([trains.joints.index(t.joint) for t in of], dtype=int),
+    prepared = Drives(
+        np.array([trains.joints.index(t.joint) for t in of], dtype=np.int64),
         np.array([t.simulated_values for t in of]).reshape(-1, 7),
         np.array([t.inertials if len(t.inertials) else np.zeros(p) for t in of]).reshape(-1, p),
-        np.array([t.link_inertia for t in of]),
+        np.array([t.link_inertia for t in of], dtype=float),
+        np.array([t.dynamic for t in of], dtype=bool),
         offs,
         offs * np.array([t.values[COMPLIANCE] for t in of])[:, None],
         np.array([t.motor for t in of]).reshape(-1, 4),
-        np.array([t.dynamic for t in of], dtype=bool),
         np.array([not t.dynamic and t.form == "dead_zone" for t in of], dtype=bool),
-        np.array([one_side(t) for t in of]),
-        np.array([t.residual**2 for t in of]),
-        any(t.motor.any() for t in of),
-        robot.model.createData(),
-        robot.columns,
-        regressor_columns(robot.model),
+        np.array([one_side(t) for t in of], dtype=float),
+        np.array([t.residual**2 for t in of], dtype=float),
+        np.array(robot.offset, dtype=float),
     )
+    return Stream(trains, prepared, robot.root(None), scratch(robot.tree), room(1, k, True))

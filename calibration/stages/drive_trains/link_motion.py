@@ -23,7 +23,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from calibration.robot.rigid_tree import RigidTree, TreeDynamics, sample
+
 HALF_GAP, COMPLIANCE, COULOMB, VISCOUS, RELAXATION, SPRING, SLIP = range(7)  # order of `values`
+LIGHT = 1e-5  # [kg.m2] least inertia
+Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
 _NEWTON = 12
 _STILL = 3e-5  # [rad] between two samples: one step will do
 
@@ -153,20 +157,111 @@ def played(drive: Drive, begins: np.ndarray, starts: np.ndarray, values: np.ndar
     return out
 
 
-@njit(cache=True, error_model="numpy")
-def stream(
-    states: np.ndarray, a: Drive, b: Drive, offs: np.ndarray, longest: float, values: np.ndarray, plays: np.ndarray
-) -> None:
-    """Move states (m, c, 3) of m joints from samples a to b, (m,) each: c runs with torques off by offs (m, c).
+class Drives(NamedTuple):
+    """Drive trains made ready for single samples, m of them in a robot of k joints.
 
-    `plays` (m,): the joint is a play operator.
+    Attributes:
+        columns: (m,) column of each in the readings.
+        values: (m, 7) as simulated.
+        inertials: (m, p) of each load.
+        link_inertia: (m,) [kg.m2].
+        dynamic: (m,) whose links' inertia counts.
+        offs: (m, c) error of the torque in each run [N.m].
+        shifts: (m, c) that it winds a mesh up by [rad].
+        motor: (m, 4) eccentricities [rad].
+        plays: (m,) which are play operators.
+        one_side: (m,) width of an interval below which the side is known [rad].
+        residual: (m,) variance that trials left out kept [rad2].
+        offset: (k,) zeros of all readings [rad, m].
     """
+
+    columns: np.ndarray
+    values: np.ndarray
+    inertials: np.ndarray
+    link_inertia: np.ndarray
+    dynamic: np.ndarray
+    offs: np.ndarray
+    shifts: np.ndarray
+    motor: np.ndarray
+    plays: np.ndarray
+    one_side: np.ndarray
+    residual: np.ndarray
+    offset: np.ndarray
+
+
+@njit(cache=True, error_model="numpy")
+def loaded(
+    tree: RigidTree, drives: Drives, root: np.ndarray, work: np.ndarray, found: TreeDynamics, moving: np.ndarray,
+    samples: np.ndarray,
+) -> None:  # fmt: skip
+    """Dynamics of one sample into `found`, and what moves each link into `samples` (4, m).
+
+    `moving` (3, k) are readings, velocities and accelerations, `root` and `work` as of `rigid_tree`.
+    """
+    angle, v, a = np.empty((1, moving.shape[1])), moving[1:2], moving[2:3]
+    for j in range(moving.shape[1]):
+        angle[0, j] = moving[0, j] - drives.offset[j]
+    sample(tree, angle, v, a, root, work, found)
+    x, y, z, p = root[0, 6], root[0, 7], root[0, 8], found.regressor.shape[2]
+    for i in range(len(drives.columns)):
+        c, phi, pull = drives.columns[i], drives.inertials[i], found.coupling[0, drives.columns[i]]
+        torque = found.torque[0, c] + drives.link_inertia[i] * a[0, c]
+        for k in range(p):
+            torque += found.regressor[0, c, k] * phi[k]
+        tilt_x, tilt_y = pull[1] * z - pull[2] * y, pull[2] * x - pull[0] * z
+        torque += tilt_x * (phi[p] - found.moment[0, 0] * phi[p + 2])
+        torque += tilt_y * (phi[p + 1] - found.moment[0, 1] * phi[p + 2])
+        samples[Q, i], samples[V, i], samples[TORQUE, i] = moving[0, c], v[0, c], torque
+        samples[INERTIA, i] = max(found.inertia[0, c] + drives.link_inertia[i], LIGHT) if drives.dynamic[i] else LIGHT
+
+
+@njit(cache=True, error_model="numpy")
+def streamed(
+    states: np.ndarray, before: np.ndarray, samples: np.ndarray, dt: float, longest: float, drives: Drives
+) -> None:
+    """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`."""
+    m, torques = samples.shape[1], np.empty((2, samples.shape[1]))
+    times = np.zeros((2, m))
+    times[1] += dt
     for j in range(states.shape[1]):
-        before = Drive(a.t, a.q, a.v, a.torque + offs[:, j], a.inertia)
-        after = Drive(b.t, b.q, b.v, b.torque + offs[:, j], b.inertia)
-        for i in range(states.shape[0]):
-            if plays[i]:
-                moved = states[i, j, 0] + b.q[i] - a.q[i]
-                states[i, j, 0] = carried(moved, after, i, values[i])
+        for i in range(m):
+            torques[0, i] = before[TORQUE, i] + drives.offs[i, j]
+            torques[1, i] = samples[TORQUE, i] + drives.offs[i, j]
+        a = Drive(times[0], before[Q], before[V], torques[0], before[INERTIA])
+        b = Drive(times[1], samples[Q], samples[V], torques[1], samples[INERTIA])
+        for i in range(m):
+            if drives.plays[i]:
+                states[i, j, 0] = carried(states[i, j, 0] + b.q[i] - a.q[i], b, i, drives.values[i])
             else:
-                advanced(states[i, j], before, i, after, i, longest, values[i])
+                advanced(states[i, j], a, i, b, i, longest, drives.values[i])
+
+
+@njit(cache=True, error_model="numpy")
+def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarray) -> None:
+    """Angles (5, 1, k) behind readings q (k,): likely, least, largest, variance, 1 where the side is known."""
+    for j in range(len(q)):
+        out[0, 0, j] = out[1, 0, j] = out[2, 0, j] = q[j]
+        out[3, 0, j], out[4, 0, j] = 0.0, 1.0
+    for i in range(len(drives.columns)):
+        c, e = drives.columns[i], drives.motor[i]
+        top, bottom, theta = -np.inf, np.inf, q[c] - drives.offset[c]
+        for j in range(states.shape[1]):
+            delta = states[i, j, 0] - drives.shifts[i, j]
+            top, bottom = max(top, delta), min(bottom, delta)
+        bare = q[c] - e[0] * np.cos(theta) - e[1] * np.sin(theta) - e[2] * np.cos(2 * theta) - e[3] * np.sin(2 * theta)
+        width = top - bottom
+        out[0, 0, c] = bare - (states[i, 0, 0] - drives.shifts[i, 0])
+        out[1, 0, c], out[2, 0, c] = bare - top, bare - bottom
+        out[3, 0, c] = width**2 / 12.0 + drives.residual[i]
+        out[4, 0, c] = 1.0 if width < drives.one_side[i] else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def advanced_drives(
+    tree: RigidTree, drives: Drives, root: np.ndarray, work: np.ndarray, found: TreeDynamics, moving: np.ndarray,
+    before: np.ndarray, states: np.ndarray, dt: float, longest: float, samples: np.ndarray, angles: np.ndarray,
+) -> None:  # fmt: skip
+    """`loaded`, `streamed` and `link_angles` of a sample dt [s] after `before`."""
+    loaded(tree, drives, root, work, found, moving, samples)
+    streamed(states, before, samples, dt, longest, drives)
+    link_angles(states, moving[0], drives, angles)

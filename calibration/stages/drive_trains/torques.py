@@ -10,6 +10,7 @@ carries by its compliance times the moment of what it carries. 5 mrad are a fift
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -24,11 +25,11 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.floating_base import floating_model
+from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
 
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second
 _SLOW, _FAST = 5.0, 12.0  # [Hz] of the base's, from markers: at all times, and where it is jolted
 _JOLT = 0.15  # [s] over which the energy of a jolt is compared with the noise
-_ROOT = 6  # velocities of the floating base
 _TILTS = 3  # columns of tilt and bending
 _TILT, _BENDING = 5e-3, 1e-4  # [rad], [rad/(N.m)] their prior standard deviations
 
@@ -78,10 +79,10 @@ class Dynamics:
     offset: np.ndarray
     gravity: np.ndarray
 
-    @property
-    def columns(self) -> np.ndarray:
-        """(k,) velocity index of each measured joint."""
-        return np.array([self.model.joints[self.model.getJointId(name)].idx_v for name in self.joints])
+    @cached_property
+    def tree(self) -> RigidTree:
+        """The model made ready for its dynamics."""
+        return tree_of(self.model, self.joints)
 
     def loads(
         self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None = None, regressors: bool = False
@@ -94,42 +95,26 @@ class Dynamics:
         self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, regressors: bool
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Torques and inertias (n, k), regressors (n, k, p), moments (n, 2) at readings and derivatives (n, k)."""
-        data, columns = self.model.createData(), self.columns
-        wanted = regressor_columns(self.model) if regressors else np.zeros(0, dtype=int)
-        p = len(inertials(self)) if regressors else 0
-        torque, inertia = np.empty(q.shape), np.empty(q.shape)
-        R, moment = np.empty((*q.shape, p)), np.empty((len(q), 2))
-        for i in range(len(q)):
-            proper = None if base is None else base[i]
-            torque[i], inertia[i], R[i], moment[i] = self.at(data, columns, wanted, q[i], v[i], a[i], proper)
-        return torque, inertia, R, moment
+        root = self.root(base)
+        found = dynamics_along(self.tree, q - self.offset, v, a, root, regressors)
+        if not regressors:
+            return found.torque, found.inertia, found.regressor, found.moment
+        push, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
+        tilt = np.stack(
+            [
+                pull[..., 1] * push[..., 2] - pull[..., 2] * push[..., 1],
+                pull[..., 2] * push[..., 0] - pull[..., 0] * push[..., 2],
+            ],
+            axis=2,
+        )
+        bending = -(tilt @ found.moment[..., None])
+        return found.torque, found.inertia, np.concatenate([found.regressor, tilt, bending], axis=2), found.moment
 
-    def at(
-        self, data: pin.Data, columns: np.ndarray, wanted: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray,
-        base: np.ndarray | None,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-        """The same (k,), (k,), (k, p), (2,) of one sample; `columns` and `wanted` as of `evaluated`, `data` scratch."""
-        model = self.model
-        at, rate, push = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)
-        at[_ROOT] = 1.0
-        at[columns + 1], rate[columns], push[columns] = q - self.offset, v, a
+    def root(self, base: np.ndarray | None) -> np.ndarray:
+        """Twist, zero, and proper acceleration (n, 12) of the base; `base` (n, 6) as of `loads`."""
         if base is None:
-            push[:3] = -self.gravity
-        else:
-            push[:_ROOT] = base
-        torque = pin.rnea(model, data, at, rate, push)[columns]
-        load = data.f[2].angular[:2]
-        H = pin.crba(model, data, at)
-        inertia = H.diagonal()[columns]
-        if not len(wanted):
-            return torque, inertia, np.zeros((len(q), 0)), load
-        R = np.empty((len(q), len(wanted) + _TILTS))
-        R[:, :-_TILTS] = pin.computeJointTorqueRegressor(model, data, at, rate, push)[columns[:, None], wanted]
-        x, y, z = push[:3]
-        turned = np.array([[0.0, -z], [z, 0.0], [-y, x]])  # a_0 x e of both axes
-        tilt = H[:3, columns].T @ turned
-        R[:, -_TILTS:-1], R[:, -1] = tilt, -tilt @ load
-        return torque, inertia, R, load
+            return np.concatenate([np.zeros(6), -self.gravity, np.zeros(3)])[None]
+        return np.hstack([np.zeros_like(base), base])
 
 
 def dynamics(urdf: str, description: Description, offset: np.ndarray) -> Dynamics:
@@ -137,12 +122,6 @@ def dynamics(urdf: str, description: Description, offset: np.ndarray) -> Dynamic
     model = floating_model(urdf, description)
     model.gravity = pin.Motion.Zero()
     return Dynamics(model, description.joint_names, offset, np.array(description.gravity))
-
-
-def regressor_columns(model: pin.Model) -> np.ndarray:
-    """Columns of mass and first moments of every body beyond the root in a joint-torque regressor."""
-    bodies = np.arange(1, model.njoints - 1)
-    return (10 * bodies[:, None] + np.arange(4)).ravel()
 
 
 def inertials(robot: Dynamics) -> tuple[tuple[str, str], ...]:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
 from calibration.stages.drive_trains.drive_train import DriveTrain, Form
 from calibration.stages.drive_trains.joint_data import JointData
@@ -205,13 +206,30 @@ def weights(problem: Problem, r: np.ndarray, scales: np.ndarray) -> np.ndarray:
 
 def sizes(problem: Problem, r: np.ndarray, floor: float) -> np.ndarray:
     """Size (n_groups,) [rad] of each group's residuals: the scale of Student's distribution, by its fixed point."""
-    data, n = problem.data, problem.data.n_groups
-    square = np.where(data.known, r, 0.0) ** 2
-    count = np.maximum(np.bincount(data.group, data.known, n), 1.0)
-    s = np.maximum(np.sqrt(np.bincount(data.group, square, n) / count), floor)
+    data = problem.data
+    weight = np.where(data.known, data.weight, 0.0)
+    return np.asarray(_sizes(weight, np.where(data.known, r, 0.0) ** 2, data.group, data.n_groups, floor))
+
+
+@njit(cache=True, error_model="numpy")
+def _sizes(weight: np.ndarray, square: np.ndarray, group: np.ndarray, n: int, floor: float) -> np.ndarray:
+    """`sizes` by squares (k,), 0 where there is no residual, as its weight is."""
+    count, total, s = np.zeros(n), np.zeros(n), np.empty(n)
+    for i in range(len(group)):
+        count[group[i]] += weight[i] > 0.0
+        total[group[i]] += square[i]
+    for j in range(n):
+        count[j] = max(count[j], 1.0)
+        s[j] = max(np.sqrt(total[j] / count[j]), floor)
     for _ in range(12):
-        total = np.bincount(data.group, weights(problem, r, s) * square, n)
-        s = np.maximum(np.sqrt(s**2 * total / count), floor)
+        for j in range(n):
+            total[j] = 0.0
+        for i in range(len(group)):
+            if weight[i] > 0.0:
+                left = NU * s[group[i]] ** 2 + weight[i] * square[i]
+                total[group[i]] += weight[i] * (NU + 1.0) / left * square[i]
+        for j in range(n):
+            s[j] = max(np.sqrt(s[j] ** 2 * total[j] / count[j]), floor)
     return s
 
 

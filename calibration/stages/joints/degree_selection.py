@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from calibration.numerics.robust_covariance import BlockCovariance, block_covariance
 from calibration.options import Terms
@@ -24,6 +25,7 @@ from calibration.stages.joints.separable_fit import RANK, RHO, Problem, Projecti
 
 HIGHEST = 5
 _WORTH = 0.95  # a model that leaves more than this share of the mean square is not worth its coefficients [-]
+_CLEAR = 1e3 * RANK  # least over largest of R's diagonal, above which columns are clearly of full rank [-]
 _TIE = 1.3  # scores within this factor of the best are as good: a handful of trials tells no better [-]
 
 
@@ -102,12 +104,22 @@ def _left_out(
     for rho, of_others in zip(rho_grid(), zip(*(factors[t] for t in others), strict=True), strict=True):
         R = np.asarray(np.linalg.qr(np.vstack(of_others), mode="r"))
         for which, powers in enumerate(sets):
-            M = R[:, _columns(basis, powers)]
-            x = np.linalg.lstsq(M, R[:, -1], rcond=RANK)[0]
-            best[which] = min(best[which], (float(((R[:, -1] - M @ x) ** 2).sum()), float(rho), x), key=lambda b: b[0])
+            x, square = _solved(R[:, _columns(basis, powers)], R[:, -1])
+            best[which] = min(best[which], (square, float(rho), x), key=lambda b: b[0])
     domain, s = box(pooled([samples[t] for t in others])), samples[k]
     whole = Problem(basis(np.clip(s.theta, *domain[0]), np.clip(s.tau, *domain[1])), s.velocity, s.y)
     return [whole.design(rho)[:, _columns(basis, powers)] @ x for powers, (_, rho, x) in zip(sets, best, strict=True)]
+
+
+def _solved(M: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
+    """Least squares M x = y, the least x where columns are alike, and the squares that are left."""
+    Q, R = np.linalg.qr(M)
+    size = np.abs(R.diagonal())
+    if len(M) >= M.shape[1] and size.min(initial=np.inf) > _CLEAR * size.max(initial=0.0):
+        x = solve_triangular(R, Q.T @ y, check_finite=False)
+    else:
+        x = np.linalg.lstsq(M, y, rcond=RANK)[0]
+    return x, float(((y - M @ x) ** 2).sum())
 
 
 def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:

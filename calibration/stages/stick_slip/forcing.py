@@ -12,21 +12,20 @@ alone moves it, at the rate of the correction.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE, Signal, even, low_passed
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.stick_slip.kernel import COLUMNS, PLATE
+from calibration.robot.rigid_tree import dynamics_along
+from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STEPS
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
-from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load
+from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load, root_in_base
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source
 
 CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
-STEPS = 2  # of the integration to a sample
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -159,19 +158,11 @@ def composite_inertia(
     lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (k,) [s, mocap clock] and M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes."""
-    model, description = lab.floating, lab.description
-    order = [description.joint_names.index(name) for name in list(model.names)[2:]]
-    q = low_passed(even(t, q_motor[:, order]), CUTOFF)
-    T_0_root = model.frames[model.getFrameId(description.base_frame)].placement.inverse()
-    root = pin.SE3ToXYZQUAT(pin.SE3(T_lab_0) * T_0_root)
-    neutral = pin.neutral(model)
-    neutral[:7] = root
-    data, to_0, of_0 = model.createData(), T_0_root.dualAction, T_0_root.inverse().action
-    found = []
-    for row in q.x[::_INERTIA_STRIDE]:
-        M = pin.crba(model, data, pin.integrate(model, neutral, np.concatenate([np.zeros(6), row])))[:6, :6]
-        found.append(to_0 @ (np.triu(M) + np.triu(M, 1).T) @ of_0)
-    return q.t[::_INERTIA_STRIDE], np.array(found)
+    q = low_passed(even(t, q_motor), CUTOFF)
+    T_0_root, rows = root_in_base(lab.floating, lab.description), q.x[::_INERTIA_STRIDE]
+    none = np.zeros_like(rows)
+    M = dynamics_along(lab.tree, rows, none, none, np.zeros((1, 12))).composite
+    return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
 
 
 def _resampled(t: np.ndarray, M: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from numba import njit
 
 PLATE = 8  # first of the plate's columns of `drive`
 STATE = 19  # numbers of a state, see `advance`
+STEPS = 2  # of the integration to a sample
 COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
 
 
@@ -224,26 +225,24 @@ def advance_members(
 
 @njit(cache=True, error_model="numpy")
 def banded(
-    moved: np.ndarray,
+    ensemble: tuple[np.ndarray, np.ndarray, np.ndarray],
     before: np.ndarray,
     share: float,
     band: np.ndarray,
-    spread: np.ndarray,
-    preloaded: np.ndarray,
     elastic: np.ndarray,
-) -> np.ndarray:
+    out: np.ndarray,
+) -> None:
     """Band and believed motion of one sample, see `band`: rows mean, path, largest square of a slip, x, variance, G.
 
     Args:
-        moved: (3,) mean of the members.
+        ensemble: As of `advance_members`, (3,) each.
         before: (6, 3) as returned a sample ago.
         share: That slid.
         band: (4, 3) s, r, p, l.
-        spread: (3,) variance of the members.
-        preloaded: (3,) mean square by preload.
         elastic: (3,) what springs alone do.
+        out: (6, 3), filled.
     """
-    out = np.empty((6, 3))
+    moved, spread, preloaded = ensemble
     for a in range(3):
         path = before[1, a] + share * abs(moved[a] - before[0, a])
         slip = moved[a] - elastic[a]
@@ -253,4 +252,48 @@ def banded(
         out[0, a], out[1, a], out[2, a] = moved[a], path, largest
         out[3, a], out[4, a] = elastic[a] + kept * slip, band[0, a] ** 2 + excess
         out[5, a] = max(before[5, a], elastic[a] * elastic[a])
-    return out
+
+
+@njit(cache=True, error_model="numpy")
+def sample_row(wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: np.ndarray, row: np.ndarray) -> None:
+    """A sample as `advance` takes it (11,), less what rests (6,): the plate's (Fx, Fy, Mz), inverse dynamics'."""
+    for a in range(3):
+        row[a] = driving[a] - rest[3 + a]
+    row[3], row[4], row[5], row[6], row[7] = -wrench[2], wrench[4], -wrench[3], tilt[0], tilt[1]
+    row[8], row[9], row[10] = wrench[0] - rest[0], wrench[1] - rest[1], wrench[5] - rest[2]
+
+
+@njit(cache=True, error_model="numpy")
+def step_members(
+    states: np.ndarray,
+    e: np.ndarray,
+    readings: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    fitted: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    h: float,
+    row: np.ndarray,
+    found: np.ndarray,
+) -> None:
+    """`advance_members` from one sample to the next, and `banded`; in between, readings are linear.
+
+    Args:
+        states: Changed.
+        e: Changed.
+        readings: Wrench, tilt, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
+        fitted: Wheels, bodies, K_0^-1 (3, 3), band (4, 3).
+        h: [s].
+        row: (11,) of this sample, filled.
+        found: (6, 3) of `banded`, filled.
+    """
+    (wrench, tilt, driving, rest, earlier, before), (wheels, bodies, compliance, band) = readings, fitted
+    drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
+    sample_row(wrench, tilt, driving, rest, row)
+    for s in range(STEPS):
+        for c in range(COLUMNS):
+            drive[s, c] = earlier[c] + (s + 1.0) / STEPS * (row[c] - earlier[c])
+    for i in range(6):
+        inertia[i] = driving[3 + i]
+    for i in range(3):
+        for c in range(3):
+            elastic[i] += compliance[i, c] * row[PLATE + c]
+    mean, spread, preloaded, share = advance_members(states, e, drive, inertia, wheels, bodies, h)
+    banded((mean, spread, preloaded), before, share, band, elastic, found)

@@ -7,42 +7,41 @@ used. Without the wrench of inverse dynamics, which needs accelerations, the bas
 moves it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.forcing import STEPS, UNMOVED
-from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STATE, advance_members, banded
+from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STATE, sample_row, step_members
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
 
-_PARTS = (np.arange(STEPS)[:, None] + 1.0) / STEPS
+_UNDRIVEN = np.array([0.0] * 3 + [UNMOVED, 0.0, 0.0, UNMOVED, 0.0, UNMOVED])
+_NO_REST = np.zeros(6)
 _LOADS = np.array([0.0] * 3 + [1.0] * 3 + [0.0] * 5)  # of a sample at rest: the vertical load alone
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """One sample.
 
     Attributes:
         t: [s].
         wrench: (6,) action on the floor in frame 0, by the plate [N, N.m].
         tilt: (2,) rx, ry since the first second [rad], as the compliance has them.
-        driving: (3,) Fx, Fy, Mz of inverse dynamics, tilt's inertia taken off; None without.
-        inertia: (6,) of M in the plane, row by row, upper; None without.
+        driving: (9,) Fx, Fy, Mz of inverse dynamics, tilt's inertia taken off, and M in the plane, row by row, upper;
+            None without.
     """
 
     t: float
     wrench: np.ndarray
     tilt: np.ndarray
     driving: np.ndarray | None = None
-    inertia: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
-class SlipState:
+class SlipState(NamedTuple):
     """The base after a sample.
 
     Attributes:
@@ -96,22 +95,23 @@ class SlipStream:
 
     def stepped(self, sample: Sample, before: SlipState | None) -> SlipState:
         """The base one sample on; without a state before, this sample is the first at rest."""
-        row, planar = _row(sample)
-        if before is None:
-            return self._first(sample.t, row, planar)
-        if sample.t <= before.start + REST:
+        driving = _UNDRIVEN if sample.driving is None else sample.driving
+        if before is None or sample.t <= before.start + REST:
+            row = np.empty(COLUMNS)
+            sample_row(sample.wrench, sample.tilt, driving, _NO_REST, row)
+            planar, row = np.concatenate([row[PLATE:], row[:3]]), row * _LOADS
+            if before is None:
+                return self._first(sample.t, row, planar)
             n = before.n + 1
-            still = row * _LOADS
-            return replace(before, t=sample.t, rest=before.rest + (planar - before.rest) / n, n=n, before=still)
-        row[PLATE:] -= before.rest[:3]
-        row[:3] -= before.rest[3:]
+            return before._replace(t=sample.t, rest=before.rest + (planar - before.rest) / n, n=n, before=row)
         states, e = before.states.copy(), before.deflections.copy()
-        h = (sample.t - before.t) / STEPS
-        drive = before.before + _PARTS * (row - before.before)
-        arguments = states, e, drive, _inertia(sample), self.wheels, self.bodies, h
-        mean, spread, preloaded, share = advance_members(*arguments)
-        elastic = self.compliance @ row[PLATE:]
-        found = banded(mean, before.found, share, self.band, spread, preloaded, elastic)
+        row, found, fitted = (
+            np.empty(COLUMNS),
+            np.empty_like(before.found),
+            (self.wheels, self.bodies, self.compliance, self.band),
+        )
+        readings = sample.wrench, sample.tilt, driving, before.rest, before.before, before.found
+        step_members(states, e, readings, fitted, (sample.t - before.t) / STEPS, row, found)
         return SlipState(before.start, sample.t, before.rest, before.n, row, states, e, found, found[3] * self.moves)
 
     def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
@@ -144,22 +144,3 @@ def slip_stream(model: StickSlip) -> SlipStream:
         found.slips,
         np.array([found.band.floor, found.band.spread, found.band.start, found.band.slip]),
     )
-
-
-def _row(sample: Sample) -> tuple[np.ndarray, np.ndarray]:
-    """The sample as the kernel takes it (11,), and its forces in the plane (6,): the plate's, inverse dynamics'."""
-    row = np.zeros(COLUMNS)
-    row[3:6] = -sample.wrench[2], sample.wrench[4], -sample.wrench[3]
-    row[6:8], row[PLATE:] = sample.tilt, sample.wrench[[0, 1, 5]]
-    if sample.driving is not None:
-        row[:3] = sample.driving
-    return row, np.concatenate([row[PLATE:], row[:3]])
-
-
-def _inertia(sample: Sample) -> np.ndarray:
-    """(15,) as the kernel takes it."""
-    found = np.zeros(15)
-    found[[0, 3, 5]] = UNMOVED
-    if sample.inertia is not None:
-        found[:6] = sample.inertia
-    return found

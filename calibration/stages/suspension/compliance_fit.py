@@ -159,7 +159,7 @@ def _share(
     rows = np.flatnonzero(response.valid)[::_STRIDE]
     J = np.zeros((len(rows), 6, len(dS)))
     for signal, b, directions, sign in ((x @ K.T, modes.b @ K, dS, 1.0), (rate, modes.b, dC, -1.0)):
-        lagged = modes.lagged(signal, step)[rows]
+        lagged = modes.lagged(signal, step, rows)
         paths = (modes.a[:, None, :] * b.T[None]).reshape(36, -1)  # response of axis o to force i, (o, i)
         T = (lagged.reshape(len(rows) * 6, -1) @ paths.T).real.reshape(len(rows), 6, 6, 6)
         J = J + sign * np.tensordot(T, directions, axes=([1, 3], [2, 1]))

@@ -23,8 +23,8 @@ from calibration.numerics.wrench import in_frame
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
-from calibration.robot.floating_base import configurations, root_wrenches
 from calibration.robot.laboratory import Laboratory
+from calibration.robot.rigid_tree import dynamics_along
 
 _DECIMATED = 0.005  # [s] plate samples averaged together
 _MASS_SAMPLES = 20  # configurations the inertia is averaged over
@@ -71,21 +71,13 @@ def dynamics_load(lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarr
 
 def motion_load(lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np.ndarray, cutoff: float) -> Load:
     """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock]."""
-    model, description = lab.floating, lab.description
-    order = [description.joint_names.index(name) for name in list(model.names)[2:]]
-    q = low_passed(even(t, q_motor[:, order]), cutoff)
-    spline = CubicSpline(q.t, q.x)
-    T_0_root = root_in_base(model, description)
-    root = pin.SE3(T_lab_0) * T_0_root
-    at = configurations(model, np.tile(root.homogeneous, (len(q.t), 1, 1)), q.x)
-    still = np.zeros((len(q.t), 6))
-    v, a = (np.hstack([still, spline(q.t, order)]) for order in (1, 2))
-    w = root_wrenches(model, at, v, a) @ T_0_root.dualAction.T
-    data, M = model.createData(), np.zeros((6, 6))
+    description = lab.description
+    q = low_passed(even(t, q_motor), cutoff)
+    spline, T_0_root = CubicSpline(q.t, q.x), root_in_base(lab.floating, description)
+    along = dynamics_along(lab.tree, q.x, spline(q.t, 1), spline(q.t, 2), root_at_rest(lab, T_lab_0))
+    w = along.root @ T_0_root.dualAction.T
     rows = np.linspace(0, len(q.t) - 1, _MASS_SAMPLES).astype(int)
-    for x in at[rows]:
-        M += pin.crba(model, data, x)[:6, :6] / len(rows)
-    M = T_0_root.dualAction @ (np.triu(M) + np.triu(M, 1).T) @ T_0_root.inverse().action
+    M = T_0_root.dualAction @ along.composite[rows].mean(axis=0) @ T_0_root.inverse().action
     weight = float(M[0, 0] * np.linalg.norm(description.gravity))
     com = np.array([M[2, 4] * -1.0, M[2, 3], M[0, 4]]) / M[0, 0]
     return Load(Signal(q.t, -w, q.valid), M, weight, com, np.eye(4))
@@ -94,3 +86,9 @@ def motion_load(lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np
 def root_in_base(model: pin.Model, description: Description) -> pin.SE3:
     """T_base_root, root = the body of the free flyer."""
     return model.frames[model.getFrameId(description.base_frame)].placement.inverse()
+
+
+def root_at_rest(lab: Laboratory, T_lab_0: np.ndarray) -> np.ndarray:
+    """Twist, zero, and proper acceleration (1, 12) of the root of a robot that stands at frame 0, in its axes."""
+    R = T_lab_0[:3, :3] @ root_in_base(lab.floating, lab.description).rotation
+    return np.concatenate([np.zeros(6), -np.array(lab.description.gravity) @ R, np.zeros(3)])[None]

@@ -11,7 +11,7 @@ between samples: stiff modes (tau << step) cost nothing and cannot blow up. tau 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+from numba import njit
 
 from calibration.numerics.signals import RATE
 from calibration.stages.suspension.base_response import Forcing
@@ -40,22 +40,29 @@ class Modes:
         slowest = min(rates, default=np.inf)
         return 1.0 / slowest if slowest > 0.0 else np.inf
 
-    def lagged(self, u: np.ndarray, step: float) -> np.ndarray:
-        """Channels u (n, c) through every mode's lag, (n, c, k); in balance with their first sample before."""
-        return np.stack([_lag(u, tau, step) for tau in self.tau], axis=2)
+    def lagged(self, u: np.ndarray, step: float, rows: np.ndarray) -> np.ndarray:
+        """Some rows of channels u (n, c) through every mode's lag, (r, c, k); in balance with the first one before."""
+        e, b1 = self._factors(step)
+        return np.asarray(_lagged(np.ascontiguousarray(u), e, b1, rows))
 
-    def advanced(self, y: np.ndarray, u_before: np.ndarray, u: np.ndarray, step: float) -> np.ndarray:
-        """Every mode's lag (k,) one step [s] on, from y (k,), driven linearly from u_before to u (k,)."""
+    def advanced(
+        self, y: np.ndarray, u_before: np.ndarray, w: np.ndarray, step: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One step [s] under a wrench w (6,): the modes' lags y (k,), what drives them u (k,), displacement x (6,)."""
+        x = np.empty(6)
+        found = _advance((self.a, self.b, self.tau), y, u_before, w, step, x)
+        return found[0], found[1], x
+
+    def _factors(self, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """e and b1 (k,) of every mode."""
         ratio = self.tau / step
         late = np.abs(ratio) > _INSTANT
         e = np.where(late, np.exp(-1.0 / np.where(late, ratio, 1.0)), 0.0)
-        b1 = 1.0 - ratio * (1.0 - e)
-        return np.asarray(e * y + (1.0 - e - b1) * u_before + b1 * u)
+        return e, 1.0 - ratio * (1.0 - e)
 
     def respond(self, w: np.ndarray, step: float) -> np.ndarray:
         """Displacement (n, 6) [m, rad] under w (n, 6) [N, N.m], sampled every `step` [s]."""
-        u = w @ self.b.T
-        y = np.stack([_lag(u[:, m], tau, step) for m, tau in enumerate(self.tau)], axis=1)
+        y = _responses(w @ self.b.T, *self._factors(step))
         return np.asarray((y @ self.a.T).real)
 
 
@@ -73,11 +80,60 @@ def modes_of(K: np.ndarray, C: np.ndarray, M: np.ndarray) -> Modes:
     return Modes(V[:6].astype(complex), b, tau)
 
 
-def _lag(u: np.ndarray, tau: complex, step: float) -> np.ndarray:
-    ratio = tau / step
-    e = np.exp(-1.0 / ratio) if abs(ratio) > _INSTANT else 0.0
-    b1 = 1.0 - ratio * (1.0 - e)
-    return np.asarray(lfilter([b1, 1.0 - e - b1], [1.0, -e], u, axis=0, zi=((1.0 - b1) * u[0])[None])[0])
+@njit(cache=True, error_model="numpy")
+def _advance(
+    of: tuple[np.ndarray, np.ndarray, np.ndarray],
+    y: np.ndarray,
+    u_before: np.ndarray,
+    w: np.ndarray,
+    step: float,
+    x: np.ndarray,
+) -> np.ndarray:
+    """`Modes.advanced` of modes (a, b, tau): y and u (2, k); x (6,) is filled."""
+    (a, b, tau), modes = of, np.empty((2, len(y)), dtype=np.complex128)
+    for i in range(6):
+        x[i] = 0.0
+    for m in range(len(tau)):
+        u, e, ratio = 0.0j, 0.0j, tau[m] / step
+        for i in range(6):
+            u += b[m, i] * w[i]
+        if abs(ratio) > _INSTANT:
+            e = np.exp(-1.0 / ratio)
+        b1 = 1.0 - ratio * (1.0 - e)
+        modes[0, m], modes[1, m] = e * y[m] + (1.0 - e - b1) * u_before[m] + b1 * u, u
+        for i in range(6):
+            x[i] += (a[i, m] * modes[0, m]).real
+    return modes
+
+
+@njit(cache=True, error_model="numpy")
+def _lagged(u: np.ndarray, e: np.ndarray, b1: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """`Modes.lagged`."""
+    out, y = np.empty((len(rows), u.shape[1], len(e)), dtype=np.complex128), np.empty(len(e), dtype=np.complex128)
+    for c in range(u.shape[1]):
+        for m in range(len(e)):
+            y[m] = u[0, c]
+        n = 0
+        for i in range(len(u)):
+            if i > 0:
+                for m in range(len(e)):
+                    y[m] = e[m] * y[m] + (1.0 - e[m] - b1[m]) * u[i - 1, c] + b1[m] * u[i, c]
+            if n < len(rows) and rows[n] == i:
+                for m in range(len(e)):
+                    out[n, c, m] = y[m]
+                n += 1
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _responses(u: np.ndarray, e: np.ndarray, b1: np.ndarray) -> np.ndarray:
+    """Every mode's lag of its own channel of u (n, k), in balance with the first sample before."""
+    y = np.empty_like(u)
+    for m in range(len(e)):
+        y[0, m] = u[0, m]
+        for i in range(1, len(u)):
+            y[i, m] = e[m] * y[i - 1, m] + (1.0 - e[m] - b1[m]) * u[i - 1, m] + b1[m] * u[i, m]
+    return y
 
 
 def predicted(K: np.ndarray, C: np.ndarray, forcing: Forcing) -> np.ndarray:

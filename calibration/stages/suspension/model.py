@@ -60,7 +60,11 @@ class Suspension:
 
     def moves(self, source: Source) -> np.ndarray:
         """(6,) axes that are moved when the wrench comes from a source; none where it was not tried."""
-        return next((h.moves for s, h in self.held_out if s == source), np.zeros(6, dtype=bool))
+        return self._moves.get(source, np.zeros(6, dtype=bool))
+
+    @cached_property
+    def _moves(self) -> dict[Source, np.ndarray]:
+        return {source: h.moves for source, h in reversed(self.held_out)}
 
     def displacement(self, t: np.ndarray, wrench: np.ndarray) -> np.ndarray:
         """Displacement of the base (n, 6) [m, rad] at t (n,) [s] under changes since rest of the plate's wrench (n, 6).

@@ -12,11 +12,10 @@ until the two planes meet; heading and horizontal position are the markers'.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
-from calibration.numerics.lie import compose, from_vector, inverse, mean, to_vector
+from calibration.numerics.lie import from_vector, inverse, mean, to_vector
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 
@@ -39,8 +38,7 @@ class Rest:
 
     def poses(self, x: np.ndarray) -> np.ndarray:
         """T_lab_B (n, 4, 4) of displacements x (n, 6)."""
-        T = compose(Rotation.from_rotvec(x[:, 3:]).as_matrix(), x[:, :3])
-        return self.T_lab_0 @ T @ self.T_0_B
+        return self.T_lab_0 @ from_vector(x) @ self.T_0_B
 
 
 def rest_of(description: Description, trial: Trial, T_base_B: np.ndarray) -> Rest:

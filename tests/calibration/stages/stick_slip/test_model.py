@@ -87,7 +87,8 @@ def test_samples_one_by_one_are_what_a_recording_is(model, new):
     for k, t in enumerate(forcing.t):
         last = forcing.drive[STEPS * k + STEPS - 1]
         wrench = np.array([*last[8:10], -WEIGHT[0], -WEIGHT[2], WEIGHT[1], last[10]])
-        sample = Sample(float(t), wrench, np.zeros(2), last[:3], MASS[np.triu_indices(3)])
+        driving = np.concatenate([last[:3], MASS[np.triu_indices(3)]])
+        sample = Sample(float(t), wrench, np.zeros(2), driving)
         state = stream.stepped(sample, state)
         x.append(state.x)
     moved = np.abs(batch.x).max(axis=0)

@@ -1,0 +1,62 @@
+"""Dynamics of a random arm with branches, sliding and turning joints, against Pinocchio's."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from calibration.robot.rigid_tree import dynamics_along, tree_of
+
+KINDS = (pin.JointModelRX, pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned, pin.JointModelRUBZ)
+N, K = 6, 9
+
+
+@pytest.fixture(scope="module")
+def arm() -> pin.Model:
+    rng, model = np.random.default_rng(0), pin.Model()
+    pin.seed(0)
+    model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    for i in range(K):
+        axis, kind = rng.normal(size=3), KINDS[i % len(KINDS)]
+        joint = kind(axis / np.linalg.norm(axis)) if "Unaligned" in kind.__name__ else kind()
+        parent = rng.choice([j for j in model.supports[model.njoints - 1] if j > 0])  # depth first, as Pinocchio asks
+        model.addJoint(int(parent), joint, pin.SE3.Random(), f"joint_{i}")
+    for i in range(1, model.njoints):
+        model.inertias[i] = pin.Inertia.Random()
+    model.gravity = pin.Motion.Zero()
+    return model
+
+
+def test_dynamics_are_pinocchio_s(arm):
+    rng = np.random.default_rng(1)
+    joints = tuple(rng.permutation([f"joint_{i}" for i in range(K)]))
+    q, v, a = rng.normal(size=(3, N, K))
+    root, data = rng.normal(size=(N, 12)), arm.createData()
+    found, columns = (
+        dynamics_along(tree_of(arm, joints), q, v, a, root, regressors=True),
+        [arm.joints[arm.getJointId(name)].idx_v for name in joints],
+    )
+    masses = (10 * np.arange(1, K + 1)[:, None] + np.arange(4)).ravel()
+    for i in range(N):
+        step, rate, push = np.zeros((3, arm.nv))
+        step[columns], rate[columns], push[columns] = q[i], v[i], a[i]
+        rate[:6], push[:6] = root[i, :6], root[i, 6:]
+        at = pin.integrate(arm, pin.neutral(arm), step)
+        torque = pin.rnea(arm, data, at, rate, push)
+        expected = [torque[columns], torque[:6], data.f[2].angular[:2].copy()]
+        H = np.triu(pin.crba(arm, data, at))
+        H += np.triu(H, 1).T
+        Y = pin.computeJointTorqueRegressor(arm, data, at, rate, push)[columns][:, masses]
+        expected += [H.diagonal()[columns], H[:6, :6], H[:3, columns].T, Y]
+        ours = (found.torque, found.root, found.moment, found.inertia, found.composite, found.coupling, found.regressor)
+        for x, y in zip(ours, expected, strict=True):
+            np.testing.assert_allclose(x[i], y, rtol=1e-12, atol=1e-12 * np.abs(y).max())
+
+
+def test_a_sample_alone_is_that_of_many(arm):
+    tree, (q, v, a) = (
+        tree_of(arm, tuple(f"joint_{i}" for i in range(K))),
+        np.random.default_rng(2).normal(size=(3, N, K)),
+    )
+    many = dynamics_along(tree, q, v, a, np.ones((1, 12)))
+    one = dynamics_along(tree, q[3:4], v[3:4], a[3:4], np.ones((1, 12)))
+    assert (one.torque[0] == many.torque[3]).all() and one.regressor.shape == (1, K, 0)
