@@ -3,7 +3,8 @@
     truth    sha256 over the robot's true parameters, 9 significant digits each
     marks    of each trial: mean place of the hand's markers [m, lab] and mean of all readings [rad]
 
-Truths are sampled again in a moment; recordings of another machine agree to `TOLERANCE` in their marks.
+Truths are sampled again in a moment; recordings of another machine agree to `TOLERANCE` in their marks, of which
+robots beyond the quick tier have those of one swing.
 """
 
 import hashlib
@@ -37,8 +38,8 @@ class Robot:
     Attributes:
         id: Its number.
         scenario: File its truth is sampled from.
-        truth: Hex digest of its true parameters; empty while it is not frozen.
-        marks: Of its trials, by name: x, y, z of the hand [m], mean reading [rad]; empty while they are not frozen.
+        truth: Hex digest of its true parameters.
+        marks: By trial, all of the quick tier's robots, one of the others: x, y, z of the hand [m], mean reading [rad].
     """
 
     id: int
@@ -105,12 +106,12 @@ def marks(dataset: Dataset) -> dict[str, tuple[float, ...]]:
 
 def differences(robot: Robot, dataset: Dataset) -> Iterator[str]:
     """How recordings made here differ from the frozen ones beyond the tolerance."""
-    found = marks(dataset) if robot.marks else {}
-    if found.keys() != robot.marks.keys():
-        yield f"{robot.name}: trials are {sorted(found)}, not {sorted(robot.marks)}"
+    found = marks(dataset)
+    if missing := sorted(robot.marks.keys() - found.keys()):
+        yield f"{robot.name}: no trials {', '.join(missing)}; there are {sorted(found)}"
         return
-    for trial, values in found.items():
-        far = float(np.abs(np.subtract(values, robot.marks[trial])).max())
+    for trial, values in robot.marks.items():
+        far = float(np.abs(np.subtract(found[trial], values)).max())
         if not far <= TOLERANCE:
             yield f"{robot.name}, {trial}: marks differ by {far:.2g} m or rad, at most {TOLERANCE:g} allowed"
 

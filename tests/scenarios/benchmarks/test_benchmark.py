@@ -52,7 +52,7 @@ def test_robots_and_scenarios_are_the_frozen_ones():
     assert [robot.id for robot in robots] == list(range(20))
     assert sum("unmodelled" in robot.scenario for robot in robots) == 5
     assert {"dead_zone", "friction_held"} <= {robot.scenario for robot in frozen.robots("quick")}
-    assert {len(robot.marks) for robot in robots} <= {0, 20}
+    assert [len(robot.marks) for robot in robots] == 4 * [20] + 16 * [1]
 
 
 @pytest.mark.parametrize("part", [slice(4), pytest.param(slice(4, 20), marks=pytest.mark.slow)])
@@ -73,6 +73,8 @@ def test_recordings_beyond_the_tolerance_are_named(run):
     x, *rest = robot.marks["xyz"]
     moved = replace(robot, marks=robot.marks | {"xyz": (x + 2.0 * frozen.TOLERANCE, *rest)})
     assert ["robot_00, xyz: marks differ" in line for line in frozen.differences(moved, run.dataset)] == [True]
+    more = replace(robot, marks=robot.marks | {"around_y": (x, *rest)})
+    assert ["robot_00: no trials around_y" in line for line in frozen.differences(more, run.dataset)] == [True]
 
 
 def test_a_recording_made_here_is_the_frozen_one(tmp_path):
