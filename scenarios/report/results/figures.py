@@ -121,10 +121,10 @@ def traced_trial(results: Results, steps: Sequence[Step]) -> str | None:
 
 
 def traces(results: Results, steps: Sequence[Step]) -> Figure | None:
-    """Errors over time in one trial: x, y, z and orientation, of the nominal robot and of the main model."""
+    """Errors over time, or by posture, in one trial: x, y, z, orientation; nominal robot and main model."""
     trial, model = traced_trial(results, steps), headline_model(results, steps)
     wanted = [
-        (predictive(steps, NOMINAL_ROW), NOMINAL, 0.9),
+        (predictive(steps, NOMINAL_ROW) or oracle_base(steps, NOMINAL_ROW), NOMINAL, 0.9),
         (oracle_base(steps, model), ORACLE, 0.9),
         (predictive(steps, model), ESTIMATE, 1.1),
     ]
@@ -139,15 +139,20 @@ def traces(results: Results, steps: Sequence[Step]) -> Figure | None:
             lines = [Line(_legend(s), t.t, t.position[:, axis], c, w) for t, s, c, w in found]
             error_traces(lines, f"error along {'xyz'[axis]} [mm]", ax)
         error_traces([Line(_legend(s), t.t, t.angle, c, w) for t, s, c, w in found], _ORIENTATION, axes[3])
-        _finish_traces(axes)
+        _finish_traces(axes, "posture [-]" if of_means(results, trial) else "time since the start of the trial [s]")
     return drawn
+
+
+def of_means(results: Results, trial: str | None) -> bool:
+    """Whether a trial was recorded as posture means, without time."""
+    return any(one.entry.id == trial and one.duration is None for one in results.recorded)
 
 
 def _legend(step: Step) -> str:
     return f"{step.label} ({step.kind})"
 
 
-def _finish_traces(axes: Sequence[Axes]) -> None:
+def _finish_traces(axes: Sequence[Axes], along: str) -> None:
     widest = max(abs(bound) for ax in axes[:3] for bound in ax.get_ylim())
     for ax in axes[:3]:
         ax.set_ylim(-widest, widest)
@@ -155,7 +160,7 @@ def _finish_traces(axes: Sequence[Axes]) -> None:
     for ax in axes:
         ax.set_xlim(left=0.0)
         ax.tick_params(axis="x", labelbottom=ax is axes[3])
-    axes[3].set_xlabel("time since the start of the trial [s]")
+    axes[3].set_xlabel(along)
     handles, labels = axes[0].get_legend_handles_labels()
     axes[0].legend(handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=len(labels))
 

@@ -24,6 +24,7 @@ class HeldOutErrors:
         return {"errors": figures.boxes(results, readable(steps)), "traces": figures.traces(results, steps)}
 
     def context(self) -> Mapping[str, Any] | None:
-        """The trial drawn over time."""
-        trial = figures.traced_trial(self.view.results, self.view.steps)
-        return None if trial is None else {"trial": trial}
+        """The trial drawn over time, or by posture."""
+        results = self.view.results
+        trial = figures.traced_trial(results, self.view.steps)
+        return None if trial is None else {"trial": trial, "means": figures.of_means(results, trial)}

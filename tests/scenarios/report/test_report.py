@@ -338,3 +338,4 @@ def test_rows_with_the_base_measured_are_shown_where_nothing_is_predictive(tmp_p
     page = (tmp_path / "report.html").read_text()
     assert "base measured" in page and (tmp_path / "figures" / "headline.svg").is_file()
     assert "measure the base while" not in page
+    assert "and the measured base, since nothing was recorded" in " ".join(page.split())
