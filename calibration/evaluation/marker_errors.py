@@ -33,7 +33,7 @@ class PointRow:
         n: Positions compared.
         rmse_norm_mm: Root mean squared distance [mm].
         max_norm_mm: Largest distance [mm].
-        band_95_mm: Median radius within which 95 % should be, in this session [mm].
+        band_95_mm: Median radius within which 95 % should be, in the session calibrated in [mm].
         inside: Share within their own posture's radius [-].
         other_day_band_95_mm: The same radius in any other session [mm].
         other_day_inside: Share within that [-].
