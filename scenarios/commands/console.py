@@ -147,11 +147,11 @@ def confirmation(results: Path) -> Table | None:
 
 
 def points(results: Path) -> Table | None:
-    """Return the table of single markers with bands of the calibration's and of any other session, or None where there are none."""
+    """Return the table of single markers and their bands, or None where there are none."""
     rows = json.loads((results / "evaluation.json").read_text(encoding="utf-8")).get("points", [])
     bands = ("95 % band\n[mm]", "inside\n[%]", "other day's\n95 % [mm]", "inside\n[%]")
     table = _table("marker", "row", "trial", "RMSE\nnorm [mm]", "largest\n[mm]", *bands)
-    table.title, table.title_justify = "Markers of the hand; bands of the session calibrated in, and of any other", "left"
+    table.title, table.title_justify = "Markers; bands of the session calibrated in, and of any other", "left"
     for column in table.columns[3:]:
         column.justify = "right"
     for row in rows:
