@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from calibration import calibrate, load, save_estimate
 from calibration.recording.trial import Trial
@@ -86,8 +87,10 @@ def csv(source, tmp_path_factory) -> list[Path]:
     return exported(source, tmp_path_factory.mktemp("csv") / "csv", "csv")
 
 
-def test_csv_gives_every_bit_back(source, csv, tmp_path):
-    run("import", "csv", *csv, "--map", csv[0].parent / "mapping.yaml", "--out", tmp_path / "back")
+def test_csv_gives_every_bit_back_in_the_order_of_recording(source, csv, tmp_path):
+    mapping = yaml.safe_load((csv[0].parent / "mapping.yaml").read_text())
+    (csv[0].parent / "listed.yaml").write_text(yaml.safe_dump(mapping | {"trials": mapping["trials"][::-1]}))
+    run("import", "csv", *csv, "--map", csv[0].parent / "listed.yaml", "--out", tmp_path / "back")
     assert set(largest(source, tmp_path / "back", SIGNALS + PLACES).values()) == {0.0}
 
 
