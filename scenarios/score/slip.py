@@ -33,20 +33,23 @@ class Errors:
     Attributes:
         predicted: (n, 3) [m].
         still: (n, 3) of a base that stays [m].
+        compliance: (n, 3) of a base on the 6x6 compliance alone [m]; NaN where it was not predicted.
         sigma: (n, 3) standard deviation that is claimed of `predicted` [m].
         slips: (n,) since the first second.
     """
 
     predicted: np.ndarray
     still: np.ndarray
+    compliance: np.ndarray
     sigma: np.ndarray
     slips: np.ndarray
 
-    def entry(self, rows: np.ndarray) -> dict[str, float | int]:
+    def entry(self, rows: np.ndarray) -> dict[str, float | int | None]:
         """Figures of some of the samples."""
         p, still, sigma = self.predicted[rows], self.still[rows], self.sigma[rows]
         inside = float((np.abs(p) <= _TWO_SIDED * sigma).mean())
-        return {"n": len(p), "hand_mm": _mm(p), "still_mm": _mm(still), "sigma_mm": _mm(sigma), "inside_95": inside}
+        beside = {"still_mm": _mm(still), "compliance_mm": _mm(self.compliance[rows])}
+        return {"n": len(p), "hand_mm": _mm(p) or 0.0} | beside | {"sigma_mm": _mm(sigma), "inside_95": inside}
 
 
 @dataclass(frozen=True)
@@ -90,22 +93,35 @@ def slip_scores(trials: Iterable[tuple[PredictedTrial, TruthTrial]]) -> Iterator
 def _score(trial: PredictedTrial, true: TruthTrial, source: Source, found: BasePrediction) -> SlipScore:
     early = trial.t <= trial.t[0] + _REFERENCE
     at_rest = mean(true.base_pose[early])
-    base = found.T_lab_B @ inverse(mean(found.T_lab_B[early])) @ at_rest
+    base = _moved(found.T_lab_B, early, at_rest)
     hand_in_base, hand = inverse(true.base_pose) @ true.hand_pose, true.hand_pose[:, :3, 3]
-    errors = [(T @ hand_in_base)[:, :3, 3] - hand for T in (base, np.broadcast_to(at_rest, base.shape))]
+    every = base, np.broadcast_to(at_rest, base.shape), _on_compliance(trial, source, early, at_rest)
+    errors = [(T @ hand_in_base)[:, :3, 3] - hand for T in every]
     motion = found.motion
     sigma = np.sqrt(_carried(motion.variance, at_rest, hand))
     sliding = (motion.use > _SLIDES).astype(int)
     slips = np.cumsum((np.diff(sliding, axis=0, prepend=sliding[:1]) > 0).sum(axis=1))
     columns = [*errors, sigma, np.repeat(slips[:, None], 3, axis=1)]
     kept = [_counted(trial, c) for c in columns]
-    seen = np.isfinite(np.concatenate(kept, axis=1)).all(axis=1)
-    predicted, still, spread, count = (c[seen] for c in kept)
+    seen = np.isfinite(np.concatenate([kept[0], *kept[3:]], axis=1)).all(axis=1)
+    predicted, still, compliance, spread, count = (c[seen] for c in kept)
     yaw, own = (_yaw(T)[~early] for T in (base, true.base_pose))
     moved = max(float(((own - own.mean()) ** 2).sum()), np.finfo(float).tiny)
     r2 = 1.0 - float(((yaw - own) ** 2).sum()) / moved
-    errors_found = Errors(predicted, still, spread, count[:, 0])
+    errors_found = Errors(predicted, still, compliance, spread, count[:, 0])
     return SlipScore(trial.trial_id, trial.kind, source, motion.predictable, r2, errors_found)
+
+
+def _moved(T: np.ndarray, early: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
+    """T_lab_base (n, 4, 4) from at_rest (4, 4) on, moved as a body at T (n, 4, 4) moves."""
+    return np.asarray(T @ inverse(mean(T[early])) @ at_rest)
+
+
+def _on_compliance(trial: PredictedTrial, source: Source, early: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
+    x = dict(trial.base.predicted).get(source) if trial.base is not None else None
+    if x is None or trial.base is None or trial.base.rest is None:
+        return np.full((len(trial.t), 4, 4), np.nan)
+    return _moved(trial.base.rest.poses(x), early, at_rest)
 
 
 def _counted(trial: PredictedTrial, x: np.ndarray) -> np.ndarray:
@@ -130,5 +146,5 @@ def _yaw(T: np.ndarray) -> np.ndarray:
     return np.asarray(Rotation.from_matrix(T[0, :3, :3].T @ T[:, :3, :3]).as_rotvec()[:, 2])
 
 
-def _mm(x: np.ndarray) -> float:
-    return 1e3 * float(np.sqrt((x**2).mean()))
+def _mm(x: np.ndarray) -> float | None:
+    return 1e3 * float(np.sqrt((x**2).mean())) if np.isfinite(x).all() else None

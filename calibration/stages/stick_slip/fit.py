@@ -74,7 +74,8 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
     less_certain = spread + (members[0][0] - x) ** 2
     parts = (_over_trials(trials, block_means(trials, v)) for v in (less_certain, preloaded, path**2))
     band = fitted_band(LeftOut(_over_trials(trials, masked**2), *parts), trials.noise, trials.corrected)
-    return Direction(source, found.logarithms, found.covariance, ensemble, band, _held_out(trials, masked))
+    held_out = _held_out(trials, masked)
+    return Direction(source, found.logarithms, found.covariance, ensemble, band, held_out, by_plate=trials.corrected)
 
 
 def _over_trials(trials: Trials, x: np.ndarray) -> np.ndarray:

@@ -44,6 +44,7 @@ class Direction:
         held_out: Trials left out, (k, 3) for x, y, yaw.
         linear: (3,) axes that the compliance predicts better.
         plain: Band of the axes that are linear or stay.
+        by_plate: Whether the plate's force corrects the prediction, where it is the source.
         heave_variance: (3,) of z, rx, ry, what the compliance left of trials it had not seen [m2, rad2].
     """
 
@@ -56,6 +57,13 @@ class Direction:
     linear: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=bool))
     plain: PlainBand = field(default_factory=lambda: PlainBand(np.full(3, 1e-3), np.ones(3)))
     heave_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    by_plate: bool = field(default_factory=lambda: True)
+
+    @property
+    def corrected(self) -> bool:
+        """Whether a force that a plate measured corrects the prediction."""
+        return self.source == "plate" and self.by_plate
 
     @property
     def slips(self) -> np.ndarray:
@@ -94,18 +102,18 @@ class StickSlip:
         return found
 
     def predict(self, forcing: PlanarForcing) -> PlanarPrediction:
-        """The motion in the floor's plane under a forcing; by trials left out, an axis is left still or linear.
+        """The motion in the floor's plane under a forcing; by trials left out, an axis may stay or be linear.
 
         Raises:
             NoSuchElement: Nothing was fitted from its source.
         """
         found = self.direction(forcing.source)
         p = found.parameters
-        members = [self._motion(forcing, SlipParameters.of(own)) for own in found.ensemble]
+        members = [self._motion(forcing, SlipParameters.of(own), found.corrected) for own in found.ensemble]
         one, share = members[0]
         every = np.array([m[0] for m in members])
         starts = preloads(self.wheels, p, forcing.drive[0, 3:6])
-        preloaded = np.mean([(self._motion(forcing, p, e)[0] - one) ** 2 for e in starts], axis=0)
+        preloaded = np.mean([(self._motion(forcing, p, found.corrected, e)[0] - one) ** 2 for e in starts], axis=0)
         x = every.mean(axis=0)
         variance = found.band.variance(every.var(axis=0), preloaded, slid_path(x, share))
         elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
@@ -116,10 +124,10 @@ class StickSlip:
         return PlanarPrediction(np.where(found.slips, x, plain), variance, share, kept)
 
     def _motion(
-        self, forcing: PlanarForcing, p: SlipParameters, preload: np.ndarray | None = None
+        self, forcing: PlanarForcing, p: SlipParameters, corrected: bool, preload: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Positions since the first second (n, 3), and shares of wheels that slid (n,)."""
-        starts, settings = np.array([0, len(forcing.inertia)]), body(p, forcing.source == "plate")
+        starts, settings = np.array([0, len(forcing.inertia)]), body(p, corrected)
         e = np.zeros(self.wheels.position.shape) if preload is None else preload
         x, share = simulated(starts, forcing.drive, forcing.inertia, self.wheels.rows(p), settings, STEP, e)
         return x - x[forcing.rest].mean(axis=0), share

@@ -68,8 +68,8 @@ def slipping_base_poses(model: StickSlip, sources: WrenchSources, trial: Trial, 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
     """Share (n, m) of its friction that each wheel needs, by the most likely parameters."""
-    p = model.direction(forcing.source).parameters
-    rows, settings = model.wheels.rows(p), body(p, forcing.source == "plate")
+    found = model.direction(forcing.source)
+    rows, settings = model.wheels.rows(found.parameters), body(found.parameters, found.corrected)
     e, state = np.zeros((len(forcing.t), *model.wheels.position.shape)), np.zeros(STATE)
     now = np.zeros(model.wheels.position.shape)
     for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):

@@ -25,7 +25,7 @@ from calibration.stages.stick_slip.forcing import (
     planar_forcing,
     wrenches_of,
 )
-from calibration.stages.stick_slip.likelihood import joined
+from calibration.stages.stick_slip.likelihood import Trials, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.search import displaced
@@ -65,21 +65,22 @@ def fit_stick_slip(
         return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
     tilting = Tilting(suspension.K, suspension.C)
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
-    directions: list[Direction] = []
-    misplaced: tuple[Verdict, ...] = ()
     read = _read(sources, trials)
-    for source in SOURCES:
-        rows = _rows(description, read, tilting, source)
-        if len(rows) >= _LEAST_TRIALS:
-            start, campaign = directions[0].logarithms if directions else None, joined(wheels, rows)
-            found = _linear(fit_direction(source, campaign, start), suspension)
-            directions.append(replace(found, plain=_plain(found, wheels, rows)))
-            if start is None:
-                calm = joined(wheels, [row for row, wild in zip(rows, _wild(directions[0]), strict=True) if not wild])
-                misplaced = tuple(_misplaced(wheels.names, *displaced(calm, directions[0].logarithms)))
-    if not directions:
+    by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
+    usable = [(source, rows, joined(wheels, rows)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
+    if not usable:
         message = "no stick-slip base: it takes two trials that show the base and its wrench"
         return None, (Verdict(STAGE, "missing", message),)
+    fits: list[Direction] = []
+    for source, _, campaign in usable:
+        fits.append(fit_direction(source, campaign, fits[0].logarithms if fits else None))
+    rows = usable[0][1]
+    calm = joined(wheels, [row for row, wild in zip(rows, _wild(fits[0]), strict=True) if not wild])
+    misplaced = _misplaced(wheels.names, *displaced(calm, fits[0].logarithms))
+    if _behind(fits):
+        fits[0] = _uncorrected(fits, usable[0][2])
+    directions = [_linear(fit, suspension) for fit in fits]
+    directions = [replace(d, plain=_plain(d, wheels, rows)) for d, (_, rows, _) in zip(directions, usable, strict=True)]
     model = StickSlip(wheels, tilting, tuple(directions))
     names = [one.trial.id for one in read]
     said = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
@@ -155,14 +156,28 @@ def _misplaced(names: Sequence[str], shift: np.ndarray, gain: np.ndarray) -> Ite
 
 def _doubted(directions: Sequence[Direction]) -> Iterator[Verdict]:
     """Axes of which the plate says less than inverse dynamics, which a right plate never does."""
-    if len(directions) == len(SOURCES):
-        plate, dynamics = (np.where(d.linear, 1.0, d.held_out.r2) for d in directions)
-        doubted = [a for a, p, d in zip(_AXES, plate, dynamics, strict=True) if p < d - _LESS]
-        if doubted:
-            message = (
-                f"the plate explains less of {', '.join(doubted)} than inverse dynamics do: check its axes and signs"
-            )
-            yield Verdict(STAGE, "warning", message)
+    if doubted := _behind(directions):
+        message = f"the plate explains less of {', '.join(doubted)} than inverse dynamics do: check its axes and signs"
+        yield Verdict(STAGE, "warning", message)
+
+
+def _behind(directions: Sequence[Direction]) -> list[str]:
+    """Axes of which the plate says less than inverse dynamics, both on trials left out."""
+    if len(directions) < len(SOURCES):
+        return []
+    plate, dynamics = (np.where(d.linear, 1.0, d.held_out.r2) for d in directions)
+    return [a for a, p, d in zip(_AXES, plate, dynamics, strict=True) if p < d - _LESS]
+
+
+def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
+    """The plate's direction, its force no correction where trials left out say so.
+
+    Wheels that yield otherwise than by friction under their load, as casters that turn, make the simulated force wrong,
+    not the position.
+    """
+    tried = fit_direction("plate", replace(campaign, corrected=False), fits[1].logarithms)
+    left = [np.log(d.held_out.variance(np.ones(3, dtype=bool))).sum() for d in (fits[0], tried)]
+    return tried if left[1] < left[0] else fits[0]
 
 
 def _moved(direction: Direction, names: Sequence[str]) -> Iterator[Verdict]:
@@ -187,9 +202,11 @@ def _judged(direction: Direction) -> Verdict:
     if direction.linear.any():
         linear = [a for a, is_linear in zip(_AXES, direction.linear, strict=True) if is_linear]
         message += f"; linear, as the 6x6 compliance has them: {', '.join(linear)}"
+    if direction.source == "plate" and not direction.corrected:
+        message += "; the plate's force does not correct it: wheels yield otherwise than by friction"
     still = [a for a, moves in zip(_AXES, direction.held_out.moves | direction.linear, strict=True) if not moves]
     if still:
-        message += f"; left still: {', '.join(still)}"
+        message += f"; not moved: {', '.join(still)}"
     if r2[2] < _WORTH and not direction.linear[2]:
         message += "; check the wheels' declared places, the plate's axes and clock, and that nobody moved the base"
     return Verdict(STAGE, "ok" if r2[2] >= _WORTH or direction.linear[2] else "warning", message)

@@ -133,7 +133,7 @@ def slip_stream(model: StickSlip) -> SlipStream:
     parameters = [*(SlipParameters.of(own) for own in found.ensemble), *[optimum] * PRELOADS]
     wheels = np.array([model.wheels.rows(p) for p in parameters])
     members = np.arange(len(parameters)) < len(found.ensemble)
-    bodies = np.column_stack([[body(p, True) for p in parameters], members])
+    bodies = np.column_stack([[body(p, found.corrected) for p in parameters], members])
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
     return SlipStream(
         found,
