@@ -22,7 +22,9 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.drive_trains.column_bending import rigid
 from calibration.stages.drive_trains.drive_train import Quantity
+from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.from_markers import completed
+from calibration.stages.drive_trains.geometry_refit import RefittedGeometry
 from calibration.stages.drive_trains.stage import fit_drive_trains
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
@@ -85,11 +87,12 @@ def fit_bundle(
     trains, findings = fit_drive_trains(lab.urdf, description, trials, robot, hand)
     bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
     geometry = replace(geometry, name="full")
-    if trains.trains:
-        refitted, more = completed(chain, description, trials, robot, hand, trains)
+    refitted, more = _completed(lab, trials, robot, hand, trains, findings)
+    found += more
+    if refitted is not None:
         geometry, bending, trains, at_rest = refitted.model, refitted.bending, refitted.trains, refitted.at_rest
         hand = refitted.hand(chain)
-        found += [*more, *(Verdict(STAGE, "warning", message) for message in refitted.shown)]
+        found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link)))
     base = None
@@ -99,6 +102,23 @@ def fit_bundle(
         found += more
     parts = BundleParts(trains.trains, _offsets(hand), bending, base, at_rest)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
+
+
+def _completed(
+    lab: Laboratory,
+    trials: Sequence[Trial],
+    robot: Clock,
+    hand: HandModel,
+    trains: DriveTrains,
+    findings: Sequence[Verdict],
+) -> tuple[RefittedGeometry | None, tuple[Verdict, ...]]:
+    """`completed`, nothing where link readings were rejected or no joint has a drive train."""
+    if any(v.verdict == "refused" for v in findings):
+        return None, ()
+    try:
+        return completed(lab.chain, lab.description, trials, robot, hand, trains)
+    except NotEnoughData as error:
+        return None, (Verdict(STAGE, "missing", str(error)),)
 
 
 def _offsets(hand: HandModel) -> np.ndarray:

@@ -13,20 +13,27 @@ from scenarios.files.ending import FAILED
 from scenarios.files.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from scenarios.datasets.workers import Workers as Pool
+    from scenarios.files.scenario import Scenario
     from scenarios.steps import Progress
     from scenarios.studies.statistics import Level, Parameter
 
 
 def study(  # noqa: PLR0913  an option each
     kind: Annotated[
-        Literal["coverage", "power", "compare"],
-        typer.Argument(metavar="{coverage,power,compare}", help="What to find out."),
+        Literal["coverage", "power", "joints", "compare"],
+        typer.Argument(metavar="{coverage,power,joints,compare}", help="What to find out."),
     ],
     names: Annotated[
-        list[str], typer.Argument(metavar="SCENARIO|FOLDER...", help="A scenario; compare: studies or scores.")
+        list[str],
+        typer.Argument(metavar="SCENARIO|FOLDER...", help="A scenario, joints: several; compare: studies or scores."),
     ],
     out: Out,
-    n: Annotated[int, typer.Option("-n", min=2, metavar="N", help="How many robots, for each value.")] = 20,
+    n: Annotated[
+        int | None, typer.Option("-n", min=2, metavar="N", help="How many robots, for each value; 20, joints: 50.")
+    ] = None,
     vary: Annotated[
         str | None, typer.Option(metavar="PATH=V1,V2,...", help="power: a value of the scenario and what it is set to.")
     ] = None,
@@ -38,7 +45,7 @@ def study(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Calibrate many robots: coverage of the intervals, how often a gain shows; or compare such studies, paired."""
+    """Calibrate many robots: coverage, power, corrections of the joints head to head; or compare studies, paired."""
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import workers as engine
@@ -49,6 +56,11 @@ def study(  # noqa: PLR0913  an option each
 
     if kind == "compare":
         _compare([Path(name) for name in names], out)
+        return
+    who = engine.Workers(workers, scheduler)
+    if kind == "joints" and not (workers and scheduler):
+        changes = overriding(overrides, seed)
+        _joints({name: steps.load(name, changes) for name in names}, n or 50, out, who, changes)
         return
     if len(names) != 1 or (workers and scheduler):
         raise ScenarioError(f"study {kind}: one scenario, and one of --workers and --scheduler")
@@ -62,12 +74,38 @@ def study(  # noqa: PLR0913  an option each
             loaded = steps.load(scenario, [*overriding(overrides, seed), *changed])
             folder = out / f"level_{k}" if path else out
             at = f"{path}={value} " if path else ""
-            who = engine.Workers(workers, scheduler)
-            rows = collect(Plan(loaded, n, folder, produce), who, partial(_tell, progress, at), announce=console.note)
+            rows = collect(
+                Plan(loaded, n or 20, folder, produce), who, partial(_tell, progress, at), announce=console.note
+            )
             levels.append(study.level(value, rows))
             found = list(study.parameters(folder, rows))
     study.save(out / "study.json", levels, found if kind == "coverage" else [])
     _show(levels, found if kind == "coverage" else [], out)
+
+
+def _joints(scenarios: "Mapping[str, Scenario]", n: int, out: Path, workers: "Pool", changes: "Sequence[str]") -> None:
+    from scenarios.commands import console
+    from scenarios.datasets.collection import Plan, collect
+    from scenarios.datasets.index import write_whole
+    from scenarios.studies.joint_run import head_to_head
+    from scenarios.studies.joint_table import page
+
+    with console.progress() as progress:
+        found = {
+            name: collect(
+                Plan(scenario, n, out / name, head_to_head),
+                workers,
+                partial(_tell, progress, f"{name} "),
+                announce=console.note,
+            )
+            for name, scenario in scenarios.items()
+        }
+    options = "".join(f" --set {change}" for change in changes)
+    text = page(found, f"tiago-twin study joints {' '.join(scenarios)} -n {n}{options} --out DIR")
+    write_whole(out / "joints.md", text)
+    typer.echo(text)
+    if all(row.status != "ok" for rows in found.values() for row in rows):
+        raise typer.Exit(FAILED)
 
 
 def _show(levels: "list[Level]", found: "list[Parameter]", out: Path) -> None:
