@@ -25,3 +25,9 @@ def test_a_declared_payload_is_known_to_both(trials):
     for trial in ("xyz_0kg", "xyz_2kg"):
         plate, dynamics = (trials[trial, "model_2", base, "motor"] for base in ("plate", "dynamics"))
         assert dynamics < 1.25 * plate
+
+
+@pytest.mark.parametrize("trial", ["xyz_0kg", "xyz_2kg", "push"])
+def test_drive_trains_know_what_loads_them(trials, trial):
+    errors = {name: trials[name, "full", "measured", "motor"] for name in ("xyz", trial)}
+    assert errors[trial] < 1.3 * errors["xyz"]

@@ -45,8 +45,8 @@ _FRICTIONS = (0.15, 0.5)  # [N.m]
 _VISCOUS = 0.05  # [N.m.s/rad]
 _ROUGH, _FINE = FLOORS[:2], FLOORS[2:]
 _TRIED = 3
-_SLIPS = (0.1, 0.4, 2.0)  # [N.m]
-_HINT = 2.0  # cost that friction in the mesh must save at a glance
+_SLIPS, _LIKELY = (0.1, 0.4, 2.0), 2  # [N.m]; starts
+_HINT = 4.0  # cost that friction in the mesh must save in one trial
 _BETTER = 10.0  # score by which a richer form must win
 _DAMPED = 0.02  # share of the information that damps a step without a trial
 
@@ -128,13 +128,27 @@ def best_train(problem: Problem, coarse: JointData, backlash: float, deflection:
     plain = _dead_zone(problem, rough)
     prior = prior_of(problem.data, "friction_held", backlash, deflection)
     richer = Problem(problem.joint, problem.data, prior, "friction_held", True)
-    starts = [fit_train(richer, theta, ()) for theta in _with_friction(plain.fit.theta)]
-    likely = min(starts, key=lambda fit: fit.cost)
-    if likely.cost > fit_train(plain.fit.problem, plain.fit.theta, ()).cost - _HINT:
-        return plain
-    roughly = fit_train(replace(richer, data=coarse), likely.theta, _ROUGH[1:])
-    held = judged(fit_train(richer, roughly.theta, _FINE))
+    whole = replace(richer, data=coarse)
+    roughly = [fit_train(whole, theta, _ROUGH[1:]) for theta in _hinted(problem, richer, coarse, plain.fit.theta)]
+    found = [judged(fit_train(richer, fit.theta, _FINE)) for fit in roughly]
+    held = min(found, key=lambda candidate: candidate.score, default=plain)
     return held if held.score < plain.score - _BETTER else plain
+
+
+def _hinted(problem: Problem, richer: Problem, coarse: JointData, theta: np.ndarray) -> list[np.ndarray]:
+    """Starts with friction in the mesh, where it explains the trial of most travel better than a dead zone."""
+    motion = coarse.motion
+    travel = np.add.reduceat(np.abs(np.diff(motion.q, append=motion.q[-1])), motion.begins[:-1])
+    trial = int(np.argmax(travel))
+    still = fit_train(replace(problem, form="dead_zone", data=coarse.only(trial)), theta, _ROUGH[1:])
+    of, starts = replace(richer, data=coarse.only(trial)), _with_friction(theta, problem.prior.nominal[1])
+    start = min((fit_train(of, x, ()) for x in starts), key=lambda fit: fit.cost)
+    rubbing = fit_train(of, start.theta, _ROUGH[1:])
+    if rubbing.cost > still.cost - _HINT:
+        return []
+    fine = replace(richer, data=problem.data.only(trial))
+    likely = sorted((fit_train(fine, x, ()) for x in starts), key=lambda fit: fit.cost)
+    return [fit_train(fine, x.theta, FLOORS[1:3]).theta for x in likely[:_LIKELY]]
 
 
 def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
@@ -203,7 +217,16 @@ def _starts(problem: Problem) -> list[np.ndarray]:
     return [fit.theta for fit in sorted(found, key=lambda fit: fit.cost)[:_TRIED]]
 
 
-def _with_friction(theta: np.ndarray) -> list[np.ndarray]:
-    """Starts with friction in the mesh and more of it at the link, from theta without."""
-    stiff = 1.0 / max(theta[1], 1e-5)
-    return [np.concatenate([theta[:2], [theta[2] + t], theta[3:5], [stiff, t], theta[5:]]) for t in _SLIPS]
+def _with_friction(theta: np.ndarray, compliance: float) -> list[np.ndarray]:
+    """Starts with friction in the mesh and more of it at the link, from theta without.
+
+    A dead zone that friction misled may be far too stiff or rub too much: as well from a `compliance` [rad/(N.m)].
+    """
+    soft = np.concatenate(
+        [theta[:1], [max(theta[1], compliance), min(theta[2], _FRICTIONS[0]), theta[3], 0.0], theta[5:]]
+    )
+    return [
+        np.concatenate([x[:2], [x[2] + t], x[3:5], [1.0 / max(x[1], 1e-5), t], x[5:]])
+        for x in (theta, soft)
+        for t in _SLIPS
+    ]
