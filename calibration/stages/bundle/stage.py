@@ -35,6 +35,7 @@ from calibration.stages.suspension.model import Suspension
 from calibration.verdict import Verdict
 
 STAGE = "bundle"
+_ERRS = 2e-4  # [rad] random error of readings, in the geometry, that is worth drive trains from markers alone
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def fit_bundle(
     trains, findings = fit_drive_trains(lab.urdf, description, trials, robot, hand)
     bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
     geometry = replace(geometry, name="full")
-    refitted, more = _completed(lab, trials, robot, hand, trains, findings)
+    refitted, more = _completed(lab, trials, robot, geometry, trains, findings)
     found += more
     if refitted is not None:
         geometry, bending, trains, at_rest = refitted.model, refitted.bending, refitted.trains, refitted.at_rest
@@ -108,13 +109,15 @@ def _completed(
     lab: Laboratory,
     trials: Sequence[Trial],
     robot: Clock,
-    hand: HandModel,
+    geometry: Model,
     trains: DriveTrains,
     findings: Sequence[Verdict],
 ) -> tuple[RefittedGeometry | None, tuple[Verdict, ...]]:
-    """`completed`, nothing where link readings were rejected or no joint has a drive train."""
-    if any(v.verdict == "refused" for v in findings):
+    """`completed`; nothing where link readings were rejected, no joint has a drive train or no reading errs."""
+    errs = bool((geometry.reading_sigma > _ERRS).any())
+    if any(v.verdict == "refused" for v in findings) or not (trains.trains or errs):
         return None, ()
+    hand = hand_of(geometry, lab.chain, lab.nominal_frames)
     try:
         return completed(lab.chain, lab.description, trials, robot, hand, trains)
     except NotEnoughData as error:

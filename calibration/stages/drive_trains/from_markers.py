@@ -30,7 +30,7 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.geometry_refit import RefittedGeometry, refit_geometry
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
-from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial
+from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial, unidentified
 from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances
 from calibration.stages.geometry.parameters import reading_sigma
 from calibration.verdict import Verdict
@@ -75,7 +75,8 @@ def completed(
         if not new:
             return found, ()
         found = refit_geometry(chain, description, trials, robot, found.hand(chain), more)
-    return found, (Verdict(STAGE, "ok", f"without a link encoder, from the hand's markers: {', '.join(new)}"),)
+    summary = Verdict(STAGE, "ok", f"without a link encoder, from the hand's markers: {', '.join(new)}")
+    return found, (summary, *unidentified([train for train in found.trains.trains if train.joint in new]))
 
 
 def with_hand_markers(

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model
 from calibration.mocap.postures import Postures, dwell_windows, passing_postures, readings_at, static_postures
 from calibration.numerics.lie import inverse
@@ -83,11 +84,17 @@ class RefittedGeometry:
 def refit_geometry(
     chain: Chain, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, trains: DriveTrains
 ) -> RefittedGeometry:
-    """The geometry on link angles of the calibration trials; `hand` is the one the drive trains were fitted with."""
+    """The geometry on link angles of the calibration trials; `hand` is the one the drive trains were fitted with.
+
+    Raises:
+        NotEnoughData: The trials show no posture and no motion.
+    """
     corrected = [corrected_trial(trains, trial, robot, hand) for trial in trials]
     bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
     at_rest = trains.by_joint(rest_errors(trains, corrected, robot))
     parts = list(_postures(description, corrected, robot, hand, bending, at_rest))
+    if not parts:
+        raise NotEnoughData("no calibration trial has a posture or a motion of the arm to fit the geometry to")
     postures = parts[0]
     for part in parts[1:]:
         postures = postures.joined(part)

@@ -154,10 +154,14 @@ def _verdicts(found: DriveTrains, hand: HandModel) -> Iterator[Verdict]:
     ]
     if without:
         yield Verdict(STAGE, "missing", f"no link encoder to see the drive train by: {', '.join(without)}")
-    for train in found.trains:
+    yield from unidentified(found.trains)
+
+
+def unidentified(trains: Sequence[DriveTrain]) -> Iterator[Verdict]:
+    """A warning for each joint some of whose parameters are not identifiable, with the motions that would show them."""
+    for train in trains:
         open_ = [q for q in train.parameters if q.status != "estimated" and ".motor." not in q.name]
         if open_:
             names = ", ".join(q.name for q in open_)
-            yield Verdict(
-                STAGE, "warning", f"not identifiable: {names}; {'; '.join(sorted({q.remedy for q in open_}))}"
-            )
+            motions = "; ".join(sorted({q.remedy for q in open_}))
+            yield Verdict(STAGE, "warning", f"not identifiable: {names}; {motions}")
