@@ -70,15 +70,15 @@ def _corrections(dataset: "Dataset", estimate: "Estimate", robot: "RobotClock") 
     """Link angles (n, k), NaN where a motor reading is missing, of a trial by each correction."""
     from calibration.mocap import relabelled_trials
     from calibration.options import Terms
-    from calibration.robot import nominal_frames
-    from calibration.robot.laboratory import Laboratory
+    from calibration.robot import Laboratory
     from calibration.stages.bundle import BundledRobot
     from calibration.stages.geometry import hand_of
     from calibration.stages.joints import JointModels, correct, fit_joint_models
 
     lab = Laboratory(dataset.urdf, dataset.description)
-    frames = nominal_frames(lab.chain, dataset.description)
-    hands = {m.name: hand_of(m, lab.chain, frames) for m in estimate.models if m.name in ("model_2", "full")}
+    hands = {
+        m.name: hand_of(m, lab.chain, lab.nominal_frames) for m in estimate.models if m.name in ("model_2", "full")
+    }
     trials = [trial for _, trial in relabelled_trials(dataset, "calibration")]
 
     def sigmoid(models: JointModels, trial: "Trial") -> np.ndarray:
