@@ -98,7 +98,8 @@ def dynamics_along(
     return found
 
 
-_R, _P, _S, _V, _A, _F, _X, _I, _ROW = 0, 9, 12, 18, 24, 30, 36, 42, 78  # columns of a body's row of `work`
+# columns of a body's row of `work`; numpy's integers, which numba does not compile a function for one by one
+_R, _P, _S, _V, _A, _F, _X, _I, _ROW = np.array([0, 9, 12, 18, 24, 30, 36, 42, 78])
 
 
 def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
@@ -194,7 +195,7 @@ def _move(me: np.ndarray, up: np.ndarray, v: float, a: float) -> None:
 def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
     """Inertia of body b about the root's origin, and the wrench that moves it."""
     m, inertia, h = tree.mass[b], tree.inertia[b], np.zeros(3)
-    _turned(me, tree.moment[b], h, 0)
+    _turned(me, tree.moment[b], h, _R)
     p, I, square = me[_P:_S], me[_I:_ROW].reshape(6, 6), 0.0
     for i in range(_I, _ROW):
         me[i] = 0.0
@@ -235,15 +236,15 @@ def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
             B[i, c] += w[i] * w[c]
             out[0, i] += B[i, c] * me[_P + c]
         out[0, i] += me[_A + i]
-    _cross(w, 0, me, _V, out[0], 0)
-    _cross(me, _P, out[0], 0, out[0], 3)
+    _cross(w, _R, me, _V, out[0], _R)
+    _cross(me, _P, out[0], _R, out[0], _R + 3)
     for c in range(3):
         f = out[1 + c]
         for i in range(3):
             axis[i] = me[3 * i + c]
             for r in range(3):
                 f[i] += B[i, r] * me[3 * r + c]
-        _cross(me, _P, f, 0, f, 3)
+        _cross(me, _P, f, _R, f, _R + 3)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             f[3 + i] += axis[j] * out[0, k] - axis[k] * out[0, j]
@@ -258,7 +259,7 @@ def _regress(tree: RigidTree, work: np.ndarray, out: np.ndarray) -> None:
         j = b + 1
         while j > 0:
             for c in range(4):
-                out[tree.column[j - 1], 4 * b + c] = _dot(work[j], _S, forces[c], 0)
+                out[tree.column[j - 1], 4 * b + c] = _dot(work[j], _S, forces[c], _R)
             j = tree.parent[j - 1]
 
 
@@ -308,7 +309,7 @@ def _borne(work: np.ndarray, out: TreeDynamics, i: int) -> None:
         out.root[i, r] = work[0, _F + r]
         for c in range(6):
             out.composite[i, r, c] = work[0, _I + 6 * r + c]
-    _cross(first, _F, first, _P, bears, 0)
+    _cross(first, _F, first, _P, bears, _R)
     for c in range(3):
         bears[c] += first[_F + 3 + c]
     for c in range(2):
