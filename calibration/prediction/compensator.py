@@ -39,7 +39,7 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
-from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.model import Source, Suspension
 
 _SPACING, _SPAN = 0.05, 1.0  # [s] between samples at most, and of all of them at least, for velocities
 
@@ -122,8 +122,9 @@ class Compensator:
             return self
         robot = BundledRobot.of(self.hand, parts, urdf, laboratory)
         arm, slipping = BundledArm(robot.trains.carrying(payload), robot.bending, robot.at_rest), None
-        if robot.stick_slip is not None and robot.knows("plate"):
-            slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)))
+        if robot.stick_slip is not None:
+            source: Source = "plate" if robot.knows("plate") else "dynamics"
+            slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)), source)
         return replace(self, joints=None, arm=arm, slipping=slipping)
 
     def predict(
@@ -142,7 +143,8 @@ class Compensator:
                 without are each taken to be at rest.
             q_motor: Readings, columns as in the estimate.
             wrench: (n, 6) action on the plate [N, N.m, lab axes, about the plate's centre], the first second at rest;
-                where the base's pose is not given, in the base's axes about its origin.
+                where the base's pose is not given, in the base's axes about its origin. Without a plate in the
+                laboratory, inverse dynamics of continuous readings move the base of row `full`.
             T_lab_base_start: (4, 4) pose of the base frame at the start; identity where not given.
             velocity: (n, n_joints) of the motor side [rad/s, m/s], where it is known.
             t_wrench: Times (m,) [s, plate's clock] of a wrench (m, 6) that was not taken at t, then the robot's clock.
@@ -160,11 +162,14 @@ class Compensator:
             w, there = np.asarray(wrench, dtype=float), needed(base)
             if t_wrench is not None:
                 w = at_readings(t, self.clocks, np.asarray(t_wrench, dtype=float), w)
-            if self.slipping is None:
+            if self.slipping is None or self.slipping.source != "plate":
                 moved = there.moved(t, w)
             else:
                 moved, spread = self.slipping.moved(there, t, q, w)
                 variance = partial(np.asarray, spread)
+        elif base is not None and self.slipping is not None and self.slipping.source != "plate" and _continuous(t):
+            moved, spread = self.slipping.moved(base, t, q, None)
+            variance = partial(np.asarray, spread)
         known = velocity is not None or _continuous(t)
         if self.arm is not None:
             found = self._on_links(self.arm.along(t, q, velocity) if known else self.arm.at_rest(q))
@@ -230,7 +235,7 @@ class Compensator:
         if wrench is None:
             return in_lab(in_base, base, None, T_lab_base_start, state=RobotState(arm))
         w, there, variance = np.asarray(wrench, dtype=float), needed(base), None
-        if self.slipping is None:
+        if self.slipping is None or self.slipping.source != "plate":
             state = there.stepped(t, w, before.base)
         else:
             state = self.slipping.stepped(there, t, w, motion, before.base)

@@ -1,4 +1,4 @@
-"""The base of row `full` in use: it sticks and slips under a plate's wrench and the arm's inertia.
+"""The base of row `full` in use: it sticks and slips under a plate's wrench, or that of the arm's own inertia.
 
     T_lab_base(t) = T_lab_0 exp(x(t)) T_lab_0^-1 T_lab_base(start)        covariance of x: diag V(t), in frame 0
 
@@ -20,6 +20,7 @@ from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, p
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.stream import Sample, SlipStream, slip_stream
 from calibration.stages.suspension.floor_wrench import root_in_base
+from calibration.stages.suspension.model import Source
 
 _UPPER = tuple((PLANE[i], PLANE[j]) for i, j in UPPER)
 
@@ -29,23 +30,29 @@ class SlippingBase:
     """A base that sticks and slips, wherever it stands.
 
     Attributes:
-        model: Fitted with a plate.
+        model: Fitted from `source`.
         lab: The nominal robot with the payload in its hand.
+        source: What moves it: a plate's wrench, or inverse dynamics of the readings.
     """
 
     model: StickSlip
     lab: Laboratory
+    source: Source
 
     def moved(
-        self, at: LoadedBase, t: np.ndarray, q_motor: np.ndarray, wrench: np.ndarray
+        self, at: LoadedBase, t: np.ndarray, q_motor: np.ndarray, wrench: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """How the base moved in the lab (n, 4, 4) and variances (n, 6) of its displacement in frame 0.
+
+        Without a plate's wrench inverse dynamics move it.
 
         Raises:
             NotEnoughData: Less than a second, or nothing says what point the wrench is about.
         """
-        wrenches = wrenches_along(self.lab, t, q_motor, at.load(t, wrench, CUTOFF), at.T_lab_0)
-        forcing = planar_forcing(wrenches, self.model.tilting, "plate")
+        load = None if wrench is None else at.load(t, wrench, CUTOFF)
+        forcing = planar_forcing(
+            wrenches_along(self.lab, t, q_motor, load, at.T_lab_0), self.model.tilting, self.source
+        )
         x, variance = (interpolate_columns(t, forcing.t, found) for found in self.model.displacement(forcing))
         return at.in_lab(x), variance
 

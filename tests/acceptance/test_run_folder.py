@@ -212,6 +212,29 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     np.testing.assert_allclose(clocks.T, found.T, atol=1e-6)
 
 
+def test_without_a_plate_it_is_the_row_with_the_base_from_dynamics(result, swing):
+    estimate, dataset = load_estimate(result.folder / "estimate"), calibration.load(result.folder / "dataset")
+    t, q, _, start, *_ = swing
+    entry = dataset.entries("validation", "swing")[0]
+    trial, whole, nothing = dataset.read(entry), predictor(result.estimate, dataset), np.full_like(q, np.nan)
+    slips = estimate.bundle.stick_slip
+    slips = replace(slips, directions=tuple(d for d in slips.directions if d.source == "dynamics"))
+    ok = np.isin(trial.t_mocap, t)
+    same = replace(
+        trial, t_mocap=t, marker_position=trial.marker_position[ok], t_robot=t, q_motor=q, q_link=nothing,
+        v_motor=nothing, effort=nothing, q_command=nothing, t_plate=np.zeros(0), plate_wrench=np.zeros((0, 1, 6)),
+        wrist_wrench=np.zeros((0, 6)),
+    )  # fmt: skip
+    bare = {"description": whole.description.model_copy(update={"plates": ()}), "plate": None, "robot": SAME}
+    rows = replace(whole, bundled=replace(whole.bundled, stick_slip=slips), **bare)(entry, same).rows
+    expected = next(p for p in rows if (p.model, p.base, p.encoder) == ("full", "dynamics", "motor"))
+    laboratory = estimate.laboratory.model_copy(update={"plates": ()})
+    alone = replace(estimate, bundle=replace(estimate.bundle, stick_slip=slips), laboratory=laboratory)
+    found, still = (Compensator.of(alone).predict(t[:n], q[:n], None, start) for n in (len(t), 50))
+    np.testing.assert_allclose(found.T, expected.T_lab_hand, atol=1e-9)
+    assert np.abs(found.T[:50] - still.T)[:, :3, 3].max() < 1e-3 < np.ptp(found.T[:, :3, 3])
+
+
 def test_without_velocities_readings_are_taken_to_be_at_rest(estimate, compensator, swing):
     t, q, _, start, rows, *_ = swing
     found = compensator.predict(t[::100], q[::100], T_lab_base_start=start)
