@@ -5,6 +5,7 @@ import site
 import subprocess
 import sys
 import sysconfig
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -18,18 +19,22 @@ LINES = (
     "tiago-twin check runs/robot --max model_2.mm=4",
     "tiago-twin dataset swing20 -n 1 --out runs/swings",
 )
+EMPTY = "TIAGO_TWIN_EMPTY_ENVIRONMENT"  # set: its dependencies, extra `view` too, are installed from a package index
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """An environment with the wheel; its dependencies are those of the running one."""
+    """An environment with the wheel; its dependencies are those of the running one, unless `EMPTY` is set."""
     folder = tmp_path_factory.mktemp("wheel")
     subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder], cwd=ROOT, check=True)
     subprocess.run([sys.executable, "-m", "venv", folder / "env"], check=True)
     packages = next((folder / "env").glob("lib/python*/site-packages"))
     (wheel,) = folder.glob("*.whl")
+    if os.environ.get(EMPTY):
+        subprocess.run([folder / "env/bin/pip", "install", "-q", f"{wheel}[view]", "pytest"], check=True)
+        return folder / "env"
     subprocess.run([folder / "env/bin/pip", "install", "-q", "--no-deps", "--no-index", wheel], check=True)
     others = {sysconfig.get_path("purelib"), *site.getsitepackages()}
     (packages / "dependencies.pth").write_text("".join(f"import site; site.addsitedir({p!r})\n" for p in others))
@@ -50,8 +55,18 @@ def test_every_file_comes_from_the_wheel(installed, tmp_path):
 
 def test_the_wheel_does_what_the_readme_shows(installed, tmp_path):
     options = {"cwd": tmp_path, "env": environment(installed), "capture_output": True, "text": True, "timeout": 900}
-    for line in LINES:
+    view = ("tiago-twin view runs/robot",) if os.environ.get(EMPTY) or find_spec("viser") else ()
+    for line in (*LINES, *view):
         done = subprocess.run(line.split(), **options)
         assert done.returncode == 0, f"{line}\n{done.stderr[-2000:]}"
     page = (tmp_path / "runs/robot/report.html").read_text(encoding="utf-8")
     assert "badge" in page and (tmp_path / "runs/swings/index.csv").is_file()
+
+
+def test_its_fixtures_work_in_a_project_whose_packages_have_the_same_names(installed, tmp_path):
+    (tmp_path / "calibration").mkdir()
+    (tmp_path / "calibration/__init__.py").touch()
+    (tmp_path / "test_mine.py").write_text("def test_mine(twin_run):\n    import calibration\n")
+    options = {"cwd": tmp_path, "env": environment(installed), "capture_output": True, "text": True}
+    done = subprocess.run([installed / "bin/python", "-m", "pytest", "-q"], **options)
+    assert done.returncode == 0, done.stdout[-2000:]
