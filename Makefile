@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help demo test test-fast check slow fuzz reliability claims docs pictures bench bench-peer peer clean
+.PHONY: help demo test test-fast check slow fuzz reliability claims docs pictures gallery bench bench-peer peer clean
 
 help:
 	@echo "make demo        simulate, calibrate, evaluate and report the default scenario into runs/demo"
@@ -18,6 +18,7 @@ help:
 	@echo "make claims      measure the claims on ten fixed and ten sampled robots into docs/claims.md (half an hour)"
 	@echo "make docs        the documentation site into docs/_site, offline once its tools are installed"
 	@echo "make pictures    pictures and figures of the README and the documents from runs/demo; needs Chromium"
+	@echo "make gallery     short runs of the other scenarios, for their results in the gallery"
 	@echo "make bench       the benchmarks"
 	@echo "make bench-peer  geometric calibration beside FIGAROH's, in an environment of its own"
 	@echo "make peer        FIGAROH 1.0.2 in .venv-peer, for tiago-twin peer"
@@ -65,6 +66,11 @@ pictures: $(READY)
 	$(BIN)/tiago-twin report runs/demo
 	$(BIN)/python docs/pictures.py runs/demo
 	$(BIN)/python docs/evidence.py runs/demo
+
+gallery: $(READY)
+	for name in $$($(BIN)/tiago-twin list | cut -d' ' -f1 | grep -v humanoids2024); do \
+	  $(BIN)/tiago-twin run $$name --quick --out runs/gallery/$$name && \
+	  $(BIN)/python docs/evidence.py runs/gallery/$$name || exit 1; done
 
 bench: $(READY)
 	$(BIN)/python -m pytest -q -s -m "" -o python_files='bench_*.py' tests/bench --ignore=tests/bench/bench_peer.py
