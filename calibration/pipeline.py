@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from calibration.breakdown import Breakdowns
 from calibration.checks.changes import changes, exchanged_sides, wrong_mounts
+from calibration.checks.joint_columns import wrong_columns
 from calibration.checks.recordings import judged
 from calibration.checks.trial_times import listed_twice
 from calibration.checks.unexplained import passed, unexplained
@@ -106,12 +107,11 @@ def _calibrated(
     )
     context = Context(data, _empty(dataset, data.options)).with_findings(*findings)
     if context.data.rejected:
-        return context.estimate
+        return _explained(context, means).estimate
     tell("clocks", 0.2)
-    if not data.trials and not means:
-        raise NotEnoughData("in every calibration trial the base moves; record static postures of the arm too")
-    clocks, findings = synchronise(lab, data.trials) if data.trials else ((), _NO_CLOCKS)
-    context = Context(replace(data, clocks=clocks), replace(context.estimate, clocks=clocks)).with_findings(*findings)
+    context = _synchronised(context, means)
+    if context.data.rejected and not context.data.clocks:
+        return context.estimate
     fits = [stage for stage in _STAGES if stage.name in wanted]
     if not fits:
         return context.estimate
@@ -120,6 +120,8 @@ def _calibrated(
     for k, stage in enumerate(fits):
         tell(stage.name, 0.55 + 0.45 * k / len(fits))
         context = _after(context, stage)
+    if context.data.rejected:
+        context = _explained(context, means)
     if plan_next:
         tell("next experiments", 0.95)
         context = _with_plans(context, wanted)
@@ -174,6 +176,31 @@ def _after(context: Context, stage: Stage) -> Context:
     result = stage.run(context.data)
     context = _advised(context.with_result(result), result)
     return context.with_findings(*_changed(context.data)) if stage is GEOMETRY else context
+
+
+def _synchronised(context: Context, means: Sequence[PostureMeans]) -> Context:
+    """With the clocks, or refused for the columns that hide them.
+
+    Raises:
+        NotEnoughData: There is nothing to estimate them from.
+    """
+    data = context.data
+    if not data.trials and not means:
+        raise NotEnoughData("in every calibration trial the base moves; record static postures of the arm too")
+    try:
+        clocks, findings = synchronise(data.lab, data.trials) if data.trials else ((), _NO_CLOCKS)
+    except NotEnoughData:
+        context = _explained(context, means)
+        if context.data.rejected:
+            return context
+        raise
+    return Context(replace(data, clocks=clocks), replace(context.estimate, clocks=clocks)).with_findings(*findings)
+
+
+def _explained(context: Context, means: Sequence[PostureMeans]) -> Context:
+    """With the joints whose columns are swapped or reversed, where these are why the recordings cannot be used."""
+    lab, trials = context.data.lab, context.data.trials
+    return context.with_findings(*wrong_columns(lab.description, lab.chain, (*trials, *means)))
 
 
 def _changed(data: StageInput) -> Iterator[Verdict]:

@@ -29,6 +29,7 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
+from calibration.verdict import Verdict
 
 _POSES, _FEWEST, _ENOUGH = 60, 6, 10  # compared, of all trials; of each at least; to judge by
 _OFF, _ANOTHER = 0.012, 0.06  # [m] no suspicion; another robot than the nominal one
@@ -67,6 +68,14 @@ def check_columns(description: Description, chain: Chain, trials: Sequence[tuple
     if said is not None:
         more = f" and {len(shown) - 1} more" if len(shown) > 1 else ""
         raise InputError(shown[0].file + more, said)
+
+
+def wrong_columns(description: Description, chain: Chain, trials: Sequence[Trial | PostureMeans]) -> Iterator[Verdict]:
+    """What `check_columns` finds in the recordings of a dataset: a reason, where a calibration of them is refused."""
+    try:
+        check_columns(description, chain, [(trial.id, trial) for trial in trials])
+    except InputError as error:
+        yield Verdict("reading", "refused", str(error))
 
 
 def _shown(description: Description, file: str, trial: Trial | PostureMeans) -> Shown:

@@ -139,6 +139,17 @@ def exchanged_sides(joints: list[int]) -> Spoil:
     return lambda c: c.changed("calibration", of_trial)
 
 
+def exchanged_columns(one: int, other: int) -> Spoil:
+    """Every reading of a joint in the column of another."""
+
+    def of_trial(trial: Trial, name: str) -> Trial:
+        q, link = trial.q_motor.copy(), trial.q_link.copy()
+        q[:, [one, other]], link[:, [one, other]] = q[:, [other, one]], link[:, [other, one]]
+        return replace(trial, q_motor=q, q_link=link)
+
+    return lambda c: c.changed("calibration", of_trial)
+
+
 def late(by: float, share: float, role: str = "calibration") -> Spoil:
     def spoil(c: Campaign) -> Campaign:
         rows = c.part(role, share, "t_robot")

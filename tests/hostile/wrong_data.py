@@ -6,6 +6,7 @@ A mistake changes trials of a role, or the description, of a campaign in memory.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from tests.hostile.campaign import (
     commands,
     drawn_off,
     drift,
+    exchanged_columns,
     exchanged_sides,
     gain,
     gone,
@@ -75,6 +77,10 @@ TABLE = (
     Mistake("base markers slip by 10 mm", moved("base", [0.01, 0.0, 0.0], 0.5), SLIPPED),
     Mistake("motor and link exchanged", exchanged_sides(list(range(1, 8))), "are exchanged"),
     Mistake("motor and link of arm_6 exchanged", exchanged_sides([6]), "are exchanged"),
+    *(
+        Mistake(f"columns of arm_{a} and arm_{b} exchanged", exchanged_columns(a, b), f"arm_{b}_joint are swapped")
+        for a, b in combinations(range(1, 5), 2)
+    ),
     Mistake("validated on a calibration file", validated_on_calibration, "are one recording"),
     Mistake("1 % of frames lost", hidden(0.01, 0.0), "", 1.1),
     Mistake("20 % hidden in blocks of 0.5 s", hidden(0.2, 0.5), "", 1.1),
