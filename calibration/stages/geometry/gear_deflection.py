@@ -42,6 +42,7 @@ from calibration.verdict import Verdict
 
 _HAND = np.array([5e-4, 1e-3])  # random errors of the hand's position [m] and rotation [rad] to begin with
 _SPREAD = 720  # components from which rank and combinations are found
+_OTHER_SIDE = 0.05  # share of postures whose backlash may lie against its load
 _STRONG = np.log(20.0)  # evidence called strong by Kass and Raftery, JASA 1995
 
 
@@ -56,7 +57,7 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
     model = model_of("full", chain, found.parameters, found.fit)
     if found.rejected:
         return model, tuple(Verdict(STAGE, "refused", message) for message in found.rejected)
-    return model, (*left_out(postures, found.robust), *_findings(model, hand))
+    return model, (*left_out(postures, found.robust, _OTHER_SIDE), *_findings(model, hand))
 
 
 @dataclass(frozen=True)

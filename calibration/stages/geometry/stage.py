@@ -95,12 +95,13 @@ def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, 
     return RobustFit(found.fit, kept, distance)
 
 
-def left_out(postures: Postures, found: RobustFit) -> Iterator[Verdict]:
-    """The postures that were not used, by name."""
+def left_out(postures: Postures, found: RobustFit, usual: float = 0.0) -> Iterator[Verdict]:
+    """The postures that were not used, by name; up to a share `usual` of good ones contradict a fine model as well."""
     odd = np.flatnonzero(~found.kept)
     if len(odd):
         names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
         said = (
             f"{len(odd)} of {len(postures)} postures contradict the others and were left out, counted from 0: {names}"
         )
-        yield Verdict(STAGE, "refused" if len(odd) > MANY_ODD * len(postures) else "warning", said)
+        share = len(odd) / len(postures)
+        yield Verdict(STAGE, "refused" if share > MANY_ODD else "warning" if share > usual else "ok", said)
