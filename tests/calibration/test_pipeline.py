@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 
 from calibration import calibrate, load, save_estimate
+from calibration.context import Context
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
-from calibration.pipeline import STAGES
+from calibration.pipeline import STAGES, _concluded
 from calibration.recording.trial import sha256
+from calibration.robot.laboratory import Laboratory
 from calibration.stages.geometry.model_of_fit import hand_of
+from calibration.stages.stage import StageInput
+from calibration.verdict import Verdict
 from tests.doubles import rigid_robot
 from tests.doubles.edited_dataset import rewritten
 
@@ -39,6 +43,16 @@ def test_the_estimate_is_a_function_of_the_dataset_folder_s_bytes_alone(folder, 
     save_estimate(estimate, tmp_path / "one")
     here = {p.name: p.read_bytes() for p in sorted((tmp_path / "one").iterdir())}
     assert saved(alone, tmp_path / "two") == here
+
+
+def test_intervals_include_what_a_warning_s_cause_may_have_moved(estimate, dataset):
+    name, off = "encoder.arm_2_joint.motor.offset", 0.01
+    warned = Verdict("reading", "warning", "readings of arm_2_joint slipped", (((name, off),),))
+    data = StageInput(Laboratory(dataset.urdf, dataset.description))
+    found = _concluded(Context(data, replace(estimate, verdicts=(warned,))))
+    before, after = ({p.name: p for p in e.model("model_2").parameters} for e in (estimate, found))
+    assert after[name].sigma == pytest.approx(np.hypot(before[name].sigma, off))
+    assert {n for n in before if after[n] != before[n]} == {name}
 
 
 def test_the_estimate_says_what_it_is(estimate):
