@@ -13,7 +13,7 @@ markers' noise, a marker was moved, slipped, or is another.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -22,7 +22,9 @@ from calibration.mocap.cluster_pose import body_poses
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import Trial
-from calibration.verdict import Verdict
+from calibration.robot.laboratory import Laboratory
+from calibration.robot.nominal_frames import AXES, frame_names
+from calibration.verdict import Direction, Verdict
 
 STAGE = "reading"
 _MANY = 400  # samples of a trial that are looked at
@@ -48,8 +50,9 @@ class Shape:
     e: np.ndarray
 
 
-def wrong_shapes(description: Description, trials: Sequence[Trial | PostureMeans]) -> Iterator[Verdict]:
+def wrong_shapes(lab: Laboratory, trials: Sequence[Trial | PostureMeans]) -> Iterator[Verdict]:
     """What the markers of each body say against their drawing or against each other."""
+    description = lab.description
     shapes = {b.name: [s for t in trials if (s := _shape(b, t)) is not None] for b in description.bodies}
     bodies = {b.name: b for b in description.bodies if shapes[b.name] and len(b.markers) >= 3}
     usual = {name: _median(np.concatenate([s.e for s in shapes[name]])) for name in bodies}
@@ -63,7 +66,8 @@ def wrong_shapes(description: Description, trials: Sequence[Trial | PostureMeans
             f"markers are {scale:.4f} +- {sigma:.4f} times as far apart as drawn, and the robot would become as much "
             "too large: calibrate the motion capture again (its wand), or correct the drawings"
         )
-        yield Verdict(STAGE, "refused" if abs(scale - 1.0) > _WRONG_SCALE else "warning", message)
+        refused = abs(scale - 1.0) > _WRONG_SCALE
+        yield Verdict(STAGE, "refused" if refused else "warning", message, (_grown(lab, scale - 1.0),))
     else:
         scale = 1.0
     left = {name: e - (scale - 1.0) * (xyz[name] - xyz[name].mean(axis=0)) for name, e in known.items()}
@@ -71,7 +75,33 @@ def wrong_shapes(description: Description, trials: Sequence[Trial | PostureMeans
     limit = description.tolerances.body_translation
     for name, e in left.items():
         moved = list(_moved(bodies[name], shapes[name], description.sigmas.marker, limit))
-        yield from moved or _misdrawn(bodies[name], e, u, limit)
+        for off, verdict in moved or _misdrawn(bodies[name], e, u, limit):
+            yield replace(verdict, moves=_turned(description, bodies[name], off))
+
+
+def _grown(lab: Laboratory, by: float) -> Direction:
+    """Every length of the robot and its marker frames, longer by a share."""
+    chain, frames = lab.chain, lab.nominal_frames
+    found: list[tuple[str, float]] = []
+    for joint in chain.joints:
+        M = chain.nominal.jointPlacements[chain.nominal.getJointId(joint)]
+        found += zip(
+            (f"geometry.{joint}.{axis}" for axis in AXES[:3]), by * (M.rotation.T @ M.translation), strict=True
+        )
+    for prefix, p in zip(frame_names(), (frames[:3], frames[6:9]), strict=True):
+        found += zip((f"{prefix}.{axis}" for axis in AXES[:3]), by * p, strict=True)
+    return tuple((name, float(size)) for name, size in found)
+
+
+def _turned(description: Description, body: Body, off: float) -> tuple[Direction, ...]:
+    """What a marker that is `off` [m] does at most to the frame of its body: shares of least squares."""
+    known = dict(zip((description.base_body.name, description.hand_body.name), frame_names(), strict=True))
+    if body.name not in known:
+        return ()
+    xyz = _drawn(body)
+    radius = float(np.sqrt(((xyz - xyz.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    sizes = np.repeat([off / len(xyz), off / (np.sqrt(len(xyz)) * radius)], 3)
+    return tuple(((f"{known[body.name]}.{axis}", float(x)),) for axis, x in zip(AXES, sizes, strict=True))
 
 
 def _drawn(body: Body) -> np.ndarray:
@@ -112,8 +142,8 @@ def _size(e: Sequence[np.ndarray]) -> float:
     return float(np.median([np.sqrt((x**2).sum() / max(3 * len(x) - 6, 1)) for x in e]))
 
 
-def _misdrawn(body: Body, e: np.ndarray, usual: float, limit: float) -> Iterator[Verdict]:
-    """A marker that is not where the others put it, or a body of another shape; e (m, 3) its residuals."""
+def _misdrawn(body: Body, e: np.ndarray, usual: float, limit: float) -> Iterator[tuple[float, Verdict]]:
+    """A marker that is not where the others put it, or a body of another shape, and by how much; e (m, 3) residuals."""
     xyz = _drawn(body)
     m, measured = len(xyz), xyz + e
     size = float(np.sqrt((e**2).sum() / max(3 * m - 6, 1)))
@@ -137,7 +167,7 @@ def _misdrawn(body: Body, e: np.ndarray, usual: float, limit: float) -> Iterator
     else:
         what = f"its markers are {1e3 * size:.1f} mm rms from their drawing"
     verdict: Literal["warning", "refused"] = "refused" if (worst if alone else size) > limit else "warning"
-    yield Verdict(STAGE, verdict, f"body {body.name}: {what}; {remedy}")
+    yield worst if alone else size, Verdict(STAGE, verdict, f"body {body.name}: {what}; {remedy}")
 
 
 def _mirrored(xyz: np.ndarray, measured: np.ndarray) -> float:
@@ -155,8 +185,8 @@ def _against_others(xyz: np.ndarray, measured: np.ndarray, k: int) -> tuple[floa
     return off, float(np.sqrt((found.residual**2).sum() / max(3 * others.sum() - 6, 1)))
 
 
-def _moved(body: Body, shapes: Sequence[Shape], sigma: float, limit: float) -> Iterator[Verdict]:
-    """Trials and times in which a body has another shape than in most of the campaign."""
+def _moved(body: Body, shapes: Sequence[Shape], sigma: float, limit: float) -> Iterator[tuple[float, Verdict]]:
+    """Trials and times in which a body has another shape than in most of the campaign, and how far a marker moved."""
     windows = [
         (f"{s.trial} at {start - s.t[0]:.0f} s", _median(s.e[(s.t >= start) & (s.t < start + _WINDOW)]))
         for s in shapes
@@ -176,4 +206,4 @@ def _moved(body: Body, shapes: Sequence[Shape], sigma: float, limit: float) -> I
         f"body {body.name}: a marker moved by {1e3 * off.max():.1f} mm against the others, in {len(moved)} of "
         f"{len(e)} windows of {_WINDOW:.0f} s, the first in {windows[moved[0]][0]}; fix it, and record these again"
     )
-    yield Verdict(STAGE, "refused" if off.max() > limit else "warning", message)
+    yield float(off.max()), Verdict(STAGE, "refused" if off.max() > limit else "warning", message)

@@ -56,7 +56,7 @@ def judged(lab: Laboratory, trials: Sequence[Trial | PostureMeans], calibrated: 
     if refused:
         return refused
     continuous = [MeasuredTrial.of(lab.description, t) for t in trials if isinstance(t, Trial)]
-    found = [*wrong_shapes(lab.description, trials), *wrong_dwells(continuous), *holes(continuous)]
+    found = [*wrong_shapes(lab, trials), *wrong_dwells(continuous), *holes(continuous)]
     for trial in continuous:
         wrong = [*commanded(trial, lab.description.sigmas.encoder)]
         if not calibrated:

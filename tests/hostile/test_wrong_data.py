@@ -8,7 +8,7 @@ from calibration.checks import judged
 from calibration.mocap import relabelled_trials
 from calibration.robot.laboratory import Laboratory
 from tests.doubles import rigid_robot
-from tests.hostile.campaign import Campaign
+from tests.hostile.campaign import Campaign, scaled
 from tests.hostile.spoilt import reference_of, tried
 from tests.hostile.wrong_data import FAST, TABLE, VALIDATION, drawn
 
@@ -45,6 +45,16 @@ def test_nothing_is_said_of_good_recordings(rigid):
 def test_a_mistake_seen_in_the_recordings_is_named(rigid, mistake, tmp_path):
     found = said(mistake.spoil(rigid[1]).written(tmp_path / "data"))
     assert any(mistake.says in message for message in found), found
+
+
+def test_a_bounded_mistake_is_in_the_intervals_of_what_it_moves(rigid, tmp_path):
+    dataset = load(scaled(1.003)(rigid[1]).written(tmp_path / "data"))
+    trials = [trial for _, trial in relabelled_trials(dataset, "calibration")]
+    (found,) = judged(Laboratory(dataset.urdf, dataset.description), trials, calibrated=True)
+    moved = dict(found.moves[0])
+    assert found.verdict == "warning" and {"frame.tool.hand.x", "geometry.arm_4_joint.x"} <= moved.keys()
+    lengths = [size for name, size in moved.items() if name.startswith("geometry.")]
+    assert 0.003 * 0.8 < np.linalg.norm(lengths) < 0.003 * 2.0  # an arm's length, of a 0.3 % larger scale
 
 
 @pytest.mark.slow
