@@ -15,6 +15,7 @@ from calibration.checks.joint_columns import wrong_columns
 from calibration.checks.recordings import judged
 from calibration.checks.trial_times import listed_twice
 from calibration.checks.unexplained import passed, unexplained
+from calibration.conclusion import conclusion
 from calibration.context import Context, with_postures
 from calibration.design.next_motions import drive_next, sweeps_next, swings_next
 from calibration.design.next_postures import record_next
@@ -130,7 +131,7 @@ def _calibrated(
         tell("cross-validation", 0.97)
         estimate = _cross_validated(estimate, context.data)
     tell("done", 1.0)
-    return estimate
+    return replace(estimate, verdicts=(*estimate.verdicts, *conclusion(estimate)))
 
 
 def _usual(dataset: Dataset) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from calibration.inference.absorption import Absorption
+from calibration.inference.family import Shown
 from calibration.verdict import Direction
 
 Status = Literal["estimated", "combined", "not_identifiable"]
@@ -66,6 +67,7 @@ class Model:
         hand_error: (2,) random errors of the hand's position [m] and rotation [rad]; empty where not estimated.
         random: Covariance of the first parameters by random errors alone; empty where there is nothing else.
         absorption: How much of each class of defect its parameters swallow; None where not computed.
+        tests: Of effects that it may leave out, see `mismatch`; not saved.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Model:
     hand_error: np.ndarray = field(default_factory=lambda: np.zeros(0))
     random: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     absorption: Absorption | None = None
+    tests: tuple[Shown, ...] = ()
 
     @property
     def random_covariance(self) -> np.ndarray:

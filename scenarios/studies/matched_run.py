@@ -5,6 +5,8 @@ means by the markers' noise; Pinocchio says where the hand is. What the fit prom
 the fit is wrong, and not the model.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ from calibration.errors import NotCalibrated
 from calibration.mocap import Postures, body_poses
 from calibration.numerics.lie import adjoint, exp6, inverse
 from calibration.recording import Description
-from calibration.robot import HandModel, chain_of, nominal_hand
+from calibration.robot import Chain, HandModel, chain_of, nominal_hand
 from calibration.stages.geometry import calibrate_geometry, geometry_parameters, hand_of, reading_sigma, register
 from scenarios.datasets.run_spec import Magnitude
 from scenarios.files.scenario import Scenario
@@ -26,12 +28,59 @@ _NEW = 30  # postures the fit has not seen
 _LEVEL = 0.025  # one-sided
 
 
+@dataclass(frozen=True)
+class MatchedRobot:
+    """A robot that is what the geometric model says.
+
+    Attributes:
+        chain: Nominal.
+        description: Of its laboratory.
+        theta: (p,) parameters of the geometry.
+        true: The robot.
+        new: (m, k) readings that are not among the postures.
+        seen: Postures.
+    """
+
+    chain: Chain
+    description: Description
+    theta: np.ndarray
+    true: HandModel
+    new: np.ndarray
+    seen: Postures
+
+
+Departure = Callable[[Chain, np.ndarray], np.ndarray]
+
+
 def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     """Write score.json of one robot; as many postures as the scenario's campaign has.
 
     Raises:
         NotCalibrated: There is no result that may be used.
     """
+    found = matched_robot(scenario)
+    chain, theta, true, readings = found.chain, found.theta, found.true, found.new
+    description, seen, frames = found.description, found.seen, robot.nominal_frames(chain, found.description)
+    parameters = geometry_parameters(chain, description)
+    model, verdicts = calibrate_geometry(chain, description, seen)
+    if refused := [v.message for v in verdicts if v.verdict == "refused"]:
+        raise NotCalibrated(refused)
+    judged = judge_parameters(model, map(Parameter, parameters.names, parameters.units, theta.tolist()))
+    judged.save(out)
+    rows = {"registration": register(chain, description, seen)[0], "model_2": model}
+    errors = {name: _errors(hand_of(m, chain, frames), true, readings) for name, m in rows.items()}
+    gain = stats.ttest_rel(errors["registration"], errors["model_2"], alternative="greater").pvalue
+    return (
+        Magnitude("coverage_95", judged.coverage_95),
+        Magnitude("n_judged", float(judged.n_judged)),
+        Magnitude("nees_per_dof", judged.nees / judged.dof),
+        *(Magnitude(f"{name}_mm", 1e3 * float(np.sqrt((e**2).mean() / 3.0))) for name, e in errors.items()),
+        Magnitude("detected", float(gain < _LEVEL)),
+    )
+
+
+def matched_robot(scenario: Scenario, departure: Departure | None = None) -> MatchedRobot:
+    """A robot and its postures; `departure` is what the model does not know: angles (n, k) by chain and readings."""
     import mjcf
     from twin.campaign import describe_dataset
     from twin.motions import sample_postures
@@ -45,23 +94,10 @@ def matched(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     true = nominal_hand(chain, frames).with_theta(theta, parameters.names)
     readings = rng.permutation(sample_postures(mjcf.model(), n + _NEW, rng))
     moved = readings[:n] + reading_sigma(chain, description) * rng.normal(size=(n, len(chain.joints)))
+    poses = true.poses(moved if departure is None else moved + departure(chain, readings[:n]))
     samples = campaign.dwell * scenario.twin.instruments.mocap_rate
-    seen = _measured(description, readings[:n], true.poses(moved), samples, rng)
-    model, verdicts = calibrate_geometry(chain, description, seen)
-    if refused := [v.message for v in verdicts if v.verdict == "refused"]:
-        raise NotCalibrated(refused)
-    judged = judge_parameters(model, map(Parameter, parameters.names, parameters.units, theta.tolist()))
-    judged.save(out)
-    rows = {"registration": register(chain, description, seen)[0], "model_2": model}
-    errors = {name: _errors(hand_of(m, chain, frames), true, readings[n:]) for name, m in rows.items()}
-    gain = stats.ttest_rel(errors["registration"], errors["model_2"], alternative="greater").pvalue
-    return (
-        Magnitude("coverage_95", judged.coverage_95),
-        Magnitude("n_judged", float(judged.n_judged)),
-        Magnitude("nees_per_dof", judged.nees / judged.dof),
-        *(Magnitude(f"{name}_mm", 1e3 * float(np.sqrt((e**2).mean() / 3.0))) for name, e in errors.items()),
-        Magnitude("detected", float(gain < _LEVEL)),
-    )
+    seen = _measured(description, readings[:n], poses, samples, rng)
+    return MatchedRobot(chain, description, theta, true, readings[n:], seen)
 
 
 def _measured(

@@ -106,7 +106,7 @@ def refit_geometry(
     found = fit_robustly(robot_hand, parameters, postures, errors)
     departed = with_departures(robot_hand, parameters, found.fit, postures.rows(found.kept))
     model = model_of("full", chain, parameters, departed.fit)
-    model = replace(model, random=found.fit.covariance, absorption=departed.absorbed)
+    model = replace(model, random=found.fit.covariance, absorption=departed.absorbed, tests=departed.tests)
     fitted = hand_of(model, chain, nominal_frames(chain, description))
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset
@@ -194,13 +194,13 @@ def _postures(  # noqa: PLR0913  the parts of one line
     at_rest: np.ndarray,
 ) -> Iterator[Postures]:
     """Static postures, then those passed; at_rest (n_joints,) widens the static ones [rad]."""
-    for one in corrected:
+    for k, one in enumerate(corrected):
         if len(one.trial.dwell_start):
             found = static_postures(description, [one.trial], robot)
             yield _widened(one, found, robot, hand, bending, at_rest)
         elif np.ptp(one.loads.q, axis=0).max() > _MOVES:
             found = passing_postures(description, [one.trial], robot, _SPACING)
-            yield _widened(one, found, robot, hand, bending, None)
+            yield _widened(one, replace(found, motion=np.full(len(found), k)), robot, hand, bending, None)
 
 
 def _widened(  # noqa: PLR0913  the parts of one line

@@ -16,8 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.inference.absorption import Absorption, absorption
+from calibration.inference.family import Shown
 from calibration.inference.map_estimate import Fit
 from calibration.inference.misfit import Departures, misfit
+from calibration.inference.mismatch import Effect, mismatch
 from calibration.inference.parameters import ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.numerics.lie import inverse, jlog6, log6, moved
@@ -39,11 +41,13 @@ class Departed:
         fit: With departures counted in its covariance.
         shown: What the residuals show, as messages.
         absorbed: How much of each class of defect the parameters swallow.
+        tests: Of effects by name, together at 1 %.
     """
 
     fit: Fit
     shown: tuple[str, ...]
     absorbed: Absorption
+    tests: tuple[Shown, ...]
 
 
 def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures) -> Departed:
@@ -51,11 +55,31 @@ def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, posture
     possible = departures(hand.with_theta(fit.theta, parameters.names), postures, _expected(hand, fit))
     found, absorbed = misfit(fit, parameters, possible), _absorbed(fit, parameters, possible)
     seen = ", ".join(f"{name} {1e3 * size:.2g} m{'m' if name == NAMES[-1] else 'rad'}" for name, size in found.seen)
-    wider = replace(fit, covariance=found.covariance)
+    wider, tests = replace(fit, covariance=found.covariance), shown_by(hand, parameters, fit, postures)
     if not found.size.any():
-        return Departed(wider, (), absorbed)
+        return Departed(wider, (), absorbed, tests)
     what = f"effects that the model leaves out ({seen or 'not clear which'})"
-    return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed)
+    return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed, tests)
+
+
+def shown_by(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures) -> tuple[Shown, ...]:
+    """Whether residuals depend on time, reversal, load and posture, joint by joint: dq_j = s x_j.
+
+    x: order of recording; sign of the motion, or of the approach to a static posture; torque of gravity; cos q, sin q.
+    """
+    chain, at = hand.nominal, hand.with_theta(fit.theta, parameters.names)
+    q, tau = postures.q[:, chain.columns], chain.gravity_torques(postures.q)
+    J = _as_residuals(at.kinematics(postures.q, tau).J_joint * joint_lengths(chain), at.poses(postures.q), postures)
+    turns = [k for k, name in enumerate(chain.joints) if not chain.is_prismatic(name)]
+    order = np.linspace(-0.5, 0.5, len(q))[:, None] * np.ones(len(chain.joints))
+    came = np.sign(np.diff(q, axis=0, prepend=q[:1]))
+    load = tau / np.maximum(np.abs(tau).max(axis=0), _LOADED)
+    shapes = (("time", order), ("reversal", came), ("load", load))
+    effects = [Effect(name, J[:, :, turns] * x[:, None, turns]) for name, x in shapes]
+    waves = [J[:, :, turns] * f(q)[:, None, turns] for f in (np.cos, np.sin)]
+    effects.append(Effect("posture", np.concatenate(waves, axis=2)))
+    moves = postures.motion >= 0
+    return mismatch(fit, parameters, effects, np.where(moves, postures.motion, -1 - np.arange(len(q))))
 
 
 def _expected(hand: HandModel, fit: Fit) -> float:

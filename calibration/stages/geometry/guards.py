@@ -24,6 +24,7 @@ _CONDITION_OF_COMPLIANCES = 1e6  # scaled [-]
 _FACTOR = 6.0  # largest plausible ratio of a prior's width to what it began with [-]
 _READING = 0.03  # largest plausible random error of a reading [rad, a tenth of it in m]
 MANY_ODD = 0.25  # share of postures that may be wrong
+TOO_FEW, DEFICIENT = "distinct postures among", "the postures do not excite the model"
 _HAND = (("position [m]", 1e-2), ("rotation [rad]", 5e-2))  # largest plausible random errors of the hand
 CONDITION = {6: 2e4, 3: 1e6}  # scaled, of poses and of points; 200 to 900 for poses all over the workspace [-]
 _OFFSET = 0.5  # largest plausible zero of a reading [rad, a tenth of it in m]
@@ -71,7 +72,7 @@ def unusable_data(chain: Chain, q: np.ndarray, start: Start, components: int) ->
     needed = fewest(components)
     n = distinct(q[:, chain.columns], APART * joint_lengths(chain))
     if n < needed:
-        yield f"{n} distinct postures among {len(q)}; at least {needed} are needed, spread over all joints"
+        yield f"{n} {TOO_FEW} {len(q)}; at least {needed} are needed, spread over all joints"
         return
     size = abs(start.scale)
     if not 1.0 / _SCALE < size < _SCALE:
@@ -124,7 +125,7 @@ def too_little(known: Identifiability, limit: float) -> Iterator[str]:
     """Why the postures cannot carry the model."""
     if not known.clear or known.condition > limit:
         yield (
-            f"the postures do not excite the model (rank {known.rank}, gap {known.gap:.0f}, condition "
+            f"{DEFICIENT} (rank {known.rank}, gap {known.gap:.0f}, condition "
             f"{known.condition:.1e}); spread them over all joints' ranges"
         )
 

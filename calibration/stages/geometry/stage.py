@@ -76,7 +76,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     departed = with_departures(hand, parameters, found, postures.rows(robust.kept))
     verdicts += [Verdict(STAGE, "ok", message) for message in departed.shown]
     model = model_of("model_2", chain, parameters, departed.fit)
-    return replace(model, random=found.covariance, absorption=departed.absorbed), tuple(verdicts)
+    return replace(model, random=found.covariance, absorption=departed.absorbed, tests=departed.tests), tuple(verdicts)
 
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:

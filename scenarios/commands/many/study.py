@@ -40,6 +40,10 @@ def study(  # noqa: PLR0913  an option each
     matched: Annotated[
         bool, typer.Option("--matched", help="Robots that follow the geometric model exactly, without physics.")
     ] = False,
+    effect: Annotated[
+        Literal["time", "reversal", "load", "posture"] | None,
+        typer.Option(metavar="NAME", help="power: how large an effect that no model has must be, on matched robots."),
+    ] = None,
     workers: Workers = 0,
     scheduler: Scheduler = None,
     seed: Seed = None,
@@ -65,6 +69,9 @@ def study(  # noqa: PLR0913  an option each
     if len(names) != 1 or (workers and scheduler):
         raise ScenarioError(f"study {kind}: one scenario, and one of --workers and --scheduler")
     scenario = names[0]
+    if effect is not None:
+        _power_of_effect(kind, steps.load(scenario, overriding(overrides, seed)), effect, n, out)
+        return
     path, values = _varied(kind, vary)
     produce = without_physics if matched else judged
     levels, found = [], []
@@ -106,6 +113,22 @@ def _joints(scenarios: "Mapping[str, Scenario]", n: int, out: Path, workers: "Po
     typer.echo(text)
     if all(row.status != "ok" for rows in found.values() for row in rows):
         raise typer.Exit(FAILED)
+
+
+def _power_of_effect(
+    kind: str, scenario: "Scenario", effect: Literal["time", "reversal", "load", "posture"], n: int, out: Path
+) -> None:
+    from scenarios.commands import console
+    from scenarios.datasets.index import write_whole
+    from scenarios.studies.effect_power import entry, power
+
+    if kind != "power":
+        raise ScenarioError("--effect: belongs to power")
+    found = power(scenario, effect, n)
+    out.mkdir(parents=True, exist_ok=True)
+    write_whole(out / "study.json", json.dumps(entry(found), indent=1) + "\n")
+    console.show(console.records([_flat(asdict(one)) for one in found]))
+    typer.echo(f"Study: {out / 'study.json'}")
 
 
 def _show(levels: "list[Level]", found: "list[Parameter]", out: Path) -> None:

@@ -10,6 +10,7 @@ from scenarios.datasets.index import Row
 from scenarios.datasets.run_spec import Magnitude, run_name
 from scenarios.files.errors import ScenarioError
 from scenarios.studies import statistics
+from scenarios.studies.effect_power import Power, entry, power, smallest
 from scenarios.studies.matched_run import matched
 
 
@@ -100,6 +101,25 @@ def test_a_matched_robot_is_a_function_of_its_seed_and_its_intervals_hold(tmp_pa
     assert 0.91 < held / n < 0.98
     assert all(f["model_2_mm"] < 0.3 * f["registration_mm"] and f["detected"] == 1.0 for f in figures)
     assert len(json.loads((tmp_path / "0" / "score.json").read_text())["combinations"]) > 10
+
+
+def test_a_large_effect_is_seen_by_its_name_in_matched_robots():
+    (found,) = power(load("short", ["twin.campaign.calibration_postures=40"]), "load", 2, (3e-2,))
+    assert (found.seen.value, found.misnamed.value) == (1.0, 0.0) and 2.0 < found.hand_mm < 60.0
+
+
+def test_the_smallest_effect_is_the_one_from_which_on_all_are_seen():
+    def one(size, seen):
+        return Power("load", size, 2.0 * size, 10, statistics.share(round(10 * seen), 10), statistics.share(0, 10))
+
+    assert smallest([one(0.0, 0.0), one(1.0, 0.9), one(2.0, 0.5), one(4.0, 0.8), one(8.0, 1.0)]) == 8.0
+    assert entry([one(0.0, 1.0), one(1.0, 0.5)])["smallest_seen_mm"] is None
+
+
+@pytest.mark.slow
+def test_nothing_wrong_in_nothing_significant_out():
+    (found,) = power(load("short", ["seed=100"]), "load", 500, (0.0,))
+    assert found.seen.value * 500 <= 11  # 99 % of the binomial law of 1 %
 
 
 def test_a_study_of_matched_robots_needs_no_simulation(tmp_path):
