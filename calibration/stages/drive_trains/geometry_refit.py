@@ -30,7 +30,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain, harmonic_ter
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
-from calibration.stages.geometry.departures import with_departures
+from calibration.stages.geometry.departures import shown_by, with_departures
 from calibration.stages.geometry.hand_residual import NoiseModel
 from calibration.stages.geometry.model_of_fit import hand_of, model_of
 from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
@@ -104,9 +104,11 @@ def refit_geometry(
     errors = NoiseModel(np.maximum(play, floor), floor, _HAND[: postures.components // 3])
     robot_hand = hand_model(chain, nominal_frames(chain, description))
     found = fit_robustly(robot_hand, parameters, postures, errors)
-    departed = with_departures(robot_hand, parameters, found.fit, postures.rows(found.kept))
+    used = postures.rows(found.kept)
+    departed = with_departures(robot_hand, parameters, found.fit, used)
+    tests = shown_by(robot_hand, parameters, found.fit, used)
     model = model_of("full", chain, parameters, departed.fit)
-    model = replace(model, random=found.fit.covariance, absorption=departed.absorbed, tests=departed.tests)
+    model = replace(model, random=found.fit.covariance, absorption=departed.absorbed, tests=tests)
     fitted = hand_of(model, chain, nominal_frames(chain, description))
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset

@@ -41,13 +41,11 @@ class Departed:
         fit: With departures counted in its covariance.
         shown: What the residuals show, as messages.
         absorbed: How much of each class of defect the parameters swallow.
-        tests: Of effects by name, together at 1 %.
     """
 
     fit: Fit
     shown: tuple[str, ...]
     absorbed: Absorption
-    tests: tuple[Shown, ...]
 
 
 def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures) -> Departed:
@@ -55,11 +53,11 @@ def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, posture
     possible = departures(hand.with_theta(fit.theta, parameters.names), postures, _expected(hand, fit))
     found, absorbed = misfit(fit, parameters, possible), _absorbed(fit, parameters, possible)
     seen = ", ".join(f"{name} {1e3 * size:.2g} m{'m' if name == NAMES[-1] else 'rad'}" for name, size in found.seen)
-    wider, tests = replace(fit, covariance=found.covariance), shown_by(hand, parameters, fit, postures)
+    wider = replace(fit, covariance=found.covariance)
     if not found.size.any():
-        return Departed(wider, (), absorbed, tests)
+        return Departed(wider, (), absorbed)
     what = f"effects that the model leaves out ({seen or 'not clear which'})"
-    return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed, tests)
+    return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed)
 
 
 def shown_by(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures) -> tuple[Shown, ...]:

@@ -23,7 +23,7 @@ from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
-from calibration.stages.geometry.departures import with_departures
+from calibration.stages.geometry.departures import shown_by, with_departures
 from calibration.stages.geometry.guards import (
     APART,
     CONDITION,
@@ -67,16 +67,16 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
             Verdict(STAGE, "warning", f"joints that never moved are calibrated at their position only: {still}")
         )
     if not refused:
-        used = int(robust.kept.sum())
-        message = f"{known.rank} combinations of {len(parameters)} parameters from {used} postures"
+        message = f"{known.rank} combinations of {len(parameters)} parameters from {robust.kept.sum()} postures"
         verdicts.append(Verdict(STAGE, "ok", f"{message}, condition {known.condition:.0f}"))
     if not oriented:
         message = "a point of the hand was seen: hand orientation is not observable and fixed at nominal"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
-    departed = with_departures(hand, parameters, found, postures.rows(robust.kept))
+    used = postures.rows(robust.kept)
+    departed, tests = with_departures(hand, parameters, found, used), shown_by(hand, parameters, found, used)
     verdicts += [Verdict(STAGE, "ok", message) for message in departed.shown]
     model = model_of("model_2", chain, parameters, departed.fit)
-    return replace(model, random=found.covariance, absorption=departed.absorbed, tests=departed.tests), tuple(verdicts)
+    return replace(model, random=found.covariance, absorption=departed.absorbed, tests=tests), tuple(verdicts)
 
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:
