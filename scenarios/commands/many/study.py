@@ -68,9 +68,8 @@ def study(  # noqa: PLR0913  an option each
         return
     if len(names) != 1 or (workers and scheduler):
         raise ScenarioError(f"study {kind}: one scenario, and one of --workers and --scheduler")
-    scenario = names[0]
     if effect is not None:
-        _power_of_effect(kind, steps.load(scenario, overriding(overrides, seed)), effect, n, out)
+        _power_of_effect(kind, steps.load(names[0], overriding(overrides, seed)), effect, n or 20, out)
         return
     path, values = _varied(kind, vary)
     produce = without_physics if matched else judged
@@ -78,9 +77,8 @@ def study(  # noqa: PLR0913  an option each
     with console.progress() as progress:
         for k, value in enumerate(values):
             changed = [f"{path}={value}"] if path else []
-            loaded = steps.load(scenario, [*overriding(overrides, seed), *changed])
-            folder = out / f"level_{k}" if path else out
-            at = f"{path}={value} " if path else ""
+            loaded = steps.load(names[0], [*overriding(overrides, seed), *changed])
+            folder, at = (out / f"level_{k}", f"{path}={value} ") if path else (out, "")
             rows = collect(
                 Plan(loaded, n or 20, folder, produce), who, partial(_tell, progress, at), announce=console.note
             )
