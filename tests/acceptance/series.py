@@ -1,7 +1,8 @@
 """Runs of the default scenario on many robots, and the figures of their score.json."""
 
 import json
-from collections.abc import Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from scenarios import load, run
 
 SAMPLED = ("twin.widths.spread=0.5",)
 """Every gap, friction, stiffness, offset and wheel sampled, not the default robot's."""
+SEEDS, MORE = range(1000, 1010), range(2000, 2020)
+"""Robots that no method was developed on; those of MORE are looked at where they were run."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,17 @@ def _row(score: dict, key: Key) -> dict:
     ]
     assert found, f"score.json has no row {key}"
     return found[0]
+
+
+def kept_series(name: str, make: Callable[[str], Path], overrides: tuple[str, ...], scenario: str) -> Series:
+    """The series in the folder `name` of the environment variable CLAIM_RUNS, where it is read, not repeated.
+
+    Without that variable SEEDS are run in a folder that `make` makes.
+    """
+    kept = os.environ.get("CLAIM_RUNS")
+    folder = Path(kept) / name if kept else make(name)
+    more = (seed for seed in MORE if (folder / f"{scenario}_{seed}" / "score.json").is_file())
+    return series(folder, (*SEEDS, *more), overrides, scenario)
 
 
 def series(
