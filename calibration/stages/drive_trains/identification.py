@@ -46,7 +46,7 @@ _VISCOUS = 0.05  # [N.m.s/rad]
 _ROUGH, _FINE = FLOORS[:2], FLOORS[2:]
 _TRIED = 3
 _SLIPS, _LIKELY = (0.1, 0.4, 2.0), 2  # [N.m]; starts
-_HINT = 4.0  # cost that friction in the mesh must save in one trial
+_HINT = 6.0  # cost that friction in the mesh must save in one trial
 _BETTER = 10.0  # score by which a richer form must win
 _DAMPED = 0.02  # share of the information that damps a step without a trial
 
@@ -136,19 +136,21 @@ def best_train(problem: Problem, coarse: JointData, backlash: float, deflection:
 
 
 def _hinted(problem: Problem, richer: Problem, coarse: JointData, theta: np.ndarray) -> list[np.ndarray]:
-    """Starts with friction in the mesh, where it explains the trial of most travel better than a dead zone."""
-    motion = coarse.motion
+    """Starts with friction in the mesh, where it explains the trial of most travel better than a dead zone.
+
+    In coarse windows and in fine ones: jolts that no model of one joint has look like friction in either alone.
+    """
+    motion, starts = coarse.motion, _with_friction(theta, problem.prior.nominal[1])
     travel = np.add.reduceat(np.abs(np.diff(motion.q, append=motion.q[-1])), motion.begins[:-1])
-    trial = int(np.argmax(travel))
-    still = fit_train(replace(problem, form="dead_zone", data=coarse.only(trial)), theta, _ROUGH[1:])
-    of, starts = replace(richer, data=coarse.only(trial)), _with_friction(theta, problem.prior.nominal[1])
-    start = min((fit_train(of, x, ()) for x in starts), key=lambda fit: fit.cost)
-    rubbing = fit_train(of, start.theta, _ROUGH[1:])
-    if rubbing.cost > still.cost - _HINT:
-        return []
-    fine = replace(richer, data=problem.data.only(trial))
-    likely = sorted((fit_train(fine, x, ()) for x in starts), key=lambda fit: fit.cost)
-    return [fit_train(fine, x.theta, FLOORS[1:3]).theta for x in likely[:_LIKELY]]
+    trial, likely = int(np.argmax(travel)), []
+    for data, floors, tried in ((coarse, _ROUGH[1:], 1), (problem.data, FLOORS[1:3], _LIKELY)):
+        one = data.only(trial)
+        still, of = replace(problem, form="dead_zone", data=one), replace(richer, data=one)
+        glances = sorted((fit_train(of, x, ()) for x in starts), key=lambda fit: fit.cost)
+        likely = [fit_train(of, fit.theta, floors) for fit in glances[:tried]]
+        if min(fit.cost for fit in likely) > fit_train(still, theta, floors).cost - _HINT:
+            return []
+    return [fit.theta for fit in likely]
 
 
 def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
