@@ -8,7 +8,7 @@ has it, else of the first one that does.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
@@ -83,6 +83,17 @@ class ParameterScore:
 
 ModelScore = tuple[str, ParameterScore]
 """A model's name, and its parameters judged."""
+
+
+def with_holding(parameters: Iterable[Parameter]) -> Iterator[Parameter]:
+    """Coulomb friction of a link with what holds it in its backlash: a joint's readings show their sum alone."""
+    parameters = tuple(parameters)
+    holding = {p.name.split(".")[1]: p.value for p in parameters if p.name.endswith(".holding")}
+    for p in parameters:
+        kind, _, rest = p.name.partition(".")
+        joint, _, what = rest.rpartition(".")
+        more = holding.get(joint, 0.0) if (kind, what) == ("friction", "coulomb") else 0.0
+        yield p._replace(value=p.value + more)
 
 
 def judge_estimate(estimate: Estimate, true: Iterable[Parameter]) -> tuple[tuple[Judged, ...], tuple[ModelScore, ...]]:

@@ -18,7 +18,7 @@ from calibration.inference import Model
 from calibration.prediction import BASELINE, PredictedTrial, Prediction
 from scenarios.files.errors import ScenarioError
 from scenarios.score.base_motion import BaseScore, base_scores
-from scenarios.score.parameters import ModelScore, ParameterScore, judge_estimate
+from scenarios.score.parameters import ModelScore, ParameterScore, judge_estimate, with_holding
 from scenarios.score.slip import SlipScore, slip_scores
 from twin import truth
 from twin.truth import Parameter, TruthTrial
@@ -114,7 +114,8 @@ def _read_parameters(path: Path, estimated: Collection[str]) -> tuple[Parameter,
         derived = _derived(path.parent)
         elements = ((m, i, j) for m in "KC" if m in derived for i in range(6) for j in range(i, 6))
         found = (Parameter(f"suspension.{m}.{i + 1}{j + 1}", "", float(derived[m][i, j])) for m, i, j in elements)
-        return (*truth.read_parameters(path), *(p for p in found if p.name in estimated and np.isfinite(p.value)))
+        own = with_holding(truth.read_parameters(path))
+        return (*own, *(p for p in found if p.name in estimated and np.isfinite(p.value)))
     except FileNotFoundError as error:
         raise ScenarioError(f"{path}: no such file; --truth names a run's truth folder") from error
     except (json.JSONDecodeError, KeyError, TypeError) as error:

@@ -2,7 +2,7 @@ import numpy as np
 
 from calibration import Estimate
 from calibration.inference.parameters import Model, Parameter
-from scenarios.score.parameters import judge_estimate
+from scenarios.score.parameters import judge_estimate, with_holding
 from twin.truth import Parameter as TrueParameter
 
 
@@ -34,3 +34,9 @@ def test_every_estimated_parameter_of_every_model_is_judged_and_the_main_model_f
         "full": (1, 3),
     }
     assert judged[0][0] == "model_2"
+
+
+def test_a_link_s_friction_is_what_its_gear_and_its_holding_make_together():
+    true = {"friction.a.coulomb": 0.5, "friction.b.coulomb": 0.2, "hysteresis.a.holding": 0.4, "hysteresis.a.slip": 2.0}
+    found = {p.name: p.value for p in with_holding(TrueParameter(name, "N.m", value) for name, value in true.items())}
+    assert found == {**true, "friction.a.coulomb": 0.9}
