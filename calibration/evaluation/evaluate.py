@@ -8,7 +8,7 @@ A base that was pushed, rolled or lifted while a trial was recorded is reported:
 not measure the base keep the place it had in the first second.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import inverse, mean, places, to_vector
 from calibration.prediction.foreign import check_names, registered
 from calibration.prediction.predict import predictor
-from calibration.prediction.predicted_trial import PredictedTrial, Prediction
+from calibration.prediction.predicted_trial import BaseMotion, PredictedTrial, Prediction
 from calibration.prediction.predictor import Predictor
 from calibration.prediction.second_session import registration_trials, reregistered
 from calibration.recording.dataset import Dataset
@@ -42,6 +42,7 @@ from calibration.recording.trial import REST, Trial
 from calibration.stages.frames.base_rests import MOVES
 from calibration.verdict import Verdict
 
+_SEEN = 1e-4  # [rad] of yaw, below which it does not matter
 _UNITS = 1e3  # [mm] of another unit, not of another robot
 
 Progress = Callable[[str, float], None]
@@ -123,7 +124,7 @@ def evaluate(
         traces=tuple(errors),
         regimes=(*estimate.regimes, *joints) if predict.joints is not None else (),
         confirmation=tuple(ladder(confirmed, "mocap")),
-        verdicts=(*remarks, *moved_in_trials(scored), *not_predictable(one.predicted for one in scored)),
+        verdicts=(*remarks, *moved_in_trials(scored), *not_predictable([one.predicted for one in scored])),
         points=point_rows(estimate, dataset.description, means),
         predicted=tuple(one.predicted for one in scored),
         main=estimate.main if submitted is None else submitted.name,
@@ -219,8 +220,8 @@ def of_another_robot(rows: tuple[Row, ...]) -> Iterator[Verdict]:
             yield Verdict(STAGE, "warning", message)
 
 
-def not_predictable(trials: Iterable[PredictedTrial]) -> Iterator[Verdict]:
-    """A warning that names the trials in which the base slips as nobody can predict."""
+def not_predictable(trials: Sequence[PredictedTrial]) -> Iterator[Verdict]:
+    """Warnings: trials in which the base slips as nobody can predict; in which one at rest would be nearer."""
     moved = [(p.trial_id, p.base.slipping) for p in trials if p.base is not None and p.base.slipping is not None]
     found = [(name, 1e3 * float(np.sqrt(m.variance[:, 5].mean()))) for name, m in moved if not m.predictable]
     if found:
@@ -230,6 +231,17 @@ def not_predictable(trials: Iterable[PredictedTrial]) -> Iterator[Verdict]:
             "measure the base, or move more softly"
         )
         yield Verdict(STAGE, "warning", message)
+    if worse := ", ".join(p.trial_id for p in trials if p.base is not None and _at_rest_is_nearer(p.base)):
+        message = f"a base at rest predicts its yaw better than the plate in {worse}: measure the base there"
+        yield Verdict(STAGE, "warning", message)
+
+
+def _at_rest_is_nearer(base: BaseMotion) -> bool:
+    """Whether the markers' yaw is nearer to none than to the predicted one."""
+    if base.slipping is None:
+        return False
+    seen, found = base.measured[:, 5], base.slipping.x[:, 5]
+    return bool(np.nanmean((seen - found) ** 2) > np.nanmean(seen**2) + _SEEN**2)
 
 
 def moved_in_trials(scored: Iterable[_Scored]) -> Iterator[Verdict]:

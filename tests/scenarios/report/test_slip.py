@@ -40,8 +40,12 @@ def test_a_trial_is_read_as_it_was_saved(tmp_path):
 
 
 def test_a_trial_whose_band_is_wider_than_its_motion_is_named():
+    """And so is one whose yaw turns the other way."""
     wide = replace(motion(), variance=np.full((400, 6), 1e-5))
     trials = [PredictedTrial(name, "swing", T, base=BaseMotion(m.x, (), None, m)) for name, m in
               (("good", motion()), ("bad", wide))]  # fmt: skip
     (said,) = not_predictable(trials)
     assert said.verdict == "warning" and "bad (3.2 mrad)" in said.message and "good" not in said.message
+    against = PredictedTrial("against", "swing", T, base=BaseMotion(-motion().x, (), None, motion()))
+    (said,) = not_predictable([trials[0], against])
+    assert said.verdict == "warning" and "in against:" in said.message
