@@ -75,7 +75,15 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
     parts = (_over_trials(trials, block_means(trials, v)) for v in (less_certain, preloaded, path**2))
     band = fitted_band(LeftOut(_over_trials(trials, masked**2), *parts), trials.noise, trials.corrected)
     held_out = _held_out(trials, masked)
-    return Direction(source, found.logarithms, found.covariance, ensemble, band, held_out, by_plate=trials.corrected)
+    return Direction(
+        source,
+        found.logarithms,
+        found.covariance,
+        ensemble,
+        band,
+        held_out,
+        by_plate=trials.corrected or source != "plate",
+    )
 
 
 def _over_trials(trials: Trials, x: np.ndarray) -> np.ndarray:

@@ -66,6 +66,11 @@ class Direction:
         return self.source == "plate" and self.by_plate
 
     @property
+    def is_of_wheels(self) -> bool:
+        """Whether wheels that stick and slip are what moves the base: no axis is linear, no force contradicts them."""
+        return self.by_plate and not np.any(self.linear)
+
+    @property
     def slips(self) -> np.ndarray:
         """(3,) axes that the stick-slip model moves."""
         return np.asarray(self.held_out.moves) & ~np.asarray(self.linear, dtype=bool)

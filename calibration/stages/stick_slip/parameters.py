@@ -5,9 +5,9 @@
 
 Wheels of one type share a value. Logarithms are normal: sigma = value * sigma_log, to first order. What the model
 leaves out of a real wheel is not in the data's scatter: MODEL is added to each logarithm. A value is `estimated`
-where its logarithm is known to 0.3 and twice as well as before; a friction that no trial reaches is not. Damping is
-not either: with a plate the rate of correction takes its place, without one inverse dynamics lacks the peaks that
-show it.
+where its logarithm is known to 0.3 and twice as well as before, and wheels are what moves the base; a friction that no
+trial reaches is not. Damping is not either: with a plate the rate of correction takes its place, without one inverse
+dynamics lacks the peaks that show it.
 """
 
 from collections.abc import Iterator
@@ -58,7 +58,7 @@ def _parameter(direction: Direction, name: str, unit: str, key: str) -> Paramete
     i = NAMES.index(key)
     value = float(np.exp(direction.logarithms[i]))
     sigma = float(np.hypot(np.sqrt(direction.covariance[i, i]), _model(key)))
-    known = sigma < min(KNOWN, _SHARPER * PRIOR_SIGMA[i])
+    known = direction.is_of_wheels and sigma < min(KNOWN, _SHARPER * PRIOR_SIGMA[i])
     status: Status = "estimated" if known else "not_identifiable"
     return Parameter(name, unit, float(np.exp(PRIOR[i])), value, value * sigma, status)
 

@@ -76,14 +76,12 @@ def fit_stick_slip(
         fits.append(fit_direction(source, campaign, fits[0].logarithms if fits else None))
     calm = joined(wheels, [row for row, wild in zip(usable[0][1], _wild(fits[0]), strict=True) if not wild])
     shift, gain = displaced(calm, fits[0].logarithms)
-    by_friction = not _behind(fits)
-    if not by_friction:
+    if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
     directions = [_linear(fit, suspension) for fit in fits]
     directions = [replace(d, plain=_plain(d, wheels, rows)) for d, (_, rows, _) in zip(directions, usable, strict=True)]
     model = StickSlip(wheels, tilting, tuple(directions))
-    by_friction = by_friction and not directions[0].linear[2]  # else the wheels are not what the model has, wherever
-    misplaced = _misplaced(wheels.names, shift, gain) if by_friction else ()
+    misplaced = _misplaced(wheels.names, shift, gain) if directions[0].is_of_wheels else ()
     names = [one.trial.id for one in read]
     said = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
     return model, said

@@ -118,6 +118,14 @@ def test_parameters_have_the_names_of_the_contract(model):
     np.testing.assert_allclose(np.sqrt(np.diag(C)), [p.sigma for p in found.values()])
 
 
+def test_where_wheels_are_not_what_moves_the_base_none_of_them_is_identified(model):
+    direction = model.directions[0]
+    assert any(p.status == "estimated" for p in wheel_parameters(model.wheels, direction))
+    for other in ({"linear": np.array([False, True, False])}, {"by_plate": False}):
+        found = wheel_parameters(model.wheels, replace(direction, **other))
+        assert {p.status for p in found} == {"not_identifiable"}
+
+
 def test_a_model_is_the_same_after_it_was_written(model, new):
     again = restored(StickSlip, json.loads(json.dumps(plain(model))))
     for a, b in zip(model.displacement(new[0]), again.displacement(new[0]), strict=True):
