@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from calibration.numerics.robust_covariance import BlockCovariance, block_covariance
 from calibration.options import Terms
@@ -100,26 +99,32 @@ def _left_out(
 ) -> list[np.ndarray]:
     """Discrepancy (n,) of trial k by the models of the others, one for each set of powers."""
     others = [t for t in range(len(samples)) if t != k]
-    best = [(np.inf, 0.0, np.zeros(0))] * len(sets)
+    best = [(np.inf, 0.0, np.zeros((0, 0)))] * len(sets)
     for rho, of_others in zip(rho_grid(), zip(*(factors[t] for t in others), strict=True), strict=True):
         R = np.asarray(np.linalg.qr(np.vstack(of_others), mode="r"))
         for which, powers in enumerate(sets):
-            x, square = _solved(R[:, _columns(basis, powers)], R[:, -1])
-            best[which] = min(best[which], (square, float(rho), x), key=lambda b: b[0])
+            own = R[:, [*_columns(basis, powers), -1]]
+            best[which] = min(best[which], (_square(own), float(rho), own), key=lambda b: b[0])
     domain, s = box(pooled([samples[t] for t in others])), samples[k]
     whole = Problem(basis(np.clip(s.theta, *domain[0]), np.clip(s.tau, *domain[1])), s.velocity, s.y)
-    return [whole.design(rho)[:, _columns(basis, powers)] @ x for powers, (_, rho, x) in zip(sets, best, strict=True)]
+    return [
+        whole.design(rho)[:, _columns(basis, powers)] @ _solution(own)
+        for powers, (_, rho, own) in zip(sets, best, strict=True)
+    ]
 
 
-def _solved(M: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
-    """Least squares M x = y, the least x where columns are alike, and the squares that are left."""
-    Q, R = np.linalg.qr(M)
-    size = np.abs(R.diagonal())
-    if len(M) >= M.shape[1] and size.min(initial=np.inf) > _CLEAR * size.max(initial=0.0):
-        x = solve_triangular(R, Q.T @ y, check_finite=False)
-    else:
-        x = np.linalg.lstsq(M, y, rcond=RANK)[0]
-    return x, float(((y - M @ x) ** 2).sum())
+def _square(own: np.ndarray) -> float:
+    """Least |M x - y|^2 of [M, y]."""
+    R = np.asarray(np.linalg.qr(own, mode="r"))
+    size = np.abs(R.diagonal()[:-1])
+    if len(own) >= own.shape[1] and size.min(initial=np.inf) > _CLEAR * size.max(initial=0.0):
+        return float(np.square(R[-1, -1]))
+    return float(((own[:, -1] - own[:, :-1] @ _solution(own)) ** 2).sum())
+
+
+def _solution(own: np.ndarray) -> np.ndarray:
+    """The least x of M x = y in least squares, of [M, y]."""
+    return np.asarray(np.linalg.lstsq(own[:, :-1], own[:, -1], rcond=RANK)[0])
 
 
 def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:
