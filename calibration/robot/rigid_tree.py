@@ -82,23 +82,16 @@ def tree_of(model: pin.Model, joints: tuple[str, ...]) -> RigidTree:
 def dynamics_along(
     tree: RigidTree, q: np.ndarray, v: np.ndarray, a: np.ndarray, root: np.ndarray, regressors: bool = False
 ) -> TreeDynamics:
-    """Dynamics at positions, velocities and accelerations (n, k) in the columns of the tree.
+    """Dynamics at positions [rad, m], velocities and accelerations (n, k) in the columns of the tree.
 
-    Args:
-        tree: The robot.
-        q: [rad, m].
-        v: Velocities.
-        a: Accelerations.
-        root: (n, 12) or (1, 12) twist of the root and its proper acceleration, linear first, in its axes.
-        regressors: Whether they are wanted.
+    `root` (n, 12) or (1, 12): twist of the root and its proper acceleration, linear first, in its axes.
     """
-    found = room(len(q), q.shape[1], regressors)
-    q, v, a, root = (np.require(x, float, ["C", "W"]) for x in (q, v, a, root))
-    sample(tree, q, v, a, root, scratch(tree), found)
+    found, (q, v, a) = room(len(q), q.shape[1], regressors), np.array([q, v, a], dtype=float)
+    sample(tree, q, v, a, np.array(root, dtype=float, order="C"), scratch(tree), found)
     return found
 
 
-# columns of a body's row of `work`; numpy's integers, which numba does not compile a function for one by one
+# columns of `work`; as numpy's integers, not literals, for each of which numba would compile a function
 _R, _P, _S, _V, _A, _F, _X, _I, _ROW = np.array([0, 9, 12, 18, 24, 30, 36, 42, 78])
 
 
@@ -224,11 +217,10 @@ def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
     """Wrenches (4, 6) about the root's origin by unit mass and first moments of a body that moves: a(r) = a + B r."""
     B, axis, w, square = np.zeros((3, 3)), np.empty(3), me[_V + 3 : _A], 0.0
     for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
         square += w[i] ** 2
         for r in range(4):
             out[r, i] = out[r, 3 + i] = 0.0
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
         B[k, j], B[j, k] = me[_A + 3 + i], -me[_A + 3 + i]
     for i in range(3):
         B[i, i] -= square
@@ -265,14 +257,8 @@ def _regress(tree: RigidTree, work: np.ndarray, out: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def sample(
-    tree: RigidTree,
-    q: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    root: np.ndarray,
-    work: np.ndarray,
-    out: TreeDynamics,
-) -> None:
+    tree: RigidTree, q: np.ndarray, v: np.ndarray, a: np.ndarray, root: np.ndarray, work: np.ndarray, out: TreeDynamics
+) -> None:  # fmt: skip
     """`dynamics_along` for callers in compiled code; `work` as of `scratch`, `out` is filled."""
     k = len(tree.parent)
     work[0, 0] = work[0, 4] = work[0, 8] = 1.0
@@ -294,9 +280,7 @@ def sample(
             out.inertia[i, column] = _dot(me, _S, me, _X)
             for c in range(3):
                 out.coupling[i, column, c] = me[_X + c]
-            for c in range(6):
-                up[_F + c] += me[_F + c]
-            for c in range(_I, _ROW):
+            for c in range(_F, _ROW):  # the twist between is scratch
                 up[c] += me[c]
         _borne(work, out, i)
 
@@ -305,12 +289,12 @@ def sample(
 def _borne(work: np.ndarray, out: TreeDynamics, i: int) -> None:
     """What the root and the first joint bear."""
     first, bears = work[min(1, len(work) - 1)], np.zeros(3)
+    _cross(first, _F, first, _P, bears, _R)
     for r in range(6):
         out.root[i, r] = work[0, _F + r]
         for c in range(6):
             out.composite[i, r, c] = work[0, _I + 6 * r + c]
-    _cross(first, _F, first, _P, bears, _R)
-    for c in range(3):
-        bears[c] += first[_F + 3 + c]
     for c in range(2):
-        out.moment[i, c] = first[c] * bears[0] + first[3 + c] * bears[1] + first[6 + c] * bears[2]
+        out.moment[i, c] = 0.0
+        for r in range(3):
+            out.moment[i, c] += first[3 * r + c] * (bears[r] + first[_F + 3 + r])
