@@ -2,7 +2,8 @@
 
     load         dq_j = s tau_j / max |tau_j|                       gears that give under gravity
     side         dq_j = s tanh(10 tau_j / max |tau_j|)              backlash and friction on the side of the load
-    bending      frame j turned by s M_j / max |M|                  links, by gravity's moments across their joints
+    bending      frame j turned by s M_j / max |M|                  links, by gravity's moments across their joints;
+                                                                    columns where they slid to
     wobble       frame j turned by s (1, cos q_j, sin q_j)          bearings and encoders out of centre
     eccentric    frame j moved by s (1, cos q_j, sin q_j)           the same, and lengths
 
@@ -23,6 +24,7 @@ from calibration.inference.mismatch import Effect, mismatch
 from calibration.inference.parameters import ParameterSet
 from calibration.mocap.postures import Postures
 from calibration.numerics.lie import inverse, jlog6, log6, moved
+from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.parameter_block import joint_lengths
 
@@ -116,12 +118,24 @@ def departures(hand: HandModel, postures: Postures, expected: float) -> Departur
     found = (
         by_joint[:, :, loaded] * share[:, None],
         by_joint[:, :, loaded] * np.tanh(_SHARP * share)[:, None],
-        (by_frame[..., 3:] * bent[:, None]).reshape(n, d, -1),
+        (_turned(by_frame, chain, at.q) * bent[:, None]).reshape(n, d, -1),
         _waved(by_frame[:, :, ~slides, 3:], waves),
         _waved(by_frame[:, :, ~slides, :3], waves),
     )
     group = np.repeat(np.arange(len(found)), [part.shape[2] for part in found])
     return Departures(_as_residuals(np.concatenate(found, axis=2), at.T, postures), group, NAMES, expected)
+
+
+def _turned(J: np.ndarray, chain: Chain, q: np.ndarray) -> np.ndarray:
+    """(n, 6, k, 3) by turning each frame, J (n, 6, k, 6) by moving and turning it: one that slides where it slid to.
+
+    About a point d away: w x (p - d) = w x p - w x d
+    """
+    turned = J[..., 3:].copy()
+    for j in (j for j, name in enumerate(chain.joints) if chain.is_prismatic(name)):
+        axis = chain.loads.axis[list(chain.loads.column).index(chain.columns[j])]
+        turned[:, :, j] -= (J[:, :, j, :3] @ np.cross(np.eye(3), axis).T) * q[:, None, j, None]
+    return turned
 
 
 def _waved(J: np.ndarray, waves: np.ndarray) -> np.ndarray:
