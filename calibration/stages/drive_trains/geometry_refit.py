@@ -30,7 +30,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain, harmonic_ter
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
-from calibration.stages.geometry.departures import shown_by, with_departures
+from calibration.stages.geometry.departures import shown_by, with_departures, with_gears
 from calibration.stages.geometry.hand_residual import NoiseModel
 from calibration.stages.geometry.model_of_fit import hand_of, model_of
 from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
@@ -105,7 +105,10 @@ def refit_geometry(
     robot_hand = hand_model(chain, nominal_frames(chain, description))
     found = fit_robustly(robot_hand, parameters, postures, errors)
     used = postures.rows(found.kept)
-    departed = with_departures(robot_hand, parameters, found.fit, used)
+    geared = with_gears(
+        robot_hand, parameters, found.fit, used, _compliance_sigma(trains, chain), _known(bending.sigma)
+    )
+    departed = with_departures(robot_hand, parameters, geared, used)
     tests = shown_by(robot_hand, parameters, found.fit, used)
     model = model_of("full", chain, parameters, departed.fit)
     model = replace(model, random=found.fit.covariance, absorption=departed.absorbed, tests=tests)
@@ -116,6 +119,16 @@ def refit_geometry(
     trains = replace(trains, trains=referred).with_offset(offset)
     static = [corrected_trial(trains, trial, None, fitted) for trial in trials if len(trial.dwell_start)]
     return RefittedGeometry(model, bending, trains, rest_errors(trains, static, robot), departed.shown)
+
+
+def _known(sigma: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(sigma), sigma, 0.0)
+
+
+def _compliance_sigma(trains: DriveTrains, chain: Chain) -> np.ndarray:
+    """(k,) standard deviations of the chain's joints' compliances [rad/(N.m)]; 0 where there is none."""
+    sigma = {q.name: q.sigma for q in trains.parameters}
+    return _known(np.array([sigma.get(f"gear.{joint}.compliance", 0.0) for joint in chain.joints]))
 
 
 def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:

@@ -62,6 +62,25 @@ def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, posture
     return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed)
 
 
+def with_gears(
+    hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures, compliance: np.ndarray, bending: np.ndarray
+) -> Fit:
+    """The fit with what it takes for known counted in its covariance, C + sum s^2 (K N) (K N)', K = H^-1 J'.
+
+    N: deflection of each joint by the torque of gravity, and of the first joint's column by its moments, in postures;
+    s: standard deviations of compliances (k,) and of the column's (2,) [rad/(N.m)].
+    """
+    chain, at = hand.nominal, hand.with_theta(fit.theta, parameters.names)
+    tau, M = chain.gravity_torques(postures.q), chain.gravity_moments(postures.q)
+    found = at.kinematics(postures.q, tau)
+    column = _turned(found.J_frame[:, :, 1:], chain, found.q)[:, :, 0, :2] * (M[:, 0, :2] * bending)[:, None]
+    both = np.concatenate([found.J_joint * (tau * compliance)[:, None], column], axis=2)
+    N = (fit.whitener @ _as_residuals(both, found.T, postures)).reshape(fit.r_white.size, -1)
+    H = fit.J_white.T @ fit.J_white + np.diag(parameters.prior.precision(fit.widths.prior))
+    moved = np.linalg.solve(H, fit.J_white.T @ N)
+    return replace(fit, covariance=fit.covariance + moved @ moved.T)
+
+
 def shown_by(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures) -> tuple[Shown, ...]:
     """Whether residuals depend on time, reversal, load and posture, joint by joint: dq_j = s x_j.
 

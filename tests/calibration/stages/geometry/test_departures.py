@@ -1,5 +1,7 @@
 """Directions in which robots depart from a rigid chain."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import mjcf
@@ -7,7 +9,9 @@ from calibration.numerics.lie import adjoint, inverse, jlog6, log6
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.nominal_frames import nominal_frames
-from calibration.stages.geometry.departures import NAMES, departures
+from calibration.stages.geometry.departures import NAMES, departures, with_gears
+from calibration.stages.geometry.hand_residual import fit
+from calibration.stages.geometry.parameters import geometry_parameters
 from tests.doubles import rigid_robot
 
 
@@ -28,3 +32,19 @@ def test_a_column_bends_where_it_slid_to():
     scale = np.abs(mine).max() / np.abs(J).max()
     np.testing.assert_allclose(mine, scale * J, atol=1e-9)
     assert chain.is_prismatic(chain.joints[0]) and np.ptp(postures.q[:, chain.columns[0]]) > 0.1
+
+
+def test_a_compliance_that_is_off_moves_the_geometry_as_its_interval_says():
+    description, rng, tiny, c = rigid_robot.described(), np.random.default_rng(0), np.full(8, 1e-4), 1e-6
+    chain = chain_of(mjcf.urdf(), description)
+    hand, parameters = nominal_hand(chain, nominal_frames(chain, description)), geometry_parameters(chain, description)
+    parameters = replace(parameters, group=())
+    truth, q = rigid_robot.defects(0), rigid_robot.random_angles(rng, 30)
+    seen = rigid_robot.postures(truth, q)
+    compliance = c * (np.array(chain.joints) == "arm_4_joint")
+    tau = chain.gravity_torques(seen.q)
+    bent = replace(rigid_robot.postures(truth, q + tau * compliance), q=seen.q, covariance=seen.covariance)
+    before, after = (fit(hand, parameters, some, tiny, tiny) for some in (seen, bent))
+    wider = with_gears(hand, parameters, before, seen, compliance, np.zeros(2))
+    added = np.sqrt(np.diag(wider.covariance - before.covariance).clip(0.0))
+    np.testing.assert_allclose(added, np.abs(after.theta - before.theta), atol=0.03 * added.max())
