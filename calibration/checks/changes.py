@@ -151,6 +151,8 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
             f"motor and link readings of {names} are exchanged: the hand is where the motor side says "
             f"({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
         )
+        unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~loose | (sigma >= _TOLD)))
+        message += f"; sides of {unclear} differ too little to be judged, check them too" if unclear else ""
         yield Verdict(STAGE, "refused", f"{message}; exchange the columns")
 
 

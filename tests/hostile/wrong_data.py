@@ -75,7 +75,7 @@ TABLE = (
     Mistake("readings 50 ms late from half-way on", late(0.05, 0.5), SLIPPED),
     Mistake("hand markers slip by 10 mm", moved("gripper", [0.0, 0.01, 0.0], 0.5), SLIPPED),
     Mistake("base markers slip by 10 mm", moved("base", [0.01, 0.0, 0.0], 0.5), SLIPPED),
-    Mistake("motor and link exchanged", exchanged_sides(list(range(1, 8))), "are exchanged"),
+    Mistake("motor and link exchanged", exchanged_sides(list(range(1, 8))), "arm_2_joint, arm_3_joint, arm_4_joint"),
     Mistake("motor and link of arm_6 exchanged", exchanged_sides([6]), "are exchanged"),
     *(
         Mistake(f"columns of arm_{a} and arm_{b} exchanged", exchanged_columns(a, b), f"arm_{b}_joint are swapped")
