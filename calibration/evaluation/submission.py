@@ -27,6 +27,7 @@ from calibration.recording.schema import Role, TrialEntry
 from calibration.verdict import Verdict
 
 _GAP = 0.1  # [s] between neighbours that are interpolated
+_GAPS = 2e-3  # [-] share of a trial without a prediction that is warned of
 _UNIT = 1e-3  # [-] departure of a quaternion's norm, or of R R', from 1
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
@@ -94,7 +95,7 @@ class Submission:
                 )
                 yield Verdict("evaluation", "warning", message)
             share = float(np.isnan(row.T_lab_hand[:, 0, 0]).mean())
-            if share > 0.0:
+            if share > _GAPS:
                 message = f"{self.name}: {100.0 * share:.1f} % of {row.trial_id} is without a prediction and not scored"
                 yield Verdict("evaluation", "warning", message)
 

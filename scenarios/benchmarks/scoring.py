@@ -96,7 +96,7 @@ def score(entries: Sequence[Path], bench: Path, out: Path, tier: str, progress: 
     opened = [open_entry(folder) for folder in entries]
     pairs = list(runs(tier, bench))
     todo = [(e, task, robot, run) for e in opened for task in TASKS for robot, run in pairs]
-    found: dict[Figure, None] = {}
+    by_name: dict[tuple[str, str, str, int], Figure] = {}
     warnings = []
     for k, (entry, task, robot, run) in enumerate(todo):
         progress("score", f"{entry.name}, {task.name}, {robot.name}", k / len(todo))
@@ -106,16 +106,18 @@ def score(entries: Sequence[Path], bench: Path, out: Path, tier: str, progress: 
             continue
         try:
             scored, evaluation = _judged(task, run, path)
-            found |= dict.fromkeys(_figures(entry, task, robot, path.stem, scored, evaluation))
+            for figure in _figures(entry, task, robot, path.stem, scored, evaluation):
+                by_name.setdefault((figure.entry, figure.model, figure.task, figure.robot), figure)  # nominal once
             own = tuple(f"{row.model}: " for row in evaluation.rows)
             doubts = (v.message for v in evaluation.verdicts if v.verdict == "warning" and v.message.startswith(own))
             warnings += [f"{entry.name}, {task.name}, {robot.name}: {text}" for text in doubts]
         except _rejections() as error:
             warnings.append(f"{entry.name}, {task.name}, {robot.name}: rejected: {error}")
     out.mkdir(parents=True, exist_ok=True)
+    found = tuple(by_name.values())
     content = {"benchmark": "bench-v1", "tier": tier, "figures": [_plain(f) for f in found]}
     write_whole(out / "scores.json", json.dumps(content, indent=1) + "\n")
-    write_whole(out / "scores.md", table(tuple(found), len(pairs)))
+    write_whole(out / "scores.md", table(found, len(pairs)))
     return tuple(warnings)
 
 

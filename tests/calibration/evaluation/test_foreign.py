@@ -290,7 +290,7 @@ def test_doubts_are_among_the_verdicts(poses, dataset, tmp_path):
 
 def test_good_poses_are_not_doubted(poses, dataset, tmp_path):
     good = evaluate(read_submission(write_netcdf(tmp_path / "good.nc", poses)), dataset)
-    assert {v.message.partition(" % of ")[0] for v in good.verdicts if "good" in v.message} <= {"good: 0.1"}
+    assert not [v.message for v in good.verdicts if "good" in v.message]
 
 
 def test_matrices_that_are_no_poses_are_rejected(poses, tmp_path):
