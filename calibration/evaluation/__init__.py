@@ -3,9 +3,8 @@
 from calibration.evaluation.budget import Budget
 from calibration.evaluation.comparison import compare
 from calibration.evaluation.ladder import Row, TrialErrors, ladder, trial_errors
-from calibration.evaluation.main_row import headline
 from calibration.evaluation.marker_errors import PointRow, point_rows
-from calibration.evaluation.results import Evaluation
+from calibration.evaluation.results import Evaluation, headline
 from calibration.evaluation.submission import read_submission, write_submission
 
 __all__ = [

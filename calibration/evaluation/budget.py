@@ -20,7 +20,7 @@ import numpy as np
 
 from calibration.prediction.delivered import Delivered
 from calibration.prediction.predicted_trial import PredictedTrial
-from calibration.prediction.predictor import REFERENCE
+from calibration.recording.trial import REST
 
 BASE, JOINTS, CLOCK, GEOMETRY, NOISE = "base", "joints", "clocks", "geometry", "noise"
 ARM = "joints and geometry"  # where link encoders do not separate the two
@@ -144,7 +144,7 @@ def causes(
         without,
         effects,
     )
-    return found.rows(t > t[0] + REFERENCE)
+    return found.rows(t > t[0] + REST)
 
 
 def budget(trials: Sequence[Causes]) -> Budget | None:

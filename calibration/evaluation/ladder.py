@@ -8,7 +8,7 @@ import numpy as np
 
 from calibration.evaluation.pose_errors import PoseErrors, RowMetrics, dwell_means, pose_errors, row_metrics, turned
 from calibration.prediction.predicted_trial import Prediction
-from calibration.prediction.predictor import REFERENCE
+from calibration.recording.trial import REST
 from calibration.robot.hand_uncertainty import radius_95
 
 Trials = Literal["dynamic", "static", "all"]
@@ -93,7 +93,7 @@ def trial_errors(
 
 def _after(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Samples that count of a trial that moves."""
-    return np.asarray(x[t > t[0] + REFERENCE])
+    return np.asarray(x[t > t[0] + REST])
 
 
 def _mean(x: np.ndarray) -> float:

@@ -3,19 +3,27 @@
 evaluation.json            headline, rows, rows by trial, protocols, fit quality by regime, comparisons, verdicts
 evaluation.nc              errors over time, one group a row and trial
 predictions/<trial>.nc     see `predicted_trial`
+
+The headline is the row that `Compensator` delivers with every instrument that was recorded, and beside it those of the
+other models under the same choice:
+
+    model      the main one of the estimate                        encoder    motor
+    base       the plate, else inverse dynamics, else at rest      trials     dynamic, else static
+    (measured where nothing else was scored, as of posture means)
 """
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from calibration.errors import NotEnoughData
+from calibration.estimate.rows import row_of
 from calibration.evaluation.budget import Budget
 from calibration.evaluation.comparison import Comparison, comparisons
 from calibration.evaluation.ladder import Row, TrialErrors, Trials, trial_entry
-from calibration.evaluation.main_row import Headline, headline
 from calibration.evaluation.marker_errors import PointRow
 from calibration.evaluation.protocols import protocol_rows
 from calibration.prediction.predicted_trial import PredictedTrial
@@ -24,6 +32,41 @@ from calibration.stages.joints.repetitions import RegimeQuality
 from calibration.verdict import Verdict
 
 STAGE = "evaluation"
+_TRIALS: tuple[Trials, ...] = ("dynamic", "static")
+
+
+@dataclass(frozen=True)
+class Headline:
+    """One figure of a dataset, and what it is to be compared with.
+
+    Attributes:
+        main: The row that is delivered.
+        beside: The same of every other model, in the ladder's order.
+    """
+
+    main: Row
+    beside: tuple[Row, ...]
+
+    def entry(self) -> dict[str, Any]:
+        """The fields `main` and `beside` of evaluation.json and score.json."""
+        return {"main": self.main.entry(), "beside": [row.entry() for row in self.beside]}
+
+
+def headline(rows: Sequence[Row], main: str) -> Headline | None:
+    """The headline of rows against one reference, `main` the estimate's model; None where that was not scored."""
+    for trials in _TRIALS:
+        mine = [r for r in rows if r.trials == trials and r.encoder == "motor"]
+        found = {model: _predictive(mine, model) for model in dict.fromkeys(r.model for r in mine)}
+        delivered = found.pop(main, None)
+        if delivered is not None:
+            return Headline(delivered, tuple(row for row in found.values() if row is not None))
+    return None
+
+
+def _predictive(rows: Sequence[Row], model: str) -> Row | None:
+    mine = {r.base: r for r in rows if r.model == model}
+    base = row_of(model).predictive_base(mine)
+    return next((mine[b] for b in (base, "submitted", "measured") if b in mine), None)
 
 
 @dataclass(frozen=True)

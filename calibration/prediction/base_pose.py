@@ -14,14 +14,14 @@ Where the base's markers are in a trial, predicted: its first second and a wrenc
 T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     x from the plate's wrench or from inverse dynamics along q_motor
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from calibration.errors import NotEnoughData, ShapeError
-from calibration.mocap.cluster_pose import body_poses
+from calibration.mocap.cluster_pose import body_poses, poses_of
 from calibration.numerics.lie import adjoint, from_vector, inverse, mean
 from calibration.numerics.signals import CUTOFF
 from calibration.numerics.wrench import in_frame
@@ -242,3 +242,17 @@ def base_at(body: Body | None, T_base_B: np.ndarray, markers: np.ndarray) -> np.
     if not np.isfinite(T).all(axis=(1, 2)).any():
         raise NotEnoughData("no sample shows three markers of the base")
     return np.asarray(mean(T) @ inverse(from_vector(T_base_B)))
+
+
+def measured_base(body: Body, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """T_lab_B (n, 4, 4) of the base's marker body throughout a trial, and (4, 4) at rest, by its first second alone.
+
+    Raises:
+        NotEnoughData: The body is not seen in that second.
+    """
+    rows = trial.t_mocap <= trial.t_mocap[0] + REST
+    first = replace(trial, t_mocap=trial.t_mocap[rows], marker_position=trial.marker_position[rows])
+    at_rest = poses_of(body, first).T
+    if not np.isfinite(at_rest).any():
+        raise NotEnoughData(f"{trial.id}: body {body.name!r} is not seen in the first second of the trial")
+    return poses_of(body, trial).T, mean(at_rest)

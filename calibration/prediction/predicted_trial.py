@@ -9,7 +9,7 @@ predictions/<trial>.nc     t                                       [s, mocap clo
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,7 +19,11 @@ from scipy.spatial.transform import Rotation
 from calibration.estimate.rows import Base, Encoder
 from calibration.prediction.delivered import Delivered
 from calibration.recording import netcdf
-from calibration.stages.joints.correction import Corrected
+from calibration.recording.trial import Trial
+from calibration.stages.bundle.robot import BundledRobot
+from calibration.stages.drive_trains.geometry_refit import CorrectedTrial
+from calibration.stages.joints.correction import Corrected, JointModels
+from calibration.stages.joints.samples import samples_of
 from calibration.stages.stick_slip.poses import BasePrediction, SlippingMotion
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import Rest
@@ -217,3 +221,36 @@ def _joints(file: netcdf.Group) -> Iterator[JointSamples]:
 
 def _array_or_nan(group: netcdf.Group, name: str) -> np.ndarray:
     return netcdf.array(group, name) if name in group.variables else np.full(len(group.dimensions["sample"]), np.nan)
+
+
+def joint_samples(
+    joints: JointModels | None, bundled: BundledRobot | None, trial: Trial, geared: CorrectedTrial | None
+) -> Iterator[JointSamples]:
+    """Samples of the joints that have a model and a link encoder."""
+    if joints is None:
+        return
+    trains = {} if geared is None or bundled is None else bundled.encoder_differences(geared)
+    names = joints.inputs.measured
+    of_joints = samples_of(joints.of_trial(trial.id).inputs, trial, joints.zero)
+    for model in joints.models:
+        s = of_joints[names.index(model.joint)]
+        if s is not None:
+            predicted = model.discrepancy(s.theta, s.tau, s.velocity)
+            by_train = np.full((3, len(s.t)), np.nan)
+            if geared is not None and model.joint in trains:
+                zero = joints.zero[names.index(model.joint)]
+                by_train = np.array([np.interp(s.t, geared.loads.t, x - zero) for x in trains[model.joint]])
+            yield JointSamples(model.joint, s.t, s.theta, s.velocity, s.y, predicted, *by_train)
+
+
+def base_motion(
+    T_lab_B: np.ndarray,
+    found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]],
+    slipped: tuple[tuple[Source, BasePrediction], ...],
+) -> BaseMotion | None:
+    """The base by the sources that were recorded; None where none was."""
+    there = [(source, *one) for source, one in found if one is not None]
+    if not there:
+        return None
+    rest, own = there[0][1], next((one.motion for source, one in slipped if source == "plate"), None)
+    return BaseMotion(rest.displacement(T_lab_B), tuple((source, x) for source, _, x in there), rest, own, slipped)

@@ -15,7 +15,7 @@ Of a trial nothing else is read: encoders, plate, base markers of its first seco
 `measured`), never hand or shoulder.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeVar
 
@@ -23,13 +23,13 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.estimate.rows import LADDER, NOMINAL, SOURCES, Base, Encoder, LadderRow, row_of
-from calibration.mocap.cluster_pose import poses_of, poses_of_means
+from calibration.mocap.cluster_pose import poses_of_means
 from calibration.mocap.postures import dwell_windows, readings_at
-from calibration.numerics.lie import from_vector, inverse, mean
-from calibration.prediction.base_pose import BaseInTrial
+from calibration.numerics.lie import from_vector, inverse
+from calibration.prediction.base_pose import BaseInTrial, measured_base
 from calibration.prediction.bundled_arm import BundledArm
 from calibration.prediction.delivered import Delivered
-from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction
+from calibration.prediction.predicted_trial import PredictedTrial, Prediction, base_motion, joint_samples
 from calibration.recording.clock import Clock
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Description, TrialEntry
@@ -38,13 +38,12 @@ from calibration.robot.hand import HandModel
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.drive_trains.geometry_refit import CorrectedTrial
 from calibration.stages.joints.correction import Corrected, JointModels, correct
-from calibration.stages.joints.samples import aligned_link_readings, samples_of
+from calibration.stages.joints.samples import aligned_link_readings
 from calibration.stages.stick_slip.poses import BasePrediction
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
 
-REFERENCE = 1.0  # [s] of rest at the start of every trial
 T = TypeVar("T")
 Side = Literal["motor", "corrected", "bundled", "bundled link", "link"]  # readings the geometry is evaluated at
 
@@ -77,8 +76,8 @@ class Predictor:
 
     def __call__(self, entry: TrialEntry, trial: Trial) -> PredictedTrial:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
-        T_lab_B, corrected = self._measured_base(entry, trial), self._corrected(trial)
-        still = np.broadcast_to(mean(_start(T_lab_B, trial)), T_lab_B.shape)
+        (T_lab_B, start), corrected = measured_base(self.description.base_body, trial), self._corrected(trial)
+        still = np.broadcast_to(start, T_lab_B.shape)
         poses = TrialPoses(self, entry, trial, T_lab_B, still, self._base(entry, trial, still[0]), corrected)
         rows = tuple(
             Prediction(
@@ -99,9 +98,10 @@ class Predictor:
         if poses.loaded is not None and NOMINAL in self.models:
             found = [(source, poses.displaced(source, NOMINAL)) for source, _ in poses.loaded.suspension.held_out]
             slipped = [(source, poses.slipped(source)) for source, _ in poses.loaded.suspension.held_out]
-            motion = _motion(T_lab_B, found, tuple((s, one) for s, one in slipped if one is not None))
+            motion = base_motion(T_lab_B, found, tuple((s, one) for s, one in slipped if one is not None))
         moves = entry.kind != "static"
-        samples, delivered = (tuple(self._samples(trial, poses.geared())), poses.delivered()) if moves else ((), None)
+        samples = tuple(joint_samples(self.joints, self.bundled, trial, poses.geared())) if moves else ()
+        delivered = poses.delivered() if moves else None
         dwells = dwell_windows(trial)
         return PredictedTrial(
             entry.id, entry.kind, trial.t_mocap, rows, motion, samples, T_lab_B, dwells, corrected, delivered
@@ -164,31 +164,6 @@ class Predictor:
         if self.joints is None or not len(trial.t_robot):
             return None
         return correct(self.joints.of_trial(trial.id), trial.t_robot, trial.q_motor)
-
-    def _samples(self, trial: Trial, geared: CorrectedTrial | None) -> Iterator[JointSamples]:
-        """Samples of the joints that have a model and a link encoder."""
-        if self.joints is None:
-            return
-        trains = {} if geared is None or self.bundled is None else self.bundled.encoder_differences(geared)
-        names = self.joints.inputs.measured
-        of_joints = samples_of(self.joints.of_trial(trial.id).inputs, trial, self.joints.zero)
-        for model in self.joints.models:
-            s = of_joints[names.index(model.joint)]
-            if s is not None:
-                predicted = model.discrepancy(s.theta, s.tau, s.velocity)
-                by_train = np.full((3, len(s.t)), np.nan)
-                if geared is not None and model.joint in trains:
-                    zero = self.joints.zero[names.index(model.joint)]
-                    by_train = np.array([np.interp(s.t, geared.loads.t, x - zero) for x in trains[model.joint]])
-                yield JointSamples(model.joint, s.t, s.theta, s.velocity, s.y, predicted, *by_train)
-
-    def _measured_base(self, entry: TrialEntry, trial: Trial) -> np.ndarray:
-        """T_lab_B (n, 4, 4), seen where the trial starts."""
-        T_lab_B = poses_of(self.description.base_body, trial).T
-        if not np.isfinite(_start(T_lab_B, trial)).any():
-            body = self.description.base_body.name
-            raise NotEnoughData(f"{entry.id}: body {body!r} is not seen in the first second of the trial")
-        return T_lab_B
 
     def _base(self, entry: TrialEntry, trial: Trial, T_lab_B: np.ndarray) -> BaseInTrial | None:
         """The base on its suspension, its marker body at rest at T_lab_B (4, 4)."""
@@ -323,20 +298,3 @@ class TrialPoses:
         if key not in self._known:
             self._known[key] = compute()
         return self._known[key]
-
-
-def _motion(
-    T_lab_B: np.ndarray,
-    found: Iterable[tuple[Source, tuple[Rest, np.ndarray] | None]],
-    slipped: tuple[tuple[Source, BasePrediction], ...],
-) -> BaseMotion | None:
-    """The base by the sources that were recorded; None where none was."""
-    there = [(source, *one) for source, one in found if one is not None]
-    if not there:
-        return None
-    rest, own = there[0][1], next((one.motion for source, one in slipped if source == "plate"), None)
-    return BaseMotion(rest.displacement(T_lab_B), tuple((source, x) for source, _, x in there), rest, own, slipped)
-
-
-def _start(T_lab_B: np.ndarray, trial: Trial) -> np.ndarray:
-    return T_lab_B[trial.t_mocap <= trial.t_mocap[0] + REFERENCE]

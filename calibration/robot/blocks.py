@@ -33,6 +33,8 @@ _TORQUE = 0.5  # [N.m, N] a joint that gravity loads less has no own range of to
 class Frames(ParameterBlock):
     """T_base_B and T_tool_H: where the two marker bodies are."""
 
+    varies: ClassVar[bool] = False
+
     @classmethod
     def nominal(cls, chain: Chain, frames: np.ndarray) -> Self:
         """At the nominal frames (12,)."""
@@ -75,6 +77,8 @@ class Frames(ParameterBlock):
 
 class Placements(ParameterBlock):
     """Twist xi of each joint placement, on the right: M <- M exp6(xi)."""
+
+    varies: ClassVar[bool] = False
 
     @classmethod
     def nominal(cls, chain: Chain, frames: np.ndarray) -> Self:
@@ -120,6 +124,7 @@ class EncoderZeros(ReadingError):
     """Zero of each motor-side reading."""
 
     pattern: ClassVar[str] = "encoder.{}.motor.offset"
+    varies: ClassVar[bool] = False
 
     def tolerance(self, known: Known) -> np.ndarray:
         """Of the encoders."""

@@ -179,8 +179,8 @@ class HandModel:
 
     @cached_property
     def _constant(self) -> np.ndarray | None:
-        """Reading minus angle (n_measured,) where it depends on no torque."""
-        if any(block.loaded and block.values.any() for block in self.blocks):
+        """Reading minus angle (n_measured,) where it depends on neither angle nor torque."""
+        if any(block.varies and block.values.any() for block in self.blocks):
             return None
         constant = np.zeros(len(self.nominal.measured))
         constant[self._columns] = self._reading_error(*np.zeros((2, 1, len(self._columns))))[0]

@@ -70,6 +70,7 @@ class ParameterBlock:
     values: np.ndarray
 
     loaded: ClassVar[bool] = False  # whether the effect depends on gravity torques
+    varies: ClassVar[bool] = True  # whether the reading error, where there is one, depends on angle or torque
     averaged: ClassVar[bool] = False  # whether the fit is averaged over which of them are zero
 
     @classmethod

@@ -212,7 +212,7 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     np.testing.assert_allclose(clocks.T, found.T, atol=5e-5)  # the robot's second is 12 ppm off, so are velocities
 
 
-def test_without_a_plate_it_is_the_row_with_the_base_from_dynamics(result, swing):
+def test_without_a_plate_it_is_the_row_with_the_base_from_dynamics(result, compensator, swing):
     estimate, dataset = load_estimate(result.folder / "estimate"), calibration.load(result.folder / "dataset")
     t, q, _, start, *_ = swing
     entry = dataset.entries("validation", "swing")[0]
@@ -229,8 +229,9 @@ def test_without_a_plate_it_is_the_row_with_the_base_from_dynamics(result, swing
     rows = replace(whole, bundled=replace(whole.bundled, stick_slip=slips), **bare)(entry, same).rows
     expected = next(p for p in rows if (p.model, p.base, p.encoder) == ("full", "dynamics", "motor"))
     laboratory = estimate.laboratory.model_copy(update={"plates": ()})
-    alone = replace(estimate, bundle=replace(estimate.bundle, stick_slip=slips), laboratory=laboratory)
-    found, still = (Compensator.of(alone).predict(t[:n], q[:n], None, start) for n in (len(t), 50))
+    alone = Compensator.of(replace(estimate, bundle=replace(estimate.bundle, stick_slip=slips), laboratory=laboratory))
+    start = start @ from_vector(compensator.hand.base) @ inverse(from_vector(alone.hand.base))
+    found, still = (alone.predict(t[:n], q[:n], None, start) for n in (len(t), 50))
     np.testing.assert_allclose(found.T, expected.T_lab_hand, atol=1e-9)
     assert np.abs(found.T[:50] - still.T)[:, :3, 3].max() < 1e-3 < np.ptp(found.T[:, :3, 3])
 

@@ -52,8 +52,11 @@ def test_predictions_never_use_hand_markers_and_the_base_s_only_at_the_start_unl
     whole = {(p.model, p.base, p.trial_id): p for p in predictions(estimate, load(folder))}
     for p in predictions(estimate, changed):
         before = whole[p.model, p.base, p.trial_id].T_lab_hand
-        rows = slice(None) if p.base == "fixed" else p.t <= p.t[0] + 1.0
-        np.testing.assert_array_equal(p.T_lab_hand[rows], before[rows])
+        if p.base == "fixed":
+            np.testing.assert_array_equal(p.T_lab_hand, before)
+        else:  # a body some of whose markers are hidden gets its shape from the samples that show all of them
+            rows = p.t <= p.t[0] + 1.0
+            np.testing.assert_allclose(p.T_lab_hand[rows], before[rows], atol=1e-4)
 
 
 def test_rows_of_a_ladder_are_complete_and_named_as_in_the_contract(evaluation, estimate, tmp_path):

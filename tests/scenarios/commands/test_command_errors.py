@@ -156,9 +156,7 @@ def test_broken_data_end_with_2_and_leave_nothing(tmp_path, monkeypatch, tiago_t
     assert words in err
 
 
-@pytest.mark.parametrize(
-    "command", [["list"], ["simulate", "short", "--out", "x"], ["calibrate", "nowhere", "--out", "x"]]
-)
+@pytest.mark.parametrize("command", [["simulate", "short", "--out", "x"], ["calibrate", "nowhere", "--out", "x"]])
 def test_an_engine_that_cannot_be_imported_is_told_in_a_line(tmp_path, command):
     code = f"from scenarios.commands.main import main; main({command})"
     surroundings = {**os.environ, "MUJOCO_GL": "bogus", "PYTHONPATH": str(Path(__file__).parents[3])}
