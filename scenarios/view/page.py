@@ -7,6 +7,7 @@ import io
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -101,11 +102,8 @@ def _ghosts(server: viser.ViserServer, found: Moments, shapes: dict[str, trimesh
     if not found.hand_links:
         return []
     hand = joined(shapes, found.hand_links)
-    options = {"vertices": hand.vertices, "faces": hand.faces, "opacity": 0.55}
-    return [
-        _node(server.scene.add_mesh_simple(f"/predicted/{model}", color=_colour(model), **options), T)
-        for model, T in found.ghosts.items()
-    ]
+    add = partial(server.scene.add_mesh_simple, vertices=hand.vertices, faces=hand.faces, opacity=0.55)
+    return [_node(add(f"/predicted/{model}", color=_colour(model)), T) for model, T in found.ghosts.items()]
 
 
 def _node(handle: viser.SceneNodeHandle, T: np.ndarray) -> Node:
@@ -142,8 +140,8 @@ def _arrow(
     server: viser.ViserServer, name: str, foot: np.ndarray, head: np.ndarray, colour: tuple[int, int, int]
 ) -> Node:
     """An arrow from foot (n, 3) to head (n, 3): one along z, 1 m long, turned and scaled."""
-    size = {"shaft_radius": 0.02, "head_radius": 0.05, "head_length": 0.12}
-    handle = server.scene.add_arrows(name, np.array([[[0, 0, 0], [0, 0, 1]]], np.float32), colour, **size)
+    add = partial(server.scene.add_arrows, shaft_radius=0.02, head_radius=0.05, head_length=0.12)
+    handle = add(name, np.array([[[0, 0, 0], [0, 0, 1]]], np.float32), colour)
     along = head - foot
     length = np.maximum(np.linalg.norm(along, axis=1), 1e-4)
     z = along / length[:, None]

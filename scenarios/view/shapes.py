@@ -1,5 +1,6 @@
 """Shapes of a URDF's links as meshes: boxes, cylinders, capsules and spheres; mesh files are left out."""
 
+from typing import cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,12 +13,12 @@ _STILL = 1e-9  # [m, -] of relative motion
 
 def meshes(urdf: str) -> dict[str, trimesh.Trimesh]:
     """A mesh in the link's frame for each link with a primitive, what is drawn before what collides."""
-    found = {}
+    found: dict[str, trimesh.Trimesh] = {}
     for link in ElementTree.fromstring(urdf).iter("link"):
         for kind in _KINDS:
             parts = [part for item in link.iter(kind) if (part := _part(item)) is not None]
             if parts:
-                found[str(link.get("name"))] = trimesh.util.concatenate(parts)
+                found[str(link.get("name"))] = _one(parts)
                 break
     return found
 
@@ -37,7 +38,11 @@ def rigid_groups(T: dict[str, np.ndarray]) -> list[list[str]]:
 
 def joined(shapes: dict[str, trimesh.Trimesh], T: dict[str, np.ndarray]) -> trimesh.Trimesh:
     """The meshes of links at their poses (4, 4) as one."""
-    return trimesh.util.concatenate([shapes[link].copy().apply_transform(pose) for link, pose in T.items()])
+    return _one([shapes[link].copy().apply_transform(pose) for link, pose in T.items()])
+
+
+def _one(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
 
 
 def _part(item: ElementTree.Element) -> trimesh.Trimesh | None:
