@@ -134,14 +134,19 @@ def _pulled(model: Model, names: Sequence[str], off: np.ndarray, tolerance: np.n
 
 
 def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Verdict]:
-    """Joints whose motor reading is where the link is: r = x J_j (motor - link), x = 1 as the sides are meant to be."""
+    """Joints whose motor reading is where the link is: r = x J_j (motor - link), x = 1 as the sides are meant to be.
+
+    A joint is judged where the gear's lag is larger than other errors: without it an eccentric link encoder, which
+    moves no hand, would look exchanged.
+    """
     joints, columns = left.hand.nominal.joints, left.hand.nominal.columns
     d = (left.x.q - left.x.link)[:, columns]
     known = np.flatnonzero(np.isfinite(d).all(axis=0))
     if not len(known):
         return
     d = d[:, known] - np.median(d[:, known], axis=0)
-    loose = d.std(axis=0) > [_play(left, description, int(k))[0] for k in known]  # of less, other errors are as large
+    lag = [float(_without_waves(d[:, k], left.x.q[:, columns[j]]).std()) for k, j in enumerate(known)]
+    loose = np.array([lag[k] > _play(left, description, int(j))[0] for k, j in enumerate(known)])
     value, S, _ = left.fitted(left.J[:, :, known] * d[:, None])
     sigma = np.sqrt(np.diag(S))
     wrong = loose & (value < _HALF) & (1.0 - value > _SURE * sigma) & (sigma < _TOLD)
@@ -154,6 +159,12 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
         unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~loose | (sigma >= _TOLD)))
         message += f"; sides of {unclear} differ too little to be judged, check them too" if unclear else ""
         yield Verdict(STAGE, "refused", f"{message}; exchange the columns")
+
+
+def _without_waves(d: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """A difference d (n,) without what an eccentric encoder adds, which depends on the angle q (n,) alone."""
+    X = np.stack([np.ones_like(q), np.cos(q), np.sin(q), np.cos(2.0 * q), np.sin(2.0 * q)], axis=1)
+    return np.asarray(d - X @ np.linalg.lstsq(X, d, rcond=1e-6)[0])
 
 
 def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -> Iterator[Change]:
