@@ -71,9 +71,14 @@ class Direction:
         return self.by_plate and not np.any(self.linear)
 
     @property
+    def moved(self) -> np.ndarray:
+        """(3,) axes predicted better than at rest, by trials left out; such as slipped too far decide nothing."""
+        return self.held_out.only(~self.held_out.wild).moves
+
+    @property
     def slips(self) -> np.ndarray:
         """(3,) axes that the stick-slip model moves."""
-        return np.asarray(self.held_out.moves) & ~np.asarray(self.linear, dtype=bool)
+        return self.moved & ~np.asarray(self.linear, dtype=bool)
 
     @property
     def parameters(self) -> SlipParameters:

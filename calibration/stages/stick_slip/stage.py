@@ -40,8 +40,8 @@ SOURCES: tuple[Source, ...] = ("plate", "dynamics")
 _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _BETTER = 0.8  # mean square over that of the slipping base, below which the compliance takes an axis
+_HALF = 0.5  # mean square over that with the plate's correction, below which the correction harms
 _WORTH, _LESS = 0.8, 0.1  # R2 of yaw; by which that of the plate may be less
-_WILD = 25.0  # mean square over the median of the trials
 _ELSEWHERE = 0.009  # [m] a wheel may seem off its place
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
 _log = logging.getLogger(__name__)
@@ -74,7 +74,7 @@ def fit_stick_slip(
     fits: list[Direction] = []
     for source, _, campaign in usable:
         fits.append(fit_direction(source, campaign, fits[0].logarithms if fits else None))
-    calm = joined(wheels, [row for row, wild in zip(usable[0][1], _wild(fits[0]), strict=True) if not wild])
+    calm = joined(wheels, [row for row, wild in zip(usable[0][1], fits[0].held_out.wild, strict=True) if not wild])
     shift, gain = displaced(calm, fits[0].logarithms)
     if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
@@ -112,15 +112,20 @@ def _rows(
 
 
 def _linear(direction: Direction, suspension: Suspension) -> Direction:
-    """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off."""
+    """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off.
+
+    Trials that slipped too far to be predicted decide nothing: what one of them shows is chance.
+    """
     held_out = dict(suspension.held_out)
     tried = held_out.get(direction.source, suspension.held_out[0][1])
     variance = tried.variance(np.ones(6, dtype=bool))
     plane, heave = variance[list(PLANE)], variance[list(HEAVE)]
     if direction.source not in held_out:
         return replace(direction, heave_variance=heave)
-    own = direction.held_out.variance(np.asarray(direction.held_out.moves))
-    linear = tried.moves[list(PLANE)] & (plane < _BETTER * own)
+    calm = direction.held_out.only(~direction.held_out.wild)
+    if len(tried.count) == len(direction.held_out.count):
+        plane = tried.only(~direction.held_out.wild).variance(np.ones(6, dtype=bool))[list(PLANE)]
+    linear = tried.moves[list(PLANE)] & (plane < _BETTER * calm.variance(direction.moved))
     return replace(direction, linear=linear, heave_variance=heave)
 
 
@@ -133,12 +138,6 @@ def _plain(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarFo
             square.append((left[motion.valid] ** 2).mean(axis=0))
             reach.append(blocks(reached(forcing.force @ compliance))[motion.valid].mean(axis=0))
     return plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
-
-
-def _wild(direction: Direction) -> np.ndarray:
-    """(k,) trials whose errors, when they were left out, are far beyond those of most: they slipped too far to tell."""
-    square = direction.held_out.error / np.maximum(direction.held_out.count, 1.0)[:, None]
-    return np.asarray((square > _WILD * np.median(square, axis=0)).any(axis=1))
 
 
 def _misplaced(names: Sequence[str], shift: np.ndarray, gain: np.ndarray) -> Iterator[Verdict]:
@@ -176,8 +175,9 @@ def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
     not the position.
     """
     tried = fit_direction("plate", replace(campaign, corrected=False), fits[1].logarithms)
-    left = [np.log(d.held_out.variance(np.ones(3, dtype=bool))).sum() for d in (fits[0], tried)]
-    return tried if left[1] < left[0] else fits[0]
+    calm = ~(fits[0].held_out.wild | tried.held_out.wild)
+    left = [np.log(d.held_out.only(calm).variance(np.ones(3, dtype=bool))).mean() for d in (fits[0], tried)]
+    return tried if left[1] < left[0] + np.log(_HALF) else fits[0]
 
 
 def _moved(direction: Direction, names: Sequence[str]) -> Iterator[Verdict]:
@@ -204,7 +204,7 @@ def _judged(direction: Direction) -> Verdict:
         message += f"; linear, as the 6x6 compliance has them: {', '.join(linear)}"
     if direction.source == "plate" and not direction.corrected:
         message += "; the plate's force does not correct it: wheels yield otherwise than by friction"
-    still = [a for a, moves in zip(_AXES, direction.held_out.moves | direction.linear, strict=True) if not moves]
+    still = [a for a, moves in zip(_AXES, direction.moved | direction.linear, strict=True) if not moves]
     if still:
         message += f"; not moved: {', '.join(still)}"
     if r2[2] < _WORTH and not direction.linear[2]:

@@ -21,6 +21,7 @@ _NOISE = 1.25  # how much more than expected the noise may be, known from one se
 _SLIP = 0.1  # share of the motion [-]
 _UNKNOWN = 0.05  # of what is left, noise included [-]
 _VISIBLE = 1.5  # motion over noise, mean squares, below which its share cannot be determined [-]
+_WILD = 25.0  # mean square over the median of the trials
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,16 @@ class HeldOut:
         """
         left = np.where(moves, np.minimum(self.error, np.finfo(float).max), self.motion).sum(axis=0)
         return np.maximum(left - self.noise.sum(axis=0), _UNKNOWN * left) / max(float(self.count.sum()), 1.0)
+
+    @property
+    def wild(self) -> np.ndarray:
+        """(n_trials,) trials with an error on an axis far beyond that of most: they slipped too far to be predicted."""
+        square = self.error / np.maximum(self.count, 1.0)[:, None]
+        return np.asarray((square > _WILD * np.median(square, axis=0)).any(axis=1))
+
+    def only(self, trials: np.ndarray) -> "HeldOut":
+        """Of some trials (n_trials,) bool."""
+        return HeldOut(self.error[trials], self.motion[trials], self.noise[trials], self.count[trials])
 
     @property
     def still(self) -> np.ndarray:
