@@ -37,6 +37,7 @@ _QUIET = {
 }
 _LOOPBACK = "127.0.0.1"  # whoever reaches a scheduler may run code there
 _PATIENCE = "20s"  # for a scheduler to answer
+_LOOK, _GONE = 10.0, 6  # [s] between looks for a worker while nothing ends; looks without one
 
 
 Task = Callable[[Order], Row]
@@ -65,10 +66,11 @@ class NoRoom(OSError):
 
 @dataclass(frozen=True)
 class _Pool:
-    """What runs tasks, and how many at once."""
+    """What runs tasks, how many at once, and whether anybody is there to run them."""
 
     executor: Executor
     width: int
+    manned: Callable[[], bool] = lambda: True
 
 
 @dataclass(frozen=True)
@@ -97,8 +99,12 @@ def compute(orders: Iterable[Order], workers: Workers, task: Task = perform) -> 
         return
     with _pool(workers) as pool:
         pending = {pool.executor.submit(_timed, task, first): first}
+        without = 0
         while pending:
-            done, _ = wait(pending, return_when=FIRST_COMPLETED)
+            done, _ = wait(pending, timeout=_LOOK, return_when=FIRST_COMPLETED)
+            without = 0 if done or pool.manned() else without + 1
+            if without == _GONE:
+                raise SchedulerLost(f"no worker has been there for {_LOOK * _GONE:.0f} s; start one and {_AGAIN}")
             for future in done:
                 yield _ended(pending.pop(future), future)
             more = islice(todo, pool.width - len(pending))
@@ -145,7 +151,9 @@ def _pool(workers: Workers) -> Iterator[_Pool]:
         width = workers.number or len(client.scheduler_info(n_workers=-1)["workers"])
         if width == 0:
             raise SchedulerLost(f"{workers.scheduler}: has no worker; start one with: dask worker {workers.scheduler}")
-        yield _Pool(client.get_executor(pure=False), width)
+        yield _Pool(
+            client.get_executor(pure=False), width, lambda: bool(client.scheduler_info(n_workers=-1)["workers"])
+        )
 
 
 @contextmanager

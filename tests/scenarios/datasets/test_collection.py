@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +17,7 @@ import numpy as np
 import pytest
 
 from scenarios import load
-from scenarios.datasets import open_collection
+from scenarios.datasets import open_collection, workers
 from scenarios.datasets.collection import Plan, collect
 from scenarios.datasets.index import read_index
 from scenarios.datasets.run_content import recordings, recordings_and_truth
@@ -144,6 +146,17 @@ def test_a_run_without_a_result_is_a_row_with_its_reason(tmp_path):
     assert [row.status for row in rows] == ["ok", "failed", "ok"]
     assert rows[1].reason == "trial xyz at 3.2 s: arm_4_joint diverged"
     assert sorted(p.name for p in (tmp_path / "c/runs").iterdir()) == ["000000", "000002"]
+
+
+def test_without_a_worker_it_stops_and_says_so(tmp_path, monkeypatch):
+    class Never:
+        def submit(self, *task):
+            return Future()
+
+    monkeypatch.setattr(workers, "_pool", lambda _: nullcontext(workers._Pool(Never(), 1, lambda: False)))
+    monkeypatch.setattr(workers, "_LOOK", 0.01)
+    with pytest.raises(workers.SchedulerLost, match="no worker has been there for 0 s; start one"):
+        next(workers.compute([object()], Workers()))
 
 
 def test_workers_write_the_same_bytes(tmp_path, undisturbed):

@@ -94,6 +94,17 @@ def test_axes_that_the_compliance_predicts_better_are_linear(recorded, suspensio
     assert model.directions[0].linear.all() and "linear" in said[0].message
 
 
+def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
+    """One wild trial of eight would make a good prediction look worse than a base at rest."""
+    (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    sums = np.ones((8, 3))
+    error = 1e-8 * sums
+    calm = HeldOut(error, 1e-6 * sums, 1e-10 * sums, np.full(8, 100.0))
+    wild = replace(calm, error=np.concatenate([error[:7], 1e-4 * sums[:1]]))
+    assert not wild.moves.any() and wild.wild.tolist() == [False] * 7 + [True]
+    assert replace(direction, held_out=calm).moved.all() and replace(direction, held_out=wild).moved.all()
+
+
 def test_what_is_missing_is_named(recorded, suspension):
     trials = [r[0] for r in recorded[:2]]
     model, said = fit(trials, suspension, description=DESCRIPTION.model_copy(update={"wheels": ()}))
