@@ -13,7 +13,7 @@ from scenarios import load, run
 SAMPLED = ("twin.widths.spread=0.5",)
 """Every gap, friction, stiffness, offset and wheel sampled, not the default robot's."""
 SEEDS, MORE = range(1000, 1010), range(2000, 2020)
-"""Robots that no method was developed on; those of MORE are looked at where they were run."""
+"""Robots that no method was developed on."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ def _row(score: dict, key: Key) -> dict:
 
 
 def kept_series(name: str, make: Callable[[str], Path], overrides: tuple[str, ...], scenario: str) -> Series:
-    """The series in the folder `name` of the environment variable CLAIM_RUNS, where it is read, not repeated.
+    """The runs of SEEDS and MORE in the folder `name` of that which the environment variable CLAIM_RUNS names.
 
-    Without that variable SEEDS are run in a folder that `make` makes.
+    Where there are none, SEEDS are run, in a folder that `make` makes where the variable is not set.
     """
     kept = os.environ.get("CLAIM_RUNS")
     folder = Path(kept) / name if kept else make(name)
-    more = (seed for seed in MORE if (folder / f"{scenario}_{seed}" / "score.json").is_file())
-    return series(folder, (*SEEDS, *more), overrides, scenario)
+    there = [seed for seed in (*SEEDS, *MORE) if (folder / f"{scenario}_{seed}" / "score.json").is_file()]
+    return series(folder, there or SEEDS, overrides, scenario)
 
 
 def series(
