@@ -19,7 +19,7 @@ BANDS = {
     Key("full", "dynamics"): ((0.65, 1.0), (0.18, 0.36)),
     Key("full", "measured"): ((0.42, 0.7), (0.13, 0.26)),
     Key("full", "plate", trials="static"): ((0.8, 1.6), (0.2, 0.4)),
-    Key("full", "measured", "link"): ((0.32, 0.64), (0.08, 0.16)),
+    Key("full", "measured", "link"): ((0.26, 0.52), (0.08, 0.16)),
     Key("floor", "measured", "link"): ((0.25, 0.3), (0.05, 0.06)),
 }
 SPREAD = 1.3  # by which errors of `full` may be larger on sampled arms

@@ -22,7 +22,7 @@ CALIBRATION = ("postures", "sweep1", "sweep2", "sweep4", "swing")
 
 
 def saved(folder: Path, out: Path) -> dict[str, bytes]:
-    save_estimate(calibrate(load(folder), [stage for stage in STAGES if stage != "bundle"]), out)
+    save_estimate(calibrate(load(folder), [s for s in STAGES if s not in ("base_frame", "arm_tool", "bundle")]), out)
     return {p.name: p.read_bytes() for p in sorted(out.iterdir())}
 
 
