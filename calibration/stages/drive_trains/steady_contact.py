@@ -185,8 +185,9 @@ def _step(A: np.ndarray, r: np.ndarray, group: np.ndarray, problem: Problem) -> 
         after, weight, total = (np.cumsum(x[::-1], axis=0)[::-1] for x in (B, w, w * r))
         by_x = C @ (B.T @ r)
         information = weight - np.einsum("ij,jk,ik->i", after, C, after)
-        d = (total - after @ by_x) / information
-        k = _EACH + int(np.argmax((d**2 * information)[_EACH : n - _EACH]))
+        known = information > 0.0  # none where the derivatives explain all that follows
+        d = np.divide(total - after @ by_x, information, out=np.zeros(n), where=known)
+        k = _EACH + int(np.argmax(np.where(known, d**2 * information, 0.0)[_EACH : n - _EACH]))
         x = by_x - C @ after[k] * d[k]
         left = r - A @ x - d[k] * (np.arange(n) >= k)
-    return k, float(d[k]), float(information[k] ** -0.5), x
+    return k, float(d[k]), float(max(information[k], np.finfo(float).tiny) ** -0.5), x
