@@ -78,8 +78,8 @@ def prose() -> Iterator[tuple[Path, str, str]]:
     run = json.loads(RUNS.read_text(encoding="utf-8"))[DEFAULT]
     claims = json.loads(CLAIMS.read_text(encoding="utf-8"))
     rows, inside = run["rows"], f"{run['covered']} of {run['judged']}"
-    shares = [x for name, of in claims.items() if name.startswith("coverage/") for x in of["figures"]]
-    range_ = f"{100 * min(shares):.0f} to {100 * max(shares):.0f} %"
+    covered = [x for name, of in claims.items() if name.startswith("coverage/") for x in of["figures"]]
+    range_ = f"{100 * min(covered):.0f} to {100 * max(covered):.0f} %"
     bars = ", ".join(f"{name} {mm}" for name, mm in rows).replace(",", " mm,", 1)
     readme, limits = DOCS.parent / "README.md", DOCS / "limits.md"
     yield readme, r"unseen motion: nominal [^\]]*", f"unseen motion: {bars}"
@@ -90,6 +90,9 @@ def prose() -> Iterator[tuple[Path, str, str]]:
     yield limits, r"floor of the instruments [\d.]+ mm", f"floor of the instruments {run['floor']} mm"
     yield limits, r"\d+ of \d+ contain the truth in the default run", f"{inside} contain the truth in the default run"
     yield limits, r"\d+ to \d+ % on twenty", f"{range_} on twenty"
+    swing, static = (claims[f"slip/fixed/share in the 95 % band, {kind}"]["figures"] for kind in ("swing", "static"))
+    shares = " and ".join(f"{100 * sum(x) / len(x):.0f} %" for x in (swing, static))
+    yield limits, r"\d+ % and \d+ % inside", f"{shares} inside"
 
 
 def main(runs: list[Path]) -> int:

@@ -21,7 +21,7 @@ class Campaign:
         listed: dataset.json.
         urdf: nominal.urdf.
         trials: By id.
-        bodies: Marker bodies by name, as drawn in the good campaign.
+        bodies: Marker bodies by name, nominal ones of the good campaign.
         late: Epoch of the robot's clock on the motion capture's [s].
     """
 

@@ -51,36 +51,43 @@ def study(  # noqa: PLR0913  an option each
 ) -> None:
     """Calibrate many robots: coverage, power, corrections of the joints head to head; or compare studies, paired."""
     from scenarios import steps
-    from scenarios.commands import console
     from scenarios.datasets import workers as engine
+
+    if kind == "compare":
+        _compare([Path(name) for name in names], out)
+        return
+    if (workers and scheduler) or (kind != "joints" and len(names) != 1):
+        raise ScenarioError(f"study {kind}: one scenario, and one of --workers and --scheduler")
+    who, changes = engine.Workers(workers, scheduler), overriding(overrides, seed)
+    if kind == "joints":
+        _joints({name: steps.load(name, changes) for name in names}, n or 50, out, who, changes)
+    elif effect is not None:
+        _power_of_effect(kind, steps.load(names[0], changes), effect, n or 20, out)
+    else:
+        path, values = _varied(kind, vary)
+        scenarios = {
+            value: steps.load(names[0], [*changes, *([f"{path}={value}"] if path else [])]) for value in values
+        }
+        _levels(kind, path, scenarios, n or 20, out, who, matched)
+
+
+def _levels(  # noqa: PLR0913  a study by its options
+    kind: str, path: str, scenarios: "Mapping[str, Scenario]", n: int, out: Path, workers: "Pool", matched: bool
+) -> None:
+    """Robots of each value of what is varied, judged."""
+    from scenarios.commands import console
     from scenarios.datasets.collection import Plan, collect
     from scenarios.studies import statistics as study
     from scenarios.studies.full_run import judged
     from scenarios.studies.matched_run import matched as without_physics
 
-    if kind == "compare":
-        _compare([Path(name) for name in names], out)
-        return
-    who = engine.Workers(workers, scheduler)
-    if kind == "joints" and not (workers and scheduler):
-        changes = overriding(overrides, seed)
-        _joints({name: steps.load(name, changes) for name in names}, n or 50, out, who, changes)
-        return
-    if len(names) != 1 or (workers and scheduler):
-        raise ScenarioError(f"study {kind}: one scenario, and one of --workers and --scheduler")
-    if effect is not None:
-        _power_of_effect(kind, steps.load(names[0], overriding(overrides, seed)), effect, n or 20, out)
-        return
-    path, values = _varied(kind, vary)
     produce = without_physics if matched else judged
     levels, found = [], []
     with console.progress() as progress:
-        for k, value in enumerate(values):
-            changed = [f"{path}={value}"] if path else []
-            loaded = steps.load(names[0], [*overriding(overrides, seed), *changed])
+        for k, (value, scenario) in enumerate(scenarios.items()):
             folder, at = (out / f"level_{k}", f"{path}={value} ") if path else (out, "")
             rows = collect(
-                Plan(loaded, n or 20, folder, produce), who, partial(_tell, progress, at), announce=console.note
+                Plan(scenario, n, folder, produce), workers, partial(_tell, progress, at), announce=console.note
             )
             levels.append(study.level(value, rows))
             found = list(study.parameters(folder, rows))
