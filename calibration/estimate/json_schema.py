@@ -1,23 +1,12 @@
 """estimate.json: its fields, and the way between it and an `Estimate`."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from calibration.estimate.estimate import Estimate, RobotNames
-from calibration.estimate.json_stage_models import (
-    JointEntry,
-    RegimeEntry,
-    SuspensionEntry,
-    joint_entry,
-    joint_model,
-    regime_entry,
-    regime_quality,
-    suspension_entry,
-    suspension_of,
-)
 from calibration.estimate.plain_values import plain, restored
 from calibration.inference.absorption import Absorption
 from calibration.inference.parameters import Combination, Model, Parameter, Status
@@ -25,9 +14,14 @@ from calibration.options import Options
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description, Name, refuse_repeated
 from calibration.stages.bundle.robot import BundleParts
+from calibration.stages.joints.model import JointModel
+from calibration.stages.joints.repetitions import RegimeQuality
+from calibration.stages.suspension.model import Suspension
 from calibration.verdict import Verdict
 
 _Value = Annotated[float, Field(ge=-1e30, le=1e30)]
+_Part = dict[str, Any]
+T = TypeVar("T")
 
 
 class Entry(BaseModel):
@@ -72,7 +66,7 @@ class ModelEntry(Entry):
     rank: int = 0
     condition: float = 0.0
     hand_error: tuple[float, ...] = ()
-    absorption: dict[str, Any] | None = None
+    absorption: _Part | None = None
 
     @field_validator("parameters")
     @classmethod
@@ -89,51 +83,25 @@ class VerdictEntry(Entry):
     message: str
 
 
-class ClockEntry(Entry):
-    """t_mocap = t (1 + drift) + offset; see `clock.Clock`."""
-
-    instrument: str
-    offset: float
-    drift: float
-    covariance: tuple[tuple[float, float], tuple[float, float]]
-    epoch: float
-    sigma: float
-
-
-class RobotEntry(Entry):
-    """Measured joints and the two frames."""
-
-    joints: tuple[str, ...]
-    base_frame: str
-    tool_frame: str
-
-
 class EstimateFile(Entry):
-    """The whole of estimate.json."""
+    """The whole of estimate.json; what is a `_Part` is a dataclass in its plain form, see `plain_values`."""
 
     schema_version: Annotated[Literal[1], Field(alias="schema")] = 1
     status: Literal["calibrated", "not_calibrated"] = "calibrated"
     verdicts: tuple[VerdictEntry, ...] = ()
     models: dict[Name, ModelEntry]
     main: str = ""
-    clocks: tuple[ClockEntry, ...] = ()
-    robot: RobotEntry | None = None
-    suspension: SuspensionEntry | None = None
-    joint_models: tuple[JointEntry, ...] = ()
+    clocks: tuple[_Part, ...] = ()
+    robot: _Part | None = None
+    suspension: _Part | None = None
+    joint_models: tuple[_Part, ...] = ()
     link_zero: tuple[float | None, ...] = ()
-    regimes: tuple[RegimeEntry, ...] = ()
+    regimes: tuple[_Part, ...] = ()
     options: Options = Field(default_factory=Options)
     laboratory: Description | None = None
-    bundle: dict[str, Any] | None = None
+    bundle: _Part | None = None
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore", validate_by_name=True)
-
-    @model_validator(mode="after")
-    def _is_of_one_robot(self) -> "EstimateFile":
-        n = len(self.link_zero)
-        if self.robot is not None and n not in (0, len(self.robot.joints)):
-            raise ValueError(f"link_zero has {n} values for {len(self.robot.joints)} joints")
-        return self
 
 
 def to_file(estimate: Estimate) -> EstimateFile:
@@ -143,26 +111,12 @@ def to_file(estimate: Estimate) -> EstimateFile:
         verdicts=tuple(VerdictEntry(stage=v.stage, verdict=v.verdict, message=v.message) for v in estimate.verdicts),
         models={model.name: _model_entry(model) for model in estimate.models},
         main=estimate.main,
-        clocks=tuple(
-            ClockEntry(
-                instrument=c.instrument,
-                offset=c.offset,
-                drift=c.drift,
-                covariance=((c.covariance[0, 0], c.covariance[0, 1]), (c.covariance[1, 0], c.covariance[1, 1])),
-                epoch=c.epoch,
-                sigma=c.sigma,
-            )
-            for c in estimate.clocks
-        ),
-        robot=None
-        if estimate.robot is None
-        else RobotEntry(
-            joints=estimate.robot.joints, base_frame=estimate.robot.base_frame, tool_frame=estimate.robot.tool_frame
-        ),
-        suspension=None if estimate.suspension is None else suspension_entry(estimate.suspension),
-        joint_models=tuple(joint_entry(m) for m in estimate.joint_models),
+        clocks=tuple(map(plain, estimate.clocks)),
+        robot=plain(estimate.robot),
+        suspension=None if estimate.suspension is None else _suspension_part(estimate.suspension),
+        joint_models=tuple(_without(plain(m), "covariance", "blocks") for m in estimate.joint_models),
         link_zero=tuple(_finite(z) for z in estimate.link_zero),
-        regimes=tuple(regime_entry(x) for x in estimate.regimes),
+        regimes=tuple(map(plain, estimate.regimes)),
         options=estimate.options,
         laboratory=estimate.laboratory,
         bundle=plain(estimate.bundle),
@@ -171,23 +125,50 @@ def to_file(estimate: Estimate) -> EstimateFile:
 
 def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, np.ndarray]) -> Estimate:
     """The contents of estimate.json, with the covariances of the models that have one, as an estimate."""
-    robot = file.robot
+    robot = _known(RobotNames, file.robot, "robot")
+    if robot is not None and len(file.link_zero) not in (0, len(robot.joints)):
+        raise ValueError(f"link_zero has {len(file.link_zero)} values for {len(robot.joints)} joints")
     return Estimate(
         file.status,
         tuple(Verdict(v.stage, v.verdict, v.message) for v in file.verdicts),
-        tuple(Clock(c.instrument, c.offset, c.drift, np.array(c.covariance), c.epoch, c.sigma) for c in file.clocks),
+        tuple(_restored(Clock, c, "clocks") for c in file.clocks),
         tuple(_model(name, entry, covariances.get(name)) for name, entry in file.models.items()),
         file.main or (list(file.models)[-1] if file.models else ""),
         urdf,
-        None if robot is None else RobotNames(robot.joints, robot.base_frame, robot.tool_frame),
-        None if file.suspension is None else suspension_of(file.suspension),
-        tuple(joint_model(entry) for entry in file.joint_models),
+        robot,
+        None if file.suspension is None else _suspension(file.suspension),
+        tuple(_restored(JointModel, m, "joint_models") for m in file.joint_models),
         tuple(float("nan") if z is None else z for z in file.link_zero),
         file.options,
         file.laboratory,
-        regimes=tuple(regime_quality(x) for x in file.regimes),
-        bundle=None if file.bundle is None else restored(BundleParts, file.bundle, "estimate.json: bundle"),
+        regimes=tuple(_restored(RegimeQuality, x, "regimes") for x in file.regimes),
+        bundle=_known(BundleParts, file.bundle, "bundle"),
     )
+
+
+def _restored(kind: type[T], part: _Part, at: str) -> T:
+    return restored(kind, part, f"estimate.json: {at}")
+
+
+def _known(kind: type[T], part: _Part | None, at: str) -> T | None:
+    return None if part is None else _restored(kind, part, at)
+
+
+def _suspension_part(suspension: Suspension) -> _Part:
+    """Without what is a parameter of model_1."""
+    held_out = [{"source": source} | plain(tried) for source, tried in suspension.held_out]
+    return _without(plain(suspension), "sigma_K", "sigma_C", "parameters", "combinations") | {"held_out": held_out}
+
+
+def _suspension(part: _Part) -> Suspension:
+    unknown = np.full((6, 6), np.nan).tolist()
+    held_out = [(tried["source"], tried) for tried in part["held_out"]]
+    apart = {"held_out": held_out, "sigma_K": unknown, "sigma_C": unknown, "parameters": (), "combinations": ()}
+    return _restored(Suspension, part | apart, "suspension")
+
+
+def _without(part: _Part, *names: str) -> _Part:
+    return {name: value for name, value in part.items() if name not in names}
 
 
 def _finite(x: float) -> float | None:
@@ -239,7 +220,5 @@ def _model(name: str, entry: ModelEntry, covariance: np.ndarray | None) -> Model
         entry.rank,
         entry.condition,
         np.array(entry.hand_error),
-        absorption=None
-        if entry.absorption is None
-        else restored(Absorption, entry.absorption, f"estimate.json: {name}"),
+        absorption=_known(Absorption, entry.absorption, name),
     )

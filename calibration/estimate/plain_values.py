@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
-from calibration.errors import InputError
+from calibration.errors import InputError, ShapeError
 
 T = TypeVar("T")
 
@@ -41,28 +41,40 @@ def restored(kind: type[T], value: Any, at: str = "") -> T:
     """
     try:
         return _restored(kind, value)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, ShapeError) as error:
         raise InputError(at, f"is no {getattr(kind, '__name__', kind)}: {error!r}") from error
 
 
 def _restored(kind: Any, value: Any) -> Any:
     origin, arguments = get_origin(kind), get_args(kind)
     if kind is np.ndarray:
-        return np.array(_with_nan(value), dtype=float)
+        return _numbers(value)
     if kind is float:
-        return float("nan") if value is None else float(value)
+        return float(_numbers(value))
     if origin in (Union, UnionType):
         return None if value is None else _restored(next(a for a in arguments if a is not type(None)), value)
+    if isinstance(kind, type) and issubclass(kind, tuple):
+        return kind(*value)
     if origin is tuple:
         kinds = [arguments[0]] * len(value) if arguments[-1:] == (Ellipsis,) else arguments
         return tuple(_restored(k, x) for k, x in zip(kinds, value, strict=True))
     if is_dataclass(kind):
         hints = get_type_hints(kind)
-        given = [f for f in fields(kind) if f.init and (f.name in value or f.default_factory is MISSING)]
-        return kind(**{f.name: _restored(hints[f.name], value[f.name]) for f in given})  # type: ignore[operator]
+        given = [f.name for f in fields(kind) if f.name in value or f.default is f.default_factory is MISSING]
+        known = {name: None for name in given if type(None) in get_args(hints[name])} | value
+        return kind(**{name: _restored(hints[name], known[name]) for name in given})  # type: ignore[operator]
     if origin is Literal and value not in arguments:
         raise ValueError(f"{value!r} is none of {arguments}")
+    if kind in (str, int) and not isinstance(value, kind):
+        raise TypeError(f"{value!r} is no {kind.__name__}")
     return value
+
+
+def _numbers(value: Any) -> np.ndarray:
+    found = np.array(_with_nan(value), dtype=float)
+    if np.isinf(found).any():
+        raise ValueError("an infinite number")
+    return found
 
 
 def _with_nan(value: Any) -> Any:

@@ -21,6 +21,7 @@ Terms without a constant are not closed under a shift: for them theta_0 = tau_0 
 
 from dataclasses import dataclass, field
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import expit
@@ -45,8 +46,7 @@ def monomials(theta: np.ndarray, tau: np.ndarray, powers: tuple[Exponent, ...]) 
     return np.asarray(theta[:, None] ** i * tau[:, None] ** j)
 
 
-@dataclass(frozen=True)
-class Quality:
+class Quality(NamedTuple):
     """How well a joint's model explains its discrepancy.
 
     Attributes:

@@ -53,6 +53,11 @@ class Suspension:
     parameters: tuple[Parameter, ...]
     combinations: tuple[Combination, ...]
 
+    def __post_init__(self) -> None:
+        for name, value in (("K", self.K), ("C", self.C), ("tangent", self.tangent), ("gravity", self.gravity)):
+            if value.shape != (6, 6) or not np.isfinite(value).all():
+                raise ShapeError(f"finite {name}", value.shape, (6, 6))
+
     @cached_property
     def modes(self) -> Modes:
         """Modes of the base under wrenches the floor feels."""
