@@ -8,19 +8,24 @@ principal axes, are turned back into the link's:
 The free joint is left out: the root link is the robot's root body, and who reads the URDF adds the floating base.
 A joint's `actuatorfrcrange` becomes its effort limit, its first `user` value its velocity limit. A fixed joint has no
 name in MJCF: it is called after its child. Floats are written by `repr`, which reads back to the same double.
+
+Shapes are geoms of group 2, those that are seen. A capsule becomes a cylinder and its two end spheres; an ellipsoid,
+which URDF does not have, three cylinders along its z as wide as it is in the middle of each third (semi-axes a, b:
+sqrt(a b)).
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 
 import mujoco
 import numpy as np
 
-from mjcf.collision_shapes import collisions
 from mjcf.nominal import ROOT
 from mjcf.nominal import model as nominal
-from mjcf.rpy import rpy_from_matrix
+
+_SEEN = 2  # group of the geoms that a camera sees
+_NO_YAW = 8.0 * np.finfo(float).eps
 
 
 class NotAUrdfTree(ValueError):
@@ -75,7 +80,7 @@ def _link(model: mujoco.MjModel, body_id: int) -> ET.Element:
     link = ET.Element("link", name=model.body(body_id).name)
     if model.body_mass[body_id] > 0.0:
         link.append(_inertial(model, body_id))
-    link.extend(collisions(model, body_id, _text))
+    link.extend(_collisions(model, body_id))
     return link
 
 
@@ -148,3 +153,57 @@ def _matrix(quat_wxyz: np.ndarray) -> np.ndarray:
 def _text(values: Iterable[float]) -> str:
     """Return numbers as URDF text, shortest form that reads back to the same doubles."""
     return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
+
+
+def _collisions(model: mujoco.MjModel, body_id: int) -> Iterator[ET.Element]:
+    """Collision elements of a body."""
+    first = int(model.body_geomadr[body_id])
+    for geom_id in range(first, first + int(model.body_geomnum[body_id])):
+        if model.geom_group[geom_id] != _SEEN:
+            continue
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, model.geom_quat[geom_id])
+        for shape, along_z in _shapes(int(model.geom_type[geom_id]), model.geom_size[geom_id]):
+            collision = ET.Element("collision")
+            origin = model.geom_pos[geom_id] + along_z * R.reshape(3, 3)[:, 2]
+            rpy = rpy_from_matrix(R.reshape(3, 3))
+            ET.SubElement(collision, "origin", xyz=_text(origin), rpy=_text(rpy))
+            ET.SubElement(collision, "geometry").append(shape)
+            yield collision
+
+
+def _shapes(kind: int, size: np.ndarray) -> Iterator[tuple[ET.Element, float]]:
+    """URDF shapes of a geom and how far along its z they stand [m]; other kinds have none."""
+    of = mujoco.mjtGeom
+    if kind == of.mjGEOM_BOX:
+        yield ET.Element("box", size=_text(2.0 * size)), 0.0
+    elif kind == of.mjGEOM_SPHERE:
+        yield ET.Element("sphere", radius=_text(size[:1])), 0.0
+    elif kind == of.mjGEOM_ELLIPSOID:
+        wide, third = float(np.sqrt(size[0] * size[1])), 2.0 * float(size[2]) / 3.0
+        for k in (-1, 0, 1):
+            radius = wide * np.sqrt(1.0 - (2.0 * k / 3.0) ** 2)
+            yield ET.Element("cylinder", radius=_text([radius]), length=_text([third])), k * third
+    elif kind in (of.mjGEOM_CYLINDER, of.mjGEOM_CAPSULE):
+        yield ET.Element("cylinder", radius=_text(size[:1]), length=_text([2.0 * size[1]])), 0.0
+        if kind == of.mjGEOM_CAPSULE:
+            for end in (-size[1], size[1]):
+                yield ET.Element("sphere", radius=_text(size[:1])), float(end)
+
+
+def rpy_from_matrix(R: np.ndarray) -> tuple[float, float, float]:
+    """Return (roll, pitch, yaw) [rad] of the rotation matrix R = Rz(yaw) Ry(pitch) Rx(roll) (3, 3).
+
+    yaw is taken first; the other two angles are then read from Rz(-yaw) R, which is a rotation Ry Rx whatever yaw was.
+    At pitch = +-pi/2 the first column's horizontal part vanishes and yaw is free: 0 is taken, and roll makes up for it.
+    The textbook formula, roll from R's last row, would lose half the digits there; TIAGo's arm_4, arm_5 and arm_6
+    placements are at pitch = -pi/2.
+    """
+    if np.shape(R) != (3, 3):
+        raise ValueError(f"a rotation matrix is (3, 3); found {np.shape(R)}")
+    horizontal = np.hypot(R[0, 0], R[1, 0])
+    yaw = np.arctan2(R[1, 0], R[0, 0]) if horizontal > _NO_YAW else 0.0
+    c, s = np.cos(yaw), np.sin(yaw)
+    pitch = np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+    roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return float(roll), float(pitch), float(yaw)

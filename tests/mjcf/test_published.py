@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ET
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import mjcf
@@ -91,9 +92,7 @@ def test_placements_are_the_published_ones(model):
         R = np.empty(9)
         mujoco.mju_quat2Mat(R, body.quat)
         np.testing.assert_allclose(body.pos, values[:3], rtol=0, atol=1e-15, err_msg=child)
-        np.testing.assert_allclose(
-            R.reshape(3, 3), mjcf.matrix_from_rpy(*values[3:]), rtol=0, atol=5e-15, err_msg=child
-        )
+        np.testing.assert_allclose(R.reshape(3, 3), pin.rpy.rpyToMatrix(*values[3:]), rtol=0, atol=5e-15, err_msg=child)
     assert len(lines) == len(robot_bodies(model)) - 1
 
 
