@@ -8,6 +8,8 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 
+from tests.acceptance.claims import keep  # noqa: E402
+
 
 @pytest.fixture(scope="session")
 def base_r2():
@@ -34,3 +36,9 @@ def base_r2():
         return 1.0 - (error**2).sum(axis=0) / ((motion - motion.mean(axis=0)) ** 2).sum(axis=0)
 
     return r2
+
+
+@pytest.fixture
+def claim():
+    """Keep the figures of a claim, one a robot; `make claims` brings them into the documents."""
+    return keep

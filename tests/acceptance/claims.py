@@ -1,57 +1,73 @@
-"""Figures of the claims: kept by the tests that check them, shown in docs/claims.md.
+"""Figures of the claims: kept by the tests that check them, shown in docs/claims.md and pages of docs/results.
 
-`make claims` runs the tests of claims, keeps their figures in docs/results/claims.json and writes the page from it and
-from the sentences in claims.toml.
+Tests and benchmarks add lines to runs/claims.jsonl; `make claims` merges them into docs/results/claims.json and writes
+every page of claims.toml from it. Names that differ behind `#` alone, robots or trials, are one row.
 """
 
 import json
 import tomllib
+from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 
 import numpy as np
 
 ROOT = Path(__file__).parents[2]
-KEPT = ROOT / "runs/claims.json"
+KEPT = ROOT / "runs/claims.jsonl"
 RESULTS = ROOT / "docs/results/claims.json"
-PAGE = ROOT / "docs/claims.md"
 SENTENCES = Path(__file__).with_name("claims.toml")
 
 
-def keep(name: str, figures: np.ndarray) -> None:
-    """Merge the figures of a claim, one a robot, into runs/claims.json."""
+def keep(name: str, figures: np.ndarray | float) -> None:
+    """Add the figures of a claim, one a robot, to runs/claims.jsonl."""
     KEPT.parent.mkdir(exist_ok=True)
-    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
-    kept[name] = {"date": date.today().isoformat(), "figures": [float(x) for x in np.atleast_1d(figures)]}
-    KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    content = {"date": date.today().isoformat(), "figures": [float(x) for x in np.atleast_1d(figures)]}
+    with KEPT.open("a", encoding="utf-8") as file:
+        file.write(json.dumps({name: content}) + "\n")
 
 
-def page(results: dict) -> str:
-    """docs/claims.md from the kept figures."""
-    sentences = tomllib.loads(SENTENCES.read_text(encoding="utf-8"))
-    lines = [sentences["title"], "", sentences["intro"].strip(), ""]
-    for section in sentences["section"]:
-        lines += [f"## {section['title']}", "", section["text"].strip(), "", f"Test: `{section['test']}`.", ""]
-        lines += [f"| {section['rows']} | n | median | least | most | measured on |", "|---|---|---|---|---|---|"]
-        for name in sorted(results):
-            if name.startswith(section["figures"]):
-                lines.append(_line(name.removeprefix(section["figures"]), results[name], section.get("decimals", 2)))
+def pages(results: dict) -> Iterator[tuple[Path, str]]:
+    """Each page and its text from the kept figures."""
+    for page in tomllib.loads(SENTENCES.read_text(encoding="utf-8"))["page"]:
+        lines = [f"# {page['title']}", "", page["intro"].strip(), ""]
+        for section in page["section"]:
+            lines += _section(section, results)
+        yield ROOT / page["file"], "\n".join(lines).rstrip() + "\n"
+
+
+def _section(section: dict, results: dict) -> list[str]:
+    rows: dict[str, list[dict]] = {}
+    for name in sorted(results):
+        if name.startswith(section.get("figures", "#")):
+            rows.setdefault(name.removeprefix(section["figures"]).split("#")[0], []).append(results[name])
+    lines = [f"## {section['title']}", "", section["text"].strip(), ""]
+    lines += [f"Test: `{section['test']}`.", ""] if "test" in section else []
+    if rows:
+        figures = {
+            name: section.get("scale", 1.0) * np.concatenate([r["figures"] for r in row]) for name, row in rows.items()
+        }
+        single = all(len(x) == 1 for x in figures.values())
+        columns = ("value",) if single else ("n", "median", "least", "most")
+        lines += [f"| {' | '.join((section['rows'], *columns, 'measured on'))} |", "|---" * (len(columns) + 2) + "|"]
+        for name, x in figures.items():
+            shown = [f"{value:.{section.get('decimals', 2)}f}" for value in (np.median(x), x.min(), x.max())]
+            cells = shown[:1] if single else [str(len(x)), *shown]
+            label = name.strip("/ []").replace("/", ", ")
+            lines.append(f"| {' | '.join((label, *cells, max(r['date'] for r in rows[name])))} |")
         lines.append("")
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _line(name: str, result: dict, decimals: int) -> str:
-    x = np.array(result["figures"])
-    figures = " | ".join(f"{value:.{decimals}f}" for value in (np.median(x), x.min(), x.max()))
-    return f"| {name.strip('/').replace('/', ', ')} | {len(x)} | {figures} | {result['date']} |"
+    elif "figures" in section:
+        lines += ["Not measured yet.", ""]
+    return lines
 
 
 def main() -> None:
     """Bring the kept figures into the documents."""
-    results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
-    results |= json.loads(KEPT.read_text(encoding="utf-8"))
+    results = json.loads(RESULTS.read_text(encoding="utf-8"))
+    for line in KEPT.read_text(encoding="utf-8").splitlines() if KEPT.exists() else ():
+        results |= json.loads(line)
     RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    PAGE.write_text(page(results), encoding="utf-8")
+    for path, text in pages(results):
+        path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from scenarios import load, run
-from tests.acceptance.claims import keep
 
 
 @pytest.fixture(scope="session")
@@ -21,9 +20,3 @@ def quick_run(tmp_path_factory, worker_id):
         if not kept.is_file():
             kept.write_bytes(pickle.dumps(run(load("humanoids2024"), shared / "quick_run", quick=True)))
         return pickle.loads(kept.read_bytes())
-
-
-@pytest.fixture
-def claim():
-    """Keep the figures of a claim, one a robot, in runs/claims.json; `make claims` brings them into the documents."""
-    return keep

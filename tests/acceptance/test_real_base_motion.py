@@ -25,8 +25,12 @@ def out(tmp_path_factory):
     return folder
 
 
-def test_what_follows_the_fit_is_predicted(out):
+def test_what_follows_the_fit_is_predicted(out, claim):
     found = json.loads((out / "base_motion.json").read_text())["scores"]
+    for part, what in {"predicted": "after 28 s", "left-out cycles": "steady cycles, each left out"}.items():
+        claim(f"reality/base/{what}/hand [mm]", 1e3 * found[part]["hand"])
+        claim(f"reality/base/{what}/hand, a base at rest [mm]", 1e3 * found[part]["still"])
+        claim(f"reality/base/{what}/yaw R2 about its mean", found[part]["yaw_r2_about_mean"])
     assert found["predicted"]["hand"] < 2.0e-3 < 0.5 * found["predicted"]["still"]
     assert found["predicted"]["yaw_r2_about_mean"] >= 0.75
     assert found["left-out cycles"]["hand"] < 0.65e-3

@@ -34,15 +34,17 @@ def parts(kind: str, q: np.ndarray) -> list[np.ndarray]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["a sixth at random", "a sixth by regions", "a third by regions"])
-def test_each_row_predicts_left_out_postures_of_a_real_robot_better_than_the_one_before(kind):
+def test_each_row_predicts_left_out_postures_of_a_real_robot_better_than_the_one_before(kind, claim):
     _, rows = real_rows()
     found = cross_validated(TABLE, TWO_DAYS, parts(kind, rows[:, 12:]))
     for marker, goal in GOALS.items():
         rms = {model: pooled(found, model, marker) for model in ROWS}
-        print(kind, marker, [(m, round(p.rmse_norm_mm, 2), round(p.max_norm_mm, 1)) for m, p in rms.items()])
+        points = "one point" if marker == "BL" else "four points"
+        for model, found_mm in rms.items():
+            claim(f"geometry/real/error/{kind}, {points}/{model}", found_mm.rmse_norm_mm)
         full = rms["full"]
-        print(f"  inside the band {100 * full.inside:.0f} %, its radius {full.band_95_mm:.1f} mm")
-        print(f"  of any other session {100 * full.other_day_inside:.0f} %, {full.other_day_band_95_mm:.1f} mm")
+        claim(f"geometry/real/inside/{kind}, {points}", full.inside)
+        claim(f"geometry/real/inside/{kind}, {points}, of any other session", full.other_day_inside)
         assert full.rmse_norm_mm <= rms["model_2"].rmse_norm_mm <= rms["registration"].rmse_norm_mm
         assert full.rmse_norm_mm <= goal
         after = AFTER[kind][marker]
@@ -51,11 +53,12 @@ def test_each_row_predicts_left_out_postures_of_a_real_robot_better_than_the_one
 
 
 @pytest.mark.slow
-def test_one_marker_alone_is_predicted_where_it_was_left_out(tmp_path):
+def test_one_marker_alone_is_predicted_where_it_was_left_out(tmp_path, claim):
     _, rows = real_rows()
     found = cross_validated(TABLE, one_marker(tmp_path), parts("a sixth at random", rows[:, 12:]))
     rms = [pooled(found, model, "BL").rmse_norm_mm for model in ROWS]
-    print("fitted to one marker", np.round(rms, 2))
+    for model, mm in zip(ROWS, rms, strict=True):
+        claim(f"geometry/real/error/a sixth at random, one marker fitted/{model}", mm)
     assert rms[2] <= rms[1] <= rms[0] and rms[2] <= GOALS["BL"]
 
 

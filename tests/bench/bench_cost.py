@@ -18,7 +18,7 @@ VARIED = {
     "mocap 200 Hz": ("twin.instruments.mocap_rate=200",),
     "plate 2 kHz": ("twin.instruments.plate_rate=2000",),
     "anchored wheels": ("twin.base.wheels=anchored",),
-    "held play": ("twin.gear_form=friction_held",),
+    "friction-held gears": ("twin.gear_form=friction_held",),
 }
 
 

@@ -1,4 +1,4 @@
-"""Speed, as ratios measured in one run: `make bench` prints them and writes runs/bench.json."""
+"""Speed, as ratios measured in one run: `make bench` prints them and keeps them."""
 
 import time
 

@@ -1,5 +1,6 @@
 """What the documents say can be done can be done."""
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -9,6 +10,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from scenarios.commands.main import app
+from tests.acceptance import claims
+from tests.bench import bench_page
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -70,6 +73,17 @@ def test_figures_in_prose_are_those_of_the_kept_results(monkeypatch):
 
     for page, pattern, phrase in evidence.prose():
         assert set(re.findall(pattern, page.read_text(encoding="utf-8"))) == {phrase}, f"{page.name}: run make pictures"
+
+
+def test_generated_pages_show_the_kept_results(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    import evidence
+
+    results = ROOT / "docs/results"
+    kept = {name: json.loads((results / f"{name}.json").read_text()) for name in ("claims", "runs", "bench_v1")}
+    pages = [*claims.pages(kept["claims"]), (results / "base.md", evidence.base_page(kept["runs"]))]
+    for page, text in (*pages, (bench_page.PAGE, bench_page.page(kept["bench_v1"]))):
+        assert page.read_text(encoding="utf-8") == text, f"{page.name} is not of its results"
 
 
 def test_decisions_and_changelog_stay_short():

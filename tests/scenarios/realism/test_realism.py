@@ -222,10 +222,13 @@ def test_the_swings_start_at_full_speed_under_the_joints_limits():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 20, 40])
-def test_the_log_moves_among_the_draws(log, seed):
+def test_the_log_moves_among_the_draws(log, seed, claim):
     """As drawn y, roll, pitch and yaw; z, too, where markers shift as the log's; all where casters turn as well."""
     trials, scenario = recorded(load_dataset(log)), load("reality", [f"seed={seed}"])
     drawn, shifting, turning = (compare_replay(scenario, trials, 20, c).share for c in (AS_DRAWN, *CAUSES))
+    for name, shares in {"as sampled": drawn, "markers shift": shifting, "and casters turn": turning}.items():
+        for axis, share in zip(("x", "y", "z", "roll", "pitch", "yaw"), shares, strict=True):
+            claim(f"reality/replay/{name}/{axis}#{seed}", share)
     assert min(drawn[k] for k in (1, 3, 4, 5)) >= 0.8
     assert min(shifting[1:]) >= 0.8
     assert min(turning) >= 0.8
@@ -233,6 +236,8 @@ def test_the_log_moves_among_the_draws(log, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "inside"), [(0, 9), (20, 8), (40, 9)])
-def test_figures_of_the_log_lie_among_the_draws(seed, inside):
+def test_figures_of_the_log_lie_among_the_draws(seed, inside, claim):
     """Nine of fourteen with the seeds of the widths' condition; the others are one short, as the page says."""
-    assert compare_swings(load("reality", [f"seed={seed}"]), 20).n_inside >= inside
+    found = compare_swings(load("reality", [f"seed={seed}"]), 20).n_inside
+    claim(f"reality/inside/seeds {seed} to {seed + 19}", found)
+    assert found >= inside

@@ -57,8 +57,9 @@ def found(task):
 
 
 @pytest.mark.slow
-def test_thirty_designed_postures_beat_random_ones_where_the_robot_departs_from_its_model(found):
+def test_thirty_designed_postures_beat_random_ones_where_the_robot_departs_from_its_model(found, claim):
     against = compared(found, np.random.default_rng(3))
+    claim("geometry/design/random errors as expected", against.gain)
     assert len(found.design.chosen) == 30 and len(against.random) == 100
     assert against.gain >= 0.30
     assert against.designed < against.random.min()
@@ -90,9 +91,10 @@ def test_a_robot_plays_the_tour(found, tmp_path):
 
 
 @pytest.mark.slow
-def test_without_departures_they_beat_random_ones_by_thirty_percent(task):
+def test_without_departures_they_beat_random_ones_by_thirty_percent(task, claim):
     exact = replace(task, departures=None)
     against = compared(plan(exact, 30, "G", np.random.default_rng(2)), np.random.default_rng(3))
+    claim("geometry/design/no random errors", against.gain)
     assert against.gain >= 0.30
     assert against.designed < against.random.min()
 

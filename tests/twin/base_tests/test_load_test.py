@@ -51,16 +51,23 @@ def test_stiffness_of_the_base_is_the_sum_over_wheels(lab):
 
 
 @pytest.mark.parametrize("ground", ["contact", "anchored", pytest.param("turning", marks=pytest.mark.slow)])
-def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground):
+def test_load_and_release_find_the_stated_springs_and_dampers(nominal, ground, claim):
     twin, wheels = standing(nominal, *GROUNDS[ground])
     K, C = spatial_stiffness(wheels)
     found = load_test(twin)
-    assert error(found.K, K) < 1e-3
-    assert error(release_test(twin), C) < 0.05
+    errors = error(found.K, K), error(release_test(twin), C)
+    stated(claim, f"default, {ground}", errors)
+    assert errors[0] < 1e-3
+    assert errors[1] < 0.05
     gravity = gravity_stiffness(twin, wheels)
     q = np.sqrt(np.diag(K))
     assert np.abs((found.K_gravity - gravity) / np.outer(q, q)).max() < 1e-3
     np.testing.assert_allclose(np.diag(found.K_gravity)[3:5], np.diag(gravity)[3:5], rtol=0.01)
+
+
+def stated(claim, base, errors):
+    for of, value in zip(("stiffness", "damping"), errors, strict=True):
+        claim(f"physics/base/{of}/{base}", value)
 
 
 def random_base(seed):
@@ -76,23 +83,23 @@ def random_base(seed):
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
-def test_the_springs_and_dampers_of_random_bases_are_found(nominal, seed):
+def test_the_springs_and_dampers_of_random_bases_are_found(nominal, seed, claim):
     twin, wheels = standing(nominal, *random_base(seed))
     K, C = spatial_stiffness(wheels)
     errors = error(load_test(twin).K, K), error(release_test(twin), C)
-    print("K, C", errors)
+    stated(claim, f"random bases#{seed}", errors)
     assert errors[0] < 1e-3
     assert errors[1] < 0.05
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
-def test_the_springs_and_dampers_of_random_bases_whose_casters_turn_are_found(nominal, seed):
+def test_the_springs_and_dampers_of_random_bases_whose_casters_turn_are_found(nominal, seed, claim):
     settings = [s for s in random_base(seed) if ".friction" not in s]
     twin, wheels = standing(nominal, *settings, *GROUNDS["turning"])
     K, C = spatial_stiffness(wheels)
     errors = error(load_test(twin).K, K), error(release_test(twin), C)
-    print("K, C", errors)
+    stated(claim, f"random bases whose casters turn#{seed}", errors)
     assert errors[0] < 1e-2
     assert errors[1] < 0.05
 

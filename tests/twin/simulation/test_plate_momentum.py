@@ -59,9 +59,9 @@ def imbalance(trial, n, shift=0):
     return np.sqrt(np.mean((wrench - weight + rate) ** 2, axis=0))
 
 
-def test_the_plate_reads_weight_and_rate_of_momentum(trial):
+def test_the_plate_reads_weight_and_rate_of_momentum(trial, claim, request):
     error = imbalance(trial, SAMPLE)
-    print("rms [N, N.m]", error)
+    claim(f"physics/momentum/{request.node.callspec.params['trial']}", error)
     assert np.ptp(trial[2].wrench[:, 2]) > 30.0
     assert (error < 0.1).all()
 

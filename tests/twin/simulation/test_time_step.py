@@ -55,15 +55,12 @@ def test_halving_the_step_changes_a_trial_by_less_than_a_hundredth():
 @pytest.mark.slow
 @pytest.mark.parametrize("ground", ["contact", "anchored", "turning"])
 @pytest.mark.parametrize("name", ["xyz", "xyz_mirror", "around_z", "x_fold"])
-def test_steps(ground, name):
+def test_steps(ground, name, claim):
     """The table of docs/results/physics.md."""
     steps = (1e-3, 5e-4, 2.5e-4)
     runs = {h: observed(h, name, ground) for h in (*steps, steps[-1] / 2.0)}
     for h in steps:
         found = change(runs[h], runs[h / 2.0])
-        print(
-            f"| {ground} | {name} | {1e3 * h:g} | "
-            + " | ".join(f"{100 * a:.2f}, {100 * b:.2f}" for a, b in found)
-            + " |"
-        )
+        for what, (share, _) in zip(SOUGHT, found, strict=True):
+            claim(f"physics/step/{what}, {1e3 * h:g} ms#{ground} {name}", share)
         assert (found[:, 0] < 0.01).all()

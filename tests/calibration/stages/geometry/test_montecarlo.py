@@ -90,15 +90,16 @@ def judged(chain, seed, soft):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("soft", [False, True], ids=["stiff gears", "a share of the gears gives"])
-def test_a_thousand_matched_robots_are_calibrated_as_well_as_noise_allows(soft):
+def test_a_thousand_matched_robots_are_calibrated_as_well_as_noise_allows(soft, claim):
     chain = chain_of_frames(mjcf.urdf(), rigid_robot.JOINTS, "base_footprint", "gripper_grasping_frame")
     squares, covered, nees, variance = map(np.array, zip(*(judged(chain, s, soft) for s in SEEDS), strict=True))
     ratio = np.sqrt(squares[:, 0].mean(axis=0) / squares[:, 1].mean(axis=0))
-    print(f"RMSE of position and rotation {ratio.round(3)} x the Cramer-Rao bound of stiff gears")
+    gears = "elastic gears" if soft else "stiff gears"
+    claim(f"geometry/matched/{gears}, RMSE over the bound of stiff gears, position and rotation", ratio)
     assert soft or (ratio <= 1.1).all()
     nu = 2.0 * len(SEEDS) ** 2 / variance.sum()
     band = chi2.interval(0.99, nu) / nu
-    sure = nees.std(ddof=1) / np.sqrt(len(SEEDS))
-    print(f"95 % coverage {100 * covered.mean():.1f} %, NEES {nees.mean():.4f} +- {sure:.4f}, band {band.round(4)}")
+    claim(f"geometry/matched/{gears}, share of 95 % intervals", covered.mean())
+    claim(f"geometry/matched/{gears}, NEES per degree of freedom", nees.mean())
     assert 0.93 <= covered.mean() <= 0.97
     assert band[0] <= nees.mean() <= band[1]
