@@ -12,8 +12,7 @@ from dataclasses import replace
 from calibration.breakdown import Breakdowns
 from calibration.checks.changes import changes, exchanged_sides, wrong_mounts
 from calibration.checks.joint_columns import wrong_columns
-from calibration.checks.recordings import judged
-from calibration.checks.trial_times import listed_twice
+from calibration.checks.recordings import judged, listed_twice
 from calibration.checks.unexplained import passed, unexplained
 from calibration.conclusion import conclusion
 from calibration.context import Context, with_postures
@@ -38,10 +37,10 @@ from calibration.stages.frames.arm_tool_stage import ARM_TOOL
 from calibration.stages.frames.base_rests import MOVES, read_stations
 from calibration.stages.frames.base_stage import BASE_FRAME
 from calibration.stages.geometry.cross_validation import cross_validated
+from calibration.stages.geometry.gear_deflection import GEOMETRY
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.registration import REGISTRATION
 from calibration.stages.geometry.remounted import remounted
-from calibration.stages.geometry.rows import GEOMETRY
 from calibration.stages.joints.correction import JointModels
 from calibration.stages.joints.stage import JOINTS
 from calibration.stages.stage import Stage, StageInput, StageResult

@@ -1,7 +1,8 @@
 """Recordings that cannot be true, judged before anything is written or fitted, alike for every role.
 
 Units show in sizes: a body of markers over its nominal distances, a reading over its joint's limits, the plate's load
-over the robot's weight. A finding of some trials names them.
+over the robot's weight. Times show in dwells in which the arm moves, holes, one recording listed twice. A finding of
+some trials names them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,15 +13,19 @@ from calibration.checks.joint_readings import commanded, implausible_readings, m
 from calibration.checks.marker_bodies import implausible_markers, not_rigid, wrong_scale
 from calibration.checks.marker_shapes import STAGE, wrong_shapes
 from calibration.checks.plates import implausible_plates
-from calibration.checks.trial_times import holes, wrong_dwells
 from calibration.errors import InputError
+from calibration.mocap.dwells import rests
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.recording.posture_means import PostureMeans
-from calibration.recording.schema import Description
+from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
 from calibration.robot.laboratory import Laboratory
 from calibration.verdict import Verdict
+
+_MANY = 0.25  # share of moving dwells beyond which all of them are doubtful
+_LONG = 0.5  # [s] a shorter hole is a log's usual drop-out
+_CLOCKS = (("t_robot", "joint readings"), ("t_plate", "readings of the plate"), ("t_mocap", "frames"))
 
 
 def check(file: str, trial: Trial | PostureMeans, description: Description, chain: Chain, mass: float) -> None:
@@ -89,3 +94,49 @@ def _clocks(trial: Trial) -> Iterator[str]:
         if len(back):
             k = int(back[0])
             yield f"{name} does not increase at sample {k + 1} ({t[k]:.6f} s, then {t[k + 1]:.6f} s); sort it"
+
+
+def wrong_dwells(trials: Sequence[MeasuredTrial]) -> Iterator[Verdict]:
+    """Dwells in which the hand does not rest: they are not used."""
+    n, found = sum(len(t.dwell_start) for t in trials), []
+    for trial in trials:
+        found += [f"{trial.id} {k}" for k in np.flatnonzero(~rests(trial))]
+    if not found:
+        return
+    many = len(found) > _MANY * n
+    remedy = "they must be [start, stop] on the motion capture's clock" if many else "they are left out"
+    message = f"the hand moves in {len(found)} of {n} dwells, counted from 0: {', '.join(found[:8])}"
+    yield Verdict(STAGE, "refused" if many else "warning", f"{message}{', ...' if found[8:] else ''}; {remedy}")
+
+
+def holes(trials: Sequence[MeasuredTrial]) -> Iterator[Verdict]:
+    """Trials in which an instrument, or one joint's encoder, lost samples."""
+    for trial in trials:
+        for name, what in _CLOCKS:
+            yield from _hole(trial.id, what, getattr(trial, name), "what was lost is not used")
+        for name, read in zip(trial.joint, np.isfinite(trial.q_link).T, strict=True):
+            if read.any() and not read.all():
+                t = np.unique([trial.t_robot[0], *trial.t_robot[read], trial.t_robot[-1]])
+                yield from _hole(trial.id, f"joint readings of {name}", t, "its joint models lose that time")
+
+
+def _hole(trial: str, what: str, t: np.ndarray, cost: str) -> Iterator[Verdict]:
+    """Samples at t (n,) [s] that are too far apart."""
+    steps = np.diff(t)
+    long = np.flatnonzero(steps > _LONG)
+    if len(long):
+        k = int(long[np.argmax(steps[long])])
+        message = f"{trial}: {len(long)} holes in the {what}, the longest {steps[k]:.2f} s after {t[k]:.2f} s"
+        yield Verdict(STAGE, "warning", f"{message} of their clock; {cost}")
+
+
+def listed_twice(entries: Sequence[TrialEntry]) -> Iterator[str]:
+    """Trials whose files are the same."""
+    first: dict[str, TrialEntry] = {}
+    for entry in entries:
+        other = first.setdefault(entry.sha256, entry)
+        if other is not entry:
+            yield (
+                f"trials {other.id!r} ({other.role}) and {entry.id!r} ({entry.role}) are one recording: an error on it "
+                "is no error on unseen motion; list it once"
+            )

@@ -18,8 +18,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from calibration.prediction.delivered import Delivered
-from calibration.prediction.predicted_trial import PredictedTrial
+from calibration.prediction.predicted_trial import Delivered, PredictedTrial
 from calibration.recording.trial import REST
 
 BASE, JOINTS, CLOCK, GEOMETRY, NOISE = "base", "joints", "clocks", "geometry", "noise"

@@ -7,8 +7,7 @@ own motions did is named, as a warning: it may be the estimate that is wrong.
 from collections.abc import Iterator, Sequence
 
 from calibration.checks.changes import constants
-from calibration.checks.recordings import judged
-from calibration.checks.trial_times import listed_twice
+from calibration.checks.recordings import judged, listed_twice
 from calibration.checks.unexplained import passed, unexplained
 from calibration.errors import InputError, InputErrors
 from calibration.estimate.estimate import Estimate

@@ -18,9 +18,9 @@ from calibration.checks.recordings import check
 from calibration.errors import InputError, InputErrors, NoSuchElement
 from calibration.formats.mapping.channels import Joints, Markers, Plates, Reader, Recorded
 from calibration.formats.mapping.dwell_means import rests_of
-from calibration.formats.mapping.found_dwells import with_rests
 from calibration.formats.mapping.mapping import MappedTrial, MappingFile
 from calibration.formats.mapping.marker_bodies import in_order, placed_bodies, unmatched
+from calibration.formats.mapping.rests import with_rests
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans, write_means
 from calibration.recording.schema import Description, TrialEntry

@@ -17,7 +17,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calibration.estimate.rows import Base, Encoder
-from calibration.prediction.delivered import Delivered
 from calibration.recording import netcdf
 from calibration.recording.trial import Trial
 from calibration.stages.bundle.robot import BundledRobot
@@ -27,6 +26,30 @@ from calibration.stages.joints.samples import samples_of
 from calibration.stages.stick_slip.poses import BasePrediction, SlippingMotion
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import Rest
+
+
+@dataclass(frozen=True)
+class Delivered:
+    """Parts of n predicted poses, k joints of the chain.
+
+    Attributes:
+        joints: Their names.
+        T_lab_B: (n, 4, 4) the base's marker body.
+        T_B_H: (n, 4, 4) the hand in it.
+        q: (n, k) joint positions the geometry is evaluated at [rad, m].
+        q_link: (n, k) link encoders; NaN where there is none.
+        J: (n, 3, k) displacement of the hand by q [m/rad, lab axes].
+        without: T_lab_H (n, 4, 4) with one effect switched off, by its name.
+    """
+
+    joints: tuple[str, ...]
+    T_lab_B: np.ndarray
+    T_B_H: np.ndarray
+    q: np.ndarray
+    q_link: np.ndarray
+    J: np.ndarray
+    without: tuple[tuple[str, np.ndarray], ...]
+
 
 _OPEN = "make it again with evaluate"
 

@@ -28,8 +28,7 @@ from calibration.mocap.postures import dwell_windows, readings_at
 from calibration.numerics.lie import from_vector, inverse
 from calibration.prediction.base_pose import BaseInTrial, measured_base
 from calibration.prediction.bundled_arm import BundledArm
-from calibration.prediction.delivered import Delivered
-from calibration.prediction.predicted_trial import PredictedTrial, Prediction, base_motion, joint_samples
+from calibration.prediction.predicted_trial import Delivered, PredictedTrial, Prediction, base_motion, joint_samples
 from calibration.recording.clock import Clock
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Description, TrialEntry

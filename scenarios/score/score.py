@@ -5,27 +5,37 @@ through the same measurements: T_lab_B measured, all that follows it true.
 """
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import calibration.evaluation
 from calibration import Estimate, Evaluation
 from calibration.evaluation import Budget, Row, TrialErrors, headline, trial_errors
 from calibration.inference import Model
 from calibration.prediction import BASELINE, PredictedTrial, Prediction
+from calibration.stages.suspension import Source
 from scenarios.files.errors import ScenarioError
-from scenarios.score.base_motion import BaseScore, base_scores
 from scenarios.score.parameters import ModelScore, ParameterScore, judge_estimate, with_holding
 from scenarios.score.slip import SlipScore, slip_scores
 from twin import truth
 from twin.truth import Parameter, TruthTrial
 
 FLOOR = "floor"
-
 _SAME_TIME, _SAME_PLACE = 1e-3, 2e-3  # [s]; [m] drilling and noise of a body of markers are a tenth of it
+
+
+@dataclass(frozen=True)
+class BaseScore:
+    """R2 of the base's roll and pitch as predicted from one source of the wrench, over n samples."""
+
+    source: Source
+    n: int
+    roll_r2: float
+    pitch_r2: float
 
 
 @dataclass(frozen=True)
@@ -178,3 +188,29 @@ def _skill(row: Row, rows: tuple[Row, ...]) -> float | None:
     if floor is None or start is None or start == floor:
         return None
     return (start - row.metrics.position_rmse_component_mm) / (start - floor)
+
+
+def base_scores(trials: Iterable[tuple[PredictedTrial, TruthTrial]]) -> tuple[BaseScore, ...]:
+    """One for each source of the wrench that the suspension was tried with; none without a suspension or swings.
+
+        R2_a = 1 - sum (x_hat - x)_a^2 / sum (x - mean x)_a^2        x = log(R(0)' R(t)), all trials together
+
+    R of the true base, and as predicted from the first second at rest and a wrench: no marker later than that.
+    """
+    pairs: dict[Source, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for trial, true in trials:
+        base = trial.base
+        if trial.kind == "swing" and base is not None and base.rest is not None:
+            for source, x in base.predicted:
+                pairs.setdefault(source, []).append((_turned(true.base_pose), _turned(base.rest.poses(x))))
+    return tuple(_base_score(source, found) for source, found in pairs.items())
+
+
+def _base_score(source: Source, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> BaseScore:
+    true, found = (np.concatenate(x) for x in zip(*pairs, strict=True))
+    left = ((found - true) ** 2).sum(axis=0) / ((true - true.mean(axis=0)) ** 2).sum(axis=0)
+    return BaseScore(source, len(true), *(float(1.0 - x) for x in left[:2]))
+
+
+def _turned(T: np.ndarray) -> np.ndarray:
+    return np.asarray(Rotation.from_matrix(T[0, :3, :3].T @ T[:, :3, :3]).as_rotvec())

@@ -1,9 +1,8 @@
 """A robot and its campaign as a scenario describes them."""
 
-from twin.config.disturbances import Departures
 from twin.config.instruments import Instruments
 from twin.config.robot import ArmJoint
-from twin.config.twin import RobotConfig, SampledConfig, TwinConfig, sampled_config
+from twin.config.twin import Departures, RobotConfig, SampledConfig, TwinConfig, sampled_config
 
 __all__ = [
     "ArmJoint",

@@ -13,20 +13,84 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from twin.config.datasheet import Datasheet
-from twin.config.disturbances import Departures
 from twin.config.instruments import Instruments
 from twin.config.robot import FRICTION_HELD, Arm, SomeHeld, Torso, Widths
-from twin.config.session import Session
 from twin.defects import DEFECTS, Defect
+from twin.defects.bending import Cable, Flexibility
+from twin.defects.floor_tilt import FloorTilt, Tilt
 from twin.defects.inertia import Payload
+from twin.defects.placement import ThermalDrift
 from twin.defects.wheels.base import Base
 from twin.fields.distributions import sampled
-from twin.fields.names import OF_KEY, refuse, unknown
-from twin.fields.values import STRICT, OneOfKind
+from twin.fields.names import OF_KEY, ArmLinkName, ArmName, JointName, refuse, unknown
+from twin.fields.values import BY_NAME, STRICT, FixedNonNegative, FixedPositive, Keyed, NonNegative, OneOfKind
+from twin.instruments.markers import LooseMarker
 from twin.motions.campaign import Campaign
 
 AnyDefect = Annotated[Defect, OneOfKind(DEFECTS)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Departures:
+    """Disturbances that no model of the calibration contains, by the part they concern; each is off unless named.
+
+    `twin.defects` lists any defect.
+
+    Attributes:
+        bending: By link of the arm; the column bends as `torso` says.
+        warming: By joint of the torso or the arm.
+        floor_tilt: Rotation of the floor, and of the lab's axes with it, out of level about x and y [rad].
+        cables: By joint of the arm.
+        loosened: By marker.
+    """
+
+    bending: Annotated[dict[ArmLinkName, Flexibility], Keyed("link"), BY_NAME] = field(default_factory=dict)
+    warming: Annotated[dict[JointName, ThermalDrift], Keyed("joint_name"), BY_NAME] = field(default_factory=dict)
+    floor_tilt: tuple[Tilt, Tilt] = (0.0, 0.0)
+    cables: Annotated[dict[ArmName, Cable], Keyed("joint_name"), BY_NAME] = field(default_factory=dict)
+    loosened: Annotated[dict[str, LooseMarker], Keyed("name"), BY_NAME] = field(default_factory=dict)
+
+    def defects(self) -> Iterator[Defect]:
+        """Those that change the robot or its floor."""
+        yield from self.bending.values()
+        yield from self.warming.values()
+        if any(self.floor_tilt):
+            yield FloorTilt(self.floor_tilt)
+        yield from self.cables.values()
+
+
+@dataclass(frozen=True, config=STRICT)
+class Session:
+    """What changes from the first session to the confirmation; markers are remounted with their bodies' own widths.
+
+    Attributes:
+        base_translation: Half width of the base's move, per axis [m].
+        base_rotation: Half width of its turn [rad].
+        encoder_zero: Standard deviation of a motor encoder's zero after homing again [rad]: three steps of the absolute
+            encoder it is homed by.
+    """
+
+    base_translation: NonNegative = 0.08
+    base_rotation: NonNegative = 0.5
+    encoder_zero: NonNegative = 3e-4
+
+
+@dataclass(frozen=True, config=STRICT)
+class Datasheet:
+    """Tolerances declared to the laboratory, standard deviations; see `calibration.schema.Tolerances`."""
+
+    joint_translation: FixedPositive
+    joint_rotation: FixedPositive
+    encoder_offset: FixedPositive
+    joint_play: FixedPositive
+    body_translation: FixedPositive
+    body_rotation: FixedPositive
+    link_mass: FixedPositive
+    link_com: FixedPositive
+    joint_delay: FixedPositive
+    joint_delay_spread: FixedPositive
+    joint_windup: FixedPositive
+    payload_mass: FixedNonNegative
 
 
 @dataclass(frozen=True, config=STRICT)

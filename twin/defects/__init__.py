@@ -6,8 +6,7 @@ from twin.defects.floor_tilt import FloorTilt
 from twin.defects.gear import Gear
 from twin.defects.gear_friction import GearFriction
 from twin.defects.inertia import LinkMass
-from twin.defects.placement import Placement
-from twin.defects.thermal_drift import ThermalDrift
+from twin.defects.placement import Placement, ThermalDrift
 from twin.defects.wheels.base import Base, ground, wheels_of
 
 DEFECTS: tuple[type[Defect], ...] = (

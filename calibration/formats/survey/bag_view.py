@@ -8,8 +8,7 @@ from calibration.formats.bag.read import read_bag, topics_of
 from calibration.formats.mapping.layouts import BagLayout
 from calibration.formats.survey.poses_in_columns import SIGMAS
 from calibration.formats.survey.robot import UrdfRobot
-from calibration.formats.survey.view import FileView
-from calibration.formats.survey.yaml_text import CHOOSE, flow
+from calibration.formats.survey.view import CHOOSE, FileView, flow
 
 _LINK = ("absolute", "link", "encoder")
 _COMMAND = ("command", "target", "desired")

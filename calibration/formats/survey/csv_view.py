@@ -17,8 +17,7 @@ from calibration.formats.csv.read import CsvText, read_text
 from calibration.formats.mapping.channels import Joints, Markers, Means, Recorded
 from calibration.formats.survey.poses_in_columns import PoseColumns, lines_of, poses_in
 from calibration.formats.survey.robot import UrdfRobot
-from calibration.formats.survey.view import FileView, PlateView
-from calibration.formats.survey.yaml_text import flow
+from calibration.formats.survey.view import FileView, PlateView, flow
 from calibration.numerics.wrench import LOADED
 
 _TIME = re.compile(r"^(t|time|times|stamp|timestamp|seconds?|time[_ ]?(utc|s|ms|stamp))$", re.IGNORECASE)

@@ -12,8 +12,7 @@ from calibration.formats.survey.bodies import FoundBody
 from calibration.formats.survey.plate_signs import division, reversed_force
 from calibration.formats.survey.session import Session, sigmas_of
 from calibration.formats.survey.trials import kind_of
-from calibration.formats.survey.view import FileView, PlateView
-from calibration.formats.survey.yaml_text import CHOOSE, flow
+from calibration.formats.survey.view import CHOOSE, FileView, PlateView, flow
 
 
 def draft(session: Session, urdf: str, files: Sequence[str], wheels: str | None = None) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from calibration.formats.csv.read import CsvText
 from calibration.formats.mapping.layouts import PoseChannels
 from calibration.formats.mapping.poses import marker_names, markers_at
-from calibration.formats.survey.yaml_text import CHOOSE, flow
+from calibration.formats.survey.view import CHOOSE, flow
 
 _ROTATION = re.compile(r"^(?P<body>.*?)[\W_]*(?:(?:rot(?:ation)?|quat(?:ernion)?)[\W_]*|[qr])(?P<axis>[xyzw])$", re.I)
 _ANGLES = re.compile(r"^(?P<body>.*?)[\W_]*(?P<axis>roll|pitch|yaw)$", re.I)

@@ -1,11 +1,17 @@
 """What one laboratory file shows, in SI units, before anybody declared anything."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from calibration.formats.mapping.channels import Recorded
+
+CHOOSE = "# CHOOSE"
+"""Mark of lines that state what no file does."""
+_PLAIN = re.compile(r"^[A-Za-z_][\w./-]*$")
+_WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
 
 @dataclass(frozen=True)
@@ -55,3 +61,16 @@ class FileView:
     plates: tuple[PlateView, ...] = ()
     layout: tuple[str, ...] = ()
     left: tuple[str, ...] = ()
+
+
+def flow(value: object) -> str:
+    """A value in one line of YAML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{flow(k)}: {flow(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(flow(v) for v in value) + "]"
+    if isinstance(value, str) and (not _PLAIN.match(value) or value.lower() in _WORDS):
+        return "'" + value.replace("'", "''") + "'"
+    return str(value)

@@ -21,7 +21,7 @@ import numpy as np
 
 from calibration.errors import NoSuchElement, ShapeError
 from calibration.recording.schema import Description
-from calibration.robot.floating_base import floating_model
+from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
 from calibration.stages.drive_trains import link_motion
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion

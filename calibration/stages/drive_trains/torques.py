@@ -24,7 +24,7 @@ from calibration.numerics.signals import RATE, Signal, even, low_passed
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
-from calibration.robot.floating_base import floating_model
+from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
 
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second

@@ -1,4 +1,4 @@
-"""Row `full` of static postures: the geometry of `model_2`, compliance and preloaded backlash of the gears.
+"""Stage `geometry`: row `model_2`, and row `full` of static postures: compliance and preloaded backlash of the gears.
 
     reading = angle + offset + compliance * gravity torque + gap / 2 * tanh(gravity torque / tau_0)
 
@@ -37,7 +37,8 @@ from calibration.stages.geometry.parameters import (
     reading_floor,
     reading_sigma,
 )
-from calibration.stages.geometry.stage import STAGE, fit_robustly, left_out
+from calibration.stages.geometry.stage import STAGE, calibrate_geometry, fit_robustly, left_out
+from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
 
 _HAND = np.array([5e-4, 1e-3])  # random errors of the hand's position [m] and rotation [rad] to begin with
@@ -123,3 +124,19 @@ def _averaged(fit: Fit, parameters: ParameterSet, hand: HandModel) -> Fit:
     width = np.sqrt(parameters.prior.factor(fit.widths.prior)[asked]) * parameters.tolerance[asked]
     found = averaged(fit.theta, fit.covariance, asked, width)
     return replace(fit, at=replace(fit.at, theta=found.theta), covariance=found.covariance)
+
+
+def _run(data: StageInput) -> StageResult:
+    """Both rows; no `full` where `model_2` is rejected, or where it alone is and joint models follow."""
+    chain, description, postures = data.lab.chain, data.lab.description, data.static
+    model, findings = calibrate_geometry(chain, description, postures)
+    if any(v.verdict == "refused" for v in findings):
+        return StageResult((model,), findings)
+    full, more = calibrate_gears(chain, description, postures)
+    wrong = [v.message for v in more if v.verdict == "refused"]
+    if wrong and data.moving:
+        return StageResult((model,), (*findings, Verdict(STAGE, "warning", f"no row `full`: {'; '.join(wrong)}")))
+    return StageResult((model, full), (*findings, *(v for v in more if v not in findings)))
+
+
+GEOMETRY = Stage(STAGE, _run)

@@ -6,7 +6,7 @@ import pytest
 from calibration.evaluation.budget import budget as budget_of
 from calibration.evaluation.budget import causes
 from calibration.numerics.lie import compose
-from calibration.prediction.delivered import Delivered
+from calibration.prediction.predicted_trial import Delivered
 
 T = np.arange(0.0, 60.0, 0.01)
 SIZE = {"base": 3e-4, "joints": 4e-4, "clocks": 2e-4, "geometry": 1e-4, "noise": 1.5e-4}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import mjcf
-from calibration.checks.trial_times import holes
+from calibration.checks.recordings import holes
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import even
 from calibration.recording.holes import without_holes

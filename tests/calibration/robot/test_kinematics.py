@@ -9,7 +9,7 @@ from calibration.errors import InputError
 from calibration.numerics.lie import exp6, jexp6, jlog6, log3, log6
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of, chain_of_frames
-from calibration.robot.floating_base import floating_model
+from calibration.robot.laboratory import floating_model
 from tests.calibration.robot.test_chain import OTHER_ROBOT, other_chain
 from tests.doubles import rigid_robot
 
