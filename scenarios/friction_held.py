@@ -1,4 +1,4 @@
-"""Drive trains of the other form: backlash held by friction, a hysteretic mesh."""
+"""Drive trains of the other form: links that friction keeps inside their backlash, a hysteretic mesh."""
 
 from scenarios import load, run
 

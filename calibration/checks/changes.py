@@ -117,7 +117,7 @@ def wrong_mounts(hand: HandModel, model: Model, description: Description) -> Ite
         if over > _MOUNTED:
             message = (
                 f"body {body.name}: its markers are {1e3 * np.linalg.norm(off[:3]):.0f} mm and "
-                f"{np.degrees(np.linalg.norm(off[3:])):.1f} deg from where they are drawn on {body.link}, {over:.0f} "
+                f"{np.degrees(np.linalg.norm(off[3:])):.1f} deg from their nominal place on {body.link}, {over:.0f} "
                 "times the tolerance: correct the drawing or the placement in dataset.json"
             )
             pulled = _pulled(model, names, off, np.repeat([tol.body_translation, tol.body_rotation], 3))
@@ -153,7 +153,7 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
     if wrong.any():
         names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
         message = (
-            f"motor and link readings of {names} are exchanged: the hand is where the motor side says "
+            f"motor and link readings of {names} are exchanged: the motor readings place the hand "
             f"({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
         )
         unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~loose | (sigma >= _TOLD)))

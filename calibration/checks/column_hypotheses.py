@@ -70,7 +70,7 @@ class Shown:
         """How much later the mocap's clock is by the hand's speed of rotation [s]; NaN where q belongs to T row by row.
 
         Raises:
-            NotEnoughData: Samples are too few to tell a speed.
+            NotEnoughData: Samples are too few to estimate a speed.
         """
         return coarse_lag(self.speed, _turning(chain, self.s, reading.of(self.q))) if len(self.t) else np.nan
 

@@ -49,7 +49,7 @@ def check_columns(description: Description, chain: Chain, trials: Sequence[tuple
         trials: Of one session, where markers stay as they are, each with the file it came from.
 
     Raises:
-        InputError: It names the files, the joints and the remedy.
+        InputError: It names the files, the joints and what to do.
     """
     shown = []
     for file, trial in trials:
@@ -136,7 +136,7 @@ def _without_each(pairs: Sequence[Pairs]) -> Iterator[tuple[float, int, Frames]]
 
 
 def _judge(chain: Chain, shown: Sequence[Shown]) -> str | None:
-    """What is to be said of the readings, if anything."""
+    """The finding about the readings, if any."""
     d = _distances(chain, shown, as_declared(chain))
     if d is None or (off := float(d.mean())) < _OFF:
         return None
@@ -154,7 +154,7 @@ def _judge(chain: Chain, shown: Sequence[Shown]) -> str | None:
 
 
 def _distances(chain: Chain, shown: Sequence[Shown], reading: Reading) -> np.ndarray | None:
-    """min(|d_i|, 0.5 m) (n,) of all trials; None where they do not tell the constant frames."""
+    """min(|d_i|, 0.5 m) (n,) of all trials; None where they do not identify the constant frames."""
     try:
         pairs = [x.pairs(chain, reading, max(_FEWEST, _POSES // len(shown))) for x in shown]
         A, B = (np.concatenate(x) for x in zip(*pairs, strict=True))

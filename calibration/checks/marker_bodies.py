@@ -65,7 +65,7 @@ def wrong_scale(description: Description, trials: Sequence[Trial | PostureMeans]
         ratio = _scale(body, trials)
         if np.isfinite(ratio) and not 1.0 / _SCALE < ratio < _SCALE:
             unit = " (recorded in millimetres?)" if 500.0 < ratio < 2000.0 else ""
-            yield f"markers of body {body.name!r} are {ratio:.3g} times as far apart as dataset.json says{unit}"
+            yield f"markers of body {body.name!r} are {ratio:.3g} times as far apart as in dataset.json{unit}"
 
 
 def _scale(body: Body, trials: Sequence[Trial | PostureMeans]) -> float:

@@ -63,8 +63,8 @@ def wrong_shapes(lab: Laboratory, trials: Sequence[Trial | PostureMeans]) -> Ite
     scale, sigma = _scale([(xyz[name], e) for name, e in known.items()])
     if abs(scale - 1.0) > max(_SURE * sigma, _SCALE):
         message = (
-            f"markers are {scale:.4f} +- {sigma:.4f} times as far apart as drawn, and the robot would become as much "
-            "too large: calibrate the motion capture again (its wand), or correct the drawings"
+            f"markers are {scale:.4f} +- {sigma:.4f} times as far apart as in dataset.json, and the robot would "
+            "become as much too large: calibrate the motion capture again (its wand), or correct the drawings"
         )
         refused = abs(scale - 1.0) > _WRONG_SCALE
         yield Verdict(STAGE, "refused" if refused else "warning", message, (_grown(lab, scale - 1.0),))

@@ -1,4 +1,4 @@
-"""Motor currents whose columns are swapped or reversed, identified by what gravity asks of each joint at rest.
+"""Motor currents whose columns are swapped or reversed, identified by the gravity torque of each joint at rest.
 
     e_j = tau_j(q) / k_j + friction + constant          r_jm = correlation of e_j with tau_m over postures at rest
 
@@ -32,7 +32,7 @@ def check_currents(chain: Chain, trials: Sequence[tuple[str, Trial | PostureMean
         trials: Of one session, each with the file it came from.
 
     Raises:
-        InputError: It names the files, the joints and the remedy.
+        InputError: It names the files, the joints and what to do.
     """
     logged = [(file, t) for file, t in trials if isinstance(t, Trial) and np.isfinite(t.effort).any()]
     at_rest = [_at_rest(trial) for _, trial in logged]
@@ -67,7 +67,7 @@ def _at_rest(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _correlations(effort: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """r (k, k) of currents (n, k), by row, with torques (n, k); 0 where either tells nothing."""
+    """r (k, k) of currents (n, k), by row, with torques (n, k); 0 where either is not excited."""
     e, tau = (x - x.mean(axis=0) for x in (np.where(np.isfinite(effort).all(axis=0), effort, 0.0), torque))
     tau = np.where(np.ptp(tau, axis=0) > _LOADED, tau, 0.0)
     sizes = np.outer(np.linalg.norm(e, axis=0), np.linalg.norm(tau, axis=0))
@@ -79,11 +79,11 @@ def _findings(joints: Sequence[str], r: np.ndarray) -> Iterator[str]:
         m = int(np.argmax(np.abs(r[j])))
         if r[j, j] < _AGAINST:
             yield (
-                f"joint {name}: its motor current falls where gravity asks for more torque (correlation {r[j, j]:.2f} "
+                f"joint {name}: its motor current falls where gravity needs more torque (correlation {r[j, j]:.2f} "
                 "at rest); correct its column, or name it in `reversed_effort` if its drive counts the other way"
             )
         elif m != j and abs(r[j, m]) > _FOLLOWS and r[j, j] < _OWN:
             yield (
-                f"joint {name}: its motor current follows what gravity asks of {joints[m]} (correlation {r[j, m]:.2f} "
+                f"joint {name}: its motor current follows the gravity torque of {joints[m]} (correlation {r[j, m]:.2f} "
                 f"at rest), not of itself ({r[j, j]:.2f}); the columns are swapped: correct the mapping file"
             )

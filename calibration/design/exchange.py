@@ -1,4 +1,4 @@
-"""Choosing the postures that tell most: greedily one after another, then exchanging one for a better one while any is.
+"""The most informative postures: chosen one after another, then one exchanged for a better one while any is.
 
     D   least volume of what is left,  log det C
     E   least variance of the worst direction,  the largest eigenvalue of C        (in units of the tolerances)

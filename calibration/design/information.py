@@ -1,11 +1,11 @@
-"""What postures tell before they are recorded.
+"""Information of postures before they are recorded.
 
     theta = nominal + T (V x + rest),      T = diag(tolerance),   x ~ N(0, I) beforehand
     x | postures ~ N(., C),    C = (I + sum_i B_i' B_i)^-1,    B_i = W_i J_i T V
 
-W_i whitens the posture's noise: markers, and each joint's play along its lever arms. V spans what the candidates tell
-at all (singular values above a cliff); `rest`, the gauge, no posture tells, and it does not move the hand.
-The hand's position at posture e then has the standard deviation sqrt(trace(P_e C P_e')), P_e = J_e T V: what
+W_i whitens the posture's noise: markers, and each joint's play along its lever arms. V spans what the candidates
+identify at all (singular values above a cliff); `rest`, the gauge, no posture identifies, and it does not move the
+hand. The hand's position at posture e then has the standard deviation sqrt(trace(P_e C P_e')), P_e = J_e T V: what
 calibration leaves, the joints' own random errors apart. With nuisances z (`departures`) it is the root of
 
     trace(P_e C P_e') + |P_e C m - Z_e|^2,     m = sum_i B_i' H_i,     H_i = W_i G_i,  Z_e = G_e for the position
@@ -13,7 +13,7 @@ calibration leaves, the joints' own random errors apart. With nuisances z (`depa
 since a fit that does not ask for z is off by C m z.
 Reference: Pukelsheim, Optimal Design of Experiments, 2006.
 
-What a robot does that its calibration does not ask for, as nuisances z ~ N(0, I) with widths a datasheet gives.
+What a robot does that its calibration does not ask for, as nuisances z ~ N(0, I) with widths of a datasheet.
 
     placement of joint j    turned by  b_j M_j z        bending under the moment M_j across its axis
 
@@ -44,7 +44,7 @@ class Prospect:
 
     Attributes:
         q: (n, n_measured) candidates [rad, m].
-        B: (n, d, r) what each would tell [-].
+        B: (n, d, r) information of each [-].
         P: (e, 3, r) hand position at other postures, by x [m].
         V: (p, r) directions of the scaled parameters.
         scale: (p,) tolerances [m, rad].
@@ -141,7 +141,7 @@ def dwell_noise(T: np.ndarray, description: Description) -> np.ndarray:
 
 
 def told_directions(A: np.ndarray) -> np.ndarray:
-    """V (p, r): what whitened, scaled derivatives A (n, d, p) tell at all."""
+    """V (p, r): what whitened, scaled derivatives A (n, d, p) identify at all."""
     _, s, Vt = np.linalg.svd(np.linalg.qr(A.reshape(-1, A.shape[2]), mode="r"))
     return np.asarray(Vt[: int((s > _CLIFF * s[0]).sum())].T)
 

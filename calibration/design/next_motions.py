@@ -1,10 +1,10 @@
 """The spin or drive that observes what of a base frame is fixed at nominal.
 
-What it would tell is what the stage itself says of the recorded rests and the suggested ones, those without noise but
+Its gain is what the stage itself reports of the recorded rests and the suggested ones, those without noise but
 with the recorded ones' covariance: a drive that goes straight, a base that turns where it turned. How high the base is
-over its markers no motion tells.
+over its markers no motion identifies.
 
-The sweep that would tell a rho whose search ended at a limit.
+The sweep that would identify a rho whose search ended at a limit.
 
 At the highest limit the flanks change faster than the readings show: sweep so slowly that the joint passes speeds of
 1 / rho in many readings. At the lowest its speeds hardly choose a flank: sweep fast. The standard deviation after is
@@ -13,9 +13,10 @@ a quarter of a period where that is shorter:
 
     J = [dM/drho x, M],   M = [S, 1 - S],   S = 1 / (1 + exp(-rho dq)),   dq = 2 pi f a cos(2 pi f t)
 
-x the flanks at the middle of the model's domain. Flanks that lie together tell no rho at any speed: no sweep is named.
+x the flanks at the middle of the model's domain. Flanks that lie together identify no rho at any speed: no sweep is
+named.
 
-How many more swings would tell elements of a suspension that the recorded ones leave open; and which none would.
+How many more swings would identify elements of a suspension that the recorded ones leave open; and which none would.
 
 An element's standard deviation is the jackknife's over n trials. With m more trials like them it is
 
@@ -165,7 +166,7 @@ def sweep(model: JointModel) -> Motion:
 
 
 def predicted_sigma(model: JointModel, motion: Motion) -> float:
-    """Standard deviation of rho after a sweep [s/rad]; infinite where it would tell nothing."""
+    """Standard deviation of rho after a sweep [s/rad]; infinite where it would not identify it."""
     t = np.arange(0.0, motion.seconds, _EVERY)
     w = 2.0 * np.pi * motion.frequency
     v = w * motion.amplitude * np.cos(w * t)

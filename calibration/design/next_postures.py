@@ -1,4 +1,4 @@
-"""The five postures (more, where more are lacking) that would tell most of what the recorded ones leave to tolerances.
+"""The five postures (more, where more are lacking) that identify most of what the recorded ones leave to tolerances.
 
     C before = T^-1 Sigma T^-1,     Sigma the covariance of the fit, T = diag(tolerance)        (see `information`)
     C after  = (C^-1 + sum_5 B' B)^-1
@@ -14,8 +14,8 @@ How large the readings' random errors are believed to be where a fit must not be
     believed s^2 = s_datasheet^2 sum_l lambda_l^2 p(data | lambda_l) / sum_l p(data | lambda_l)
 
 A datasheet says what play is tolerated, not what there is. p(data | lambda) is the evidence, parameters integrated out
-at their tolerances (`evidence`): few postures tell little and leave a third of the datasheet's play (the root mean
-square of a log-uniform factor), more of them tell, and data that fit no robot ask for all of it.
+at their tolerances (`evidence`): few postures identify little and leave a third of the datasheet's play (the root mean
+square of a log-uniform factor), more of them identify it, and data that fit no robot need all of it.
 """
 
 from dataclasses import dataclass, replace
@@ -56,7 +56,7 @@ _POINTS = 21
 
 @dataclass(frozen=True)
 class Known:
-    """What recorded postures tell of a geometry.
+    """What recorded postures identify of a geometry.
 
     Attributes:
         hand: The robot as far as it is known.
@@ -64,7 +64,7 @@ class Known:
         reading_sigma: (k,) random error of each joint's reading [rad, m].
         description: With the marker noise the recorded postures had.
         C: (p, p) covariance of the scaled parameters.
-        unobserved: Number of directions that postures could tell and these did not.
+        unobserved: Number of directions that postures could identify and these did not.
     """
 
     hand: HandModel
@@ -78,7 +78,7 @@ class Known:
 def record_next(
     urdf: str, chain: Chain, description: Description, postures: Postures, model: Model, refused: bool
 ) -> tuple[ExperimentPlan | None, tuple[Verdict, ...]]:
-    """Postures to record after the geometry `model` from `postures`; None where they would tell nothing new."""
+    """Postures to record after the geometry `model` from `postures`; None where they would identify nothing new."""
     rng = np.random.default_rng(_SEED)
     known = _known(chain, description, postures, model, refused, rng)
     lost = tuple(
@@ -149,7 +149,7 @@ def _as_measured(description: Description, postures: Postures) -> Description:
 
 
 def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> ExperimentPlan:
-    """The postures with what they do to the hand, to what was lost, and to what they tell most."""
+    """The postures with what they do to the hand, to what was lost, and to what they identify best."""
     hand = [float(found.design.prospect.hand(C).max()) for C in (found.design.prospect.C, found.design.C)]
     whole = found.remedy(STAGE, "").sigma
     most = sorted((s for s in whole if s.after < _FALLS * s.before), key=lambda s: s.after / s.before)[:_NAMED]

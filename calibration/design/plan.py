@@ -58,7 +58,7 @@ class Task:
     work: Sample | None = None
 
     def prospect(self, q: np.ndarray, at: np.ndarray) -> Prospect:
-        """What candidates q tell of the hand at other postures."""
+        """What candidates q identify of the hand at other postures."""
         expected = prospect(self.model, self.parameters, self.room.description, self.reading_sigma, q, at, self.known)
         if self.departures is None:
             return expected
@@ -185,7 +185,7 @@ def search(
     rng: np.random.Generator,
     work: Sample | None = None,
 ) -> Design:
-    """Choose n postures in a room; `prospect_at(q, at)` says what candidates tell of the hand at other postures.
+    """Choose n postures in a room; `prospect_at(q, at)` is what candidates identify of the hand at other postures.
 
     Those are sampled by `work`, anywhere in the room where it is not given; candidates from both.
 

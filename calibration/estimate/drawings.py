@@ -39,7 +39,7 @@ def redrawn(estimate: Estimate, description: Description) -> tuple[Estimate, tup
         size = to_vector(X)
         if np.abs(size).max() <= _SAME and misfit <= _SAME:
             continue
-        message = f"body {new.name} is drawn otherwise than in the calibration's dataset.json"
+        message = f"body {new.name} has other marker coordinates than in the calibration's dataset.json"
         if misfit > description.tolerances.body_translation:
             message = f"{message}, its markers by {1e3 * misfit:.1f} mm rms: another cluster? calibrate with this one"
         else:

@@ -285,6 +285,6 @@ def check_order(mapping: MappingFile, trials: Sequence[Trial | PostureMeans]) ->
             if start <= stop:
                 raise mapping.error(
                     "trials",
-                    f"{a} and {b} overlap in time on the {clock} clock: their files do not say when they began; "
+                    f"{a} and {b} overlap in time on the {clock} clock: their files do not contain when they began; "
                     "give each a `start` [s]",
                 )

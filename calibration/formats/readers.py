@@ -41,4 +41,4 @@ def _reader_of(kind: str, mapping: MappingFile) -> Reader:
         return c3d_reader(content.c3d, content.setup)
     if kind == "bag" and content.bag is not None:
         return bag_reader(content.bag)
-    raise mapping.error(kind, "missing; say what is what in the files")
+    raise mapping.error(kind, "missing; state the channels of the files")

@@ -1,4 +1,4 @@
-"""What the data can tell: rank, and the combinations of parameters that are identified.
+"""What the data identify: rank, and the combinations of parameters that are identified.
 
 The whitened Jacobian, its columns divided by their scale, has rank m where its singular values fall off a cliff.
 Columns are scanned in one fixed order (zeros of readings, hand, base, then joints base to tip), for those far from the
@@ -26,7 +26,7 @@ _ALONE = 1e-2  # share of a parameter in the null space below which the data fix
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What a set of postures tells about a set of parameters.
+    """What a set of postures identifies of a set of parameters.
 
     Attributes:
         rank: Number of identifiable combinations.

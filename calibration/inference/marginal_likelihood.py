@@ -5,7 +5,7 @@
 
 theta is integrated out. Each source of noise b_m (n, d) has the variance v of its group: one of a joint's reading, of
 the hand's position, of its rotation, of the markers. Variances take Fisher scoring steps down to a floor, prior
-factors f MacKay's fixed point, held near 1 as by `_HELD` parameters that deviate by exactly their tolerance.
+factors f MacKay's fixed point, kept near 1 as by `_HELD` parameters that deviate by exactly their tolerance.
 References: MacKay, Neural Computation 1992; Patterson, Thompson, Biometrika 1971 (restricted likelihood).
 """
 
@@ -54,7 +54,7 @@ def moved_by(old: np.ndarray, new: np.ndarray, least: np.ndarray | float) -> flo
 
 
 def _scored(now: LogMarginal, floor: np.ndarray, free: np.ndarray, s: np.ndarray, damping: float) -> np.ndarray:
-    """Standard deviations after one Fisher scoring step of the variances that are free and not held at their floor."""
+    """Standard deviations after one Fisher scoring step of the variances that are free and not at their floor."""
     v, low = s**2, floor**2
     free = free & ~((v <= low * 1.0000001) & (now.slope > 0.0))
     if not free.any():

@@ -5,9 +5,9 @@
     theta = sum_m w_m theta_m,     covariance = sum_m w_m (covariance_m + (theta_m - theta) (theta_m - theta)')
 
 theta_m and covariance_m are the Gaussian posterior of all parameters given those zeros. A parameter the data do not
-need costs nothing then, one they need stays, and where they cannot tell, both are averaged, by their evidence. Every
-number of zeros is equally likely beforehand, and every set of that number: a share of parameters that are needed, of
-which nothing is known, is integrated out, so that seven that are zero speak against the eighth.
+need costs nothing then, one they need stays, and where the data do not decide, both are averaged, by their evidence.
+Every number of zeros is equally likely beforehand, and every set of that number: a share of parameters that are needed,
+of which nothing is known, is integrated out, so that seven that are zero are evidence against the eighth.
 References: Dickey, Ann. Math. Stat. 1971 (density ratio); Hoeting et al., Statistical Science 1999 (averaging);
 Scott, Berger, Annals of Statistics 2010 (the prior of sets).
 
@@ -18,7 +18,7 @@ How strongly the data of a fit ask for parameters it does not have.
 
 H (m, h) are whitened derivatives by the new parameters times their prior widths, A those by the fitted ones, C the
 fit's covariance: z is judged after theta has taken what it can. The random errors' sizes stay what they are without z,
-so that what they had to swallow speaks against z: the factor is a lower one.
+so that what they had to absorb is evidence against z: the factor is a lower one.
 Reference: Kass, Raftery, JASA 1995.
 """
 

@@ -4,7 +4,7 @@
 
 (R_i, p_i) is the tool's nominal pose, y_i the measured origin of the hand's body, t its place in the tool, (X, x) the
 laboratory in the robot's base: linear in all 15 unknowns while X is any matrix. Its determinant is the cube of the
-scale between robot and laboratory and tells wrong units and mirrored axes; its nearest rotation is the start of a fit.
+scale between robot and laboratory and shows wrong units and mirrored axes; its nearest rotation is the start of a fit.
 """
 
 from dataclasses import dataclass

@@ -19,7 +19,7 @@ A hand seen as a point: a body of one or two markers, whose mean is a place and 
     p = t + R c         c the markers' mean in the body's frame [m], (R, t) the body's pose
     dp = R (v - [c]x w)  of a local twist (v, w)
 
-Its turns are not seen. What they do to the geometry is: 33 of the 36 combinations that poses tell, see `tests`.
+Its turns are not seen. What they do to the geometry is: 33 of the 36 combinations that poses identify, see `tests`.
 """
 
 import numpy as np

@@ -16,7 +16,7 @@ uncertain: standard deviations are Student's, so that 1.96 of them hold 95 %, wi
 
     nu = (sum_g v_g)^2 / sum_g v_g^2,    v_g = (H^-1 H_g H^-1)_jj
 
-degrees of freedom. Give samples at the Nyquist rate of whatever low-passed them; more tell nothing.
+degrees of freedom. Give samples at the Nyquist rate of whatever low-passed them; more add nothing.
 References: Bell, McCaffrey, Survey Methodology 2002; Geyer, Statistical Science 1992; Carlstein, Ann. Stat. 1986.
 
 Intervals where a variance is summed from few parts, each of them uncertain.

@@ -98,7 +98,7 @@ class Compensator:
     def of(cls, estimate: Estimate, payload: float | None = None) -> "Compensator":
         """The main model of an estimate that knows its robot."""
         if estimate.urdf is None or estimate.robot is None:
-            raise NotCalibrated(["it does not say which robot it is about"])
+            raise NotCalibrated(["it does not name its robot"])
         robot, laboratory = estimate.robot, estimate.laboratory
         frames = robot.base_frame, robot.tool_frame
         described = () if laboratory is None else (laboratory.payload, laboratory.gravity)

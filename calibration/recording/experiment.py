@@ -1,4 +1,4 @@
-"""What to record: postures and motions, with what they would tell, as a YAML file.
+"""What to record: postures and motions, with what they would identify, as a YAML file.
 
 schema: 1
 joints: [torso_lift_joint, arm_1_joint, ...]           columns of q and approach
@@ -74,7 +74,7 @@ class Sigma:
 
 @dataclass(frozen=True, config=_STRICT)
 class ExperimentPlan:
-    """What to record for one purpose, and what it would tell."""
+    """What to record for one purpose, and what it would identify."""
 
     stage: str
     why: str
@@ -100,7 +100,7 @@ def plans_text(joints: Sequence[str], remedies: Sequence[ExperimentPlan]) -> str
 
 
 def _plain(value: Any) -> Any:
-    """Lists for tuples; a remedy's or motion's fields that say nothing left out."""
+    """Lists for tuples; a remedy's or motion's empty fields left out."""
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items() if v not in ((), "") and not (k != "approach" and v == 0)}
     return [_plain(v) for v in value] if isinstance(value, tuple | list) else value

@@ -6,7 +6,7 @@
     gear.<joint>.compliance       reading = angle + ... + compliance * gravity torque [rad/(N.m), m/N]
     backlash.<joint>.gap          reading = angle + ... + gap / 2 * tanh(gravity torque / tau_0) [rad, m]
 
-A joint's offset and the twist along its axis move the hand alike: the data speak of their combination, their
+A joint's offset and the twist along its axis move the hand alike: the data identify their combination, their
 tolerances divide it. Derivatives are local twists of the hand:
 
     d/d(T_tool_H)   L(T_tool_H)                        d/d(xi)      J_frame Jexp6(xi)

@@ -5,7 +5,7 @@
     S = J Sigma J' + J_joint diag(s^2) J_joint' + diag(hand^2) + Ad diag(base) Ad' + diag(marker body)
 
 Sigma is the parameters' covariance, s and hand the random errors of readings and hand. The last two terms are a day's:
-between sessions base and marker body are not where they were, by what nothing inside one session can tell.
+between sessions base and marker body are not where they were, by what nothing inside one session can show.
 The radius that holds 95 % of |e| is that of a gamma distribution with the mean and variance of |e|^2.
 Reference: Satterthwaite, Biometrics Bulletin 1946.
 """

@@ -4,7 +4,7 @@
 
 f, tau: ACTION of what hangs there on the sensor, its axes, about its origin; w its weight [N, base], m its mass [kg], c
 its centre [m], f_0 the sensor's zero, tau_0' = tau_0 - c x f_0. E turns the sensor by the little that its axes are off:
-the hand's markers tell R_base_sensor up to a constant on either side. w, E and f_0 by Gauss-Newton, c linearly;
+the hand's markers identify R_base_sensor up to a constant on either side. w, E and f_0 by Gauss-Newton, c linearly;
 standard deviations from the residuals, those of a posture together. A base out of level turns w and not m. A gain of
 the sensor's passes for mass: a sensor that is 1 % off weighs 1 % wrong.
 Nominal: all nominal links beyond the sensor, and the declared payload where it hangs there.
@@ -191,7 +191,7 @@ def weighed(
         return ()
     description, link = lab.description, lab.description.wrist_link
     if link is None:
-        return (Verdict(_STAGE, "missing", "wrist_wrench is recorded, but wrist_link does not say where: not used"),)
+        return (Verdict(_STAGE, "missing", "wrist_wrench is recorded, but wrist_link does not name where: not used"),)
     w = _means(recorded, robot)
     rows = [k for k, label in enumerate(postures.label) if label in w and postures.components == 6]
     if not rows:

@@ -156,7 +156,7 @@ def calibrate(
     console.show(console.verdicts(estimate.verdicts))
     typer.echo(f"\nStatus: {estimate.extent}\nEstimate: {out}")
     if not estimate.calibrated:
-        typer.echo("The estimate must not be used; the refused verdicts say why.", err=True)
+        typer.echo("The estimate must not be used; the refused verdicts state why.", err=True)
         raise typer.Exit(FAILED)
 
 

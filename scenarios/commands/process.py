@@ -29,7 +29,7 @@ def process(
         typer.echo("\nNo validation trial: the error is the cross-validated one above; keep trials aside for another.")
     typer.echo(f"\nStatus: {found.estimate.extent}\nReport: {out / 'report.html'}\nEstimate: {out / 'estimate'}")
     if not found.estimate.calibrated:
-        typer.echo("The estimate must not be used; the refused verdicts say why.", err=True)
+        typer.echo("The estimate must not be used; the refused verdicts state why.", err=True)
         raise typer.Exit(FAILED)
 
 

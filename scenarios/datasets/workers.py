@@ -82,7 +82,7 @@ class Done:
 
 
 def compute(orders: Iterable[Order], workers: Workers, task: Task = perform) -> Iterator[Done]:
-    """Yield each run as it ends, the first before any other starts: it tells what the others will cost.
+    """Yield each run as it ends, the first before any other starts: it shows what the others will cost.
 
     Args:
         orders: What to make.

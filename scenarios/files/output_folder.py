@@ -4,7 +4,7 @@
 
 Entries are moved in one by one, results last, so that a folder between two states lacks the file by which it is read.
 `moving.json` lists them before the first is moved: what a killed command left is completed by the next one, or removed
-where it was not complete. A work folder is locked while its process lives, so that a second command is told. What a
+where it was not complete. A work folder is locked while its process lives, so that a second command is refused. What a
 user put into a folder stays; only folders of this program are replaced; links are moved, never followed.
 """
 

@@ -127,7 +127,7 @@ def _shown(value: Any) -> str:
 
 
 def _fields(adapter: TypeAdapter[Any], values: Any, above: Sequence[str], path: Sequence[str]) -> list[str]:
-    """Return the field names possible in the mapping at `path`, as far as the types tell."""
+    """Return the field names possible in the mapping at `path`, as far as the types show."""
     try:
         root = _schema(adapter)
     except PydanticInvalidForJsonSchema:

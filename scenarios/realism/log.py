@@ -1,4 +1,4 @@
-"""What a recording tells of a base on its wheels: the wrench on the floor, and the displacement that went with it.
+"""What a recording shows of a base on its wheels: the wrench on the floor, and the displacement that went with it.
 
 Both in frame 0 (`calibration.suspension_rest`), about its origin. The wrench is low-passed at 20 Hz, since what slips
 slips in peaks, the displacement at 10 Hz. At rest a robot pulls the floor neither sideways nor about the vertical: what
@@ -22,8 +22,8 @@ from calibration.recording import Clock, Dataset, Description, Trial
 from calibration.stages.suspension import Rest, base_response_of, plate_load, rest_of
 
 REST = slice(100, 150)
-"""Samples of a trial's rest that displacements are told from: of the log's second second, since its markers step by
-0.3 mrad within the first while the plate feels nothing."""
+"""Samples of a trial's rest that displacements are taken from: of the log's second second, since its markers step by
+0.3 mrad within the first while the plate measures nothing."""
 
 _WRENCH = 20.0  # [Hz]
 _LEVEL = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])  # what of a resting wrench a floor can feel

@@ -102,7 +102,7 @@ def floor_of(config: TwinConfig, seed: int, condition: Condition, weight: float)
 def replayed(config: TwinConfig, seed: int, trial: Recorded, condition: Condition = AS_DRAWN) -> np.ndarray:
     """What one sampled robot's base does under a trial's wrench, as motion capture would see it (n, 6) [m, rad].
 
-    The plate's errors are sampled too: what it read is not what it felt.
+    The plate's errors are sampled too: what it read is not the wrench on it.
 
     Raises:
         Diverged: The simulation left the numbers.

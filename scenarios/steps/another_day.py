@@ -69,7 +69,7 @@ def predict(  # noqa: PLR0913  an option each
     if not known.calibrated:
         raise NotCalibrated([v.message for v in known.verdicts if v.verdict == "refused"])
     if known.laboratory is None:
-        raise ScenarioError(f"{estimate}: does not say in which laboratory it was found; calibrate again")
+        raise ScenarioError(f"{estimate}: does not contain its laboratory; calibrate again")
     with folder.replacing(out, SESSION) as new, one_blas_thread():
         dataset = new / "dataset"
         notes = import_files(None, files, mapping, dataset, later=known.laboratory, progress=progress)

@@ -111,7 +111,7 @@ def recording_too(scenario: "Scenario", file: Path) -> "Scenario":
     if joints != JOINTS:
         raise ScenarioError(f"{file}: joints are {list(joints)}; the twin has {list(JOINTS)}")
     if not asked:
-        raise ScenarioError(f"{file}: asks for no posture; motions are recorded by hand, see its `motions`")
+        raise ScenarioError(f"{file}: contains no posture; motions are recorded by hand, see its `motions`")
     campaign = scenario.twin.campaign
     own = schedule(replace(campaign, only=("postures",)), mjcf.model(), scenario.seed)[0]
     rests = [tuple(map(float, own.command[round(stop * RATE)])) for _, stop in own.dwells]

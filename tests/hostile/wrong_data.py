@@ -53,8 +53,8 @@ class Mistake:
 
 SLIPPED = "elsewhere|slipped|drift|off in scale|late|moved|contradict|did not converge|refused"
 FAST = (
-    Mistake("markers 1 % too large", scaled(1.01), "times as far apart as drawn", judged=True),
-    Mistake("markers 5 % too large", scaled(1.05), "times as far apart as drawn", judged=True),
+    Mistake("markers 1 % too large", scaled(1.01), "times as far apart as in dataset.json", judged=True),
+    Mistake("markers 5 % too large", scaled(1.05), "times as far apart as in dataset.json", judged=True),
     Mistake(
         "a hand marker drawn 50 mm off", drawn_off("gripper", [0.0, 0.05, 0.0], 1), "from its drawing", judged=True
     ),
@@ -92,7 +92,7 @@ TABLE = (
 
 VALIDATION = (
     Mistake("validation in millimetres", scaled(1000.0, "validation"), "in millimetres"),
-    Mistake("validation 1 % too large", scaled(1.01, "validation"), "times as far apart as drawn"),
+    Mistake("validation 1 % too large", scaled(1.01, "validation"), "times as far apart as in dataset.json"),
     Mistake("validation in a mirror", scaled(-1.0, "validation"), "as in a mirror"),
     Mistake("validation 0.3 s late", late(0.3, -1.0, "validation"), "readings are late"),
     Mistake("validation 30 ms late", late(0.03, -1.0, "validation"), "readings are late"),

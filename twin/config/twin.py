@@ -148,7 +148,7 @@ class RobotConfig:
         """Friction that would hold nothing."""
         if self.gear_form == "dead_zone" and self.friction_held != FRICTION_HELD:
             error = PydanticCustomError(
-                "unused", "nothing is held where gear_form is dead_zone; set it to friction_held"
+                "unused", "gear_form dead_zone has no friction_held; set gear_form to friction_held"
             )
             yield InitErrorDetails(type=error, loc=("friction_held",), input=self.friction_held)
 

@@ -90,7 +90,7 @@ def _on_plate(inputs: RolloutInputs, motion: Motion, T_lab_base: np.ndarray) -> 
             left = (np.abs(p_plate) > half).any(axis=1)
             _refuse(left, f"{name.removesuffix(_WHEEL)} is off the plate", motion, _EVERY * model.opt.timestep)
             on_seam = (np.abs(p_plate[:, None] - _seams(model)) < _SEAM).any(axis=(1, 2))
-            what = f"{name.removesuffix(_WHEEL)} stands on a seam of plate_grid and would touch both plates"
+            what = f"{name.removesuffix(_WHEEL)} is on a seam of plate_grid and would touch both plates"
             _refuse(on_seam, what, motion, _EVERY * model.opt.timestep)
 
 

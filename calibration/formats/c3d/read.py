@@ -1,6 +1,6 @@
 """Force plates of a C3D file, as ACTION, lab axes, about the surface centre the setup declares.
 
-What the file says of a plate is taken from it and held against the setup; whose wrench it stores is the mapping's.
+What the file states of a plate is taken from it and compared with the setup; whose wrench it stores is the mapping's.
 
 A C3D file as markers and plates, in SI units, the plates as ACTION, lab axes, about the setup's surface centre.
 
@@ -93,7 +93,7 @@ def _moment_unit(file: C3dFile, chosen: np.ndarray, mapped: C3dPlateMap, kind: i
     if len(moments | declared) != 1 or (kind == 2 and not forces and not declared):
         raise InputError(
             file.path,
-            f"plate {mapped.number}: ANALOG:UNITS say {sorted(stated) or 'nothing'} and the mapping "
+            f"plate {mapped.number}: ANALOG:UNITS are {sorted(stated) or 'nothing'} and the mapping "
             f"{mapped.moment_unit or 'nothing'} of its moments; map the right `moment_unit`",
         )
     return MOMENTS[(moments | declared).pop()]

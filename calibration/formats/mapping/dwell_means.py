@@ -1,4 +1,4 @@
-"""A recording of a hand that shows a point only, as the means over its rests: there is no turn to tell a clock from.
+"""A recording of a hand that shows a point only, as the means over its rests: no rotation identifies a clock.
 
     q = mean of the readings,  p = mean of the markers,  std^2 = mean over rests of var(quarter means) / 4
 
@@ -36,7 +36,7 @@ def rests_of(mapping: MappingFile, trial: MappedTrial, recorded: Recorded) -> Re
         what = "is used at rest only; declare it `static` with `dwells`, or put three markers on the hand"
         raise InputError(recorded.file, f"{few} {what}")
     if "robot" not in {*recorded.together, *mapping.content.setup.mocap_clock}:
-        what = "shows no turn to tell the readings' clock from; sample both together, or put three markers on the hand"
+        what = "shows no rotation that identifies the clock; sample both together, or put three markers on the hand"
         raise InputError(recorded.file, f"{few} {what}")
     return replace(recorded, markers=None, joints=None, plates=None, dwells=None, means=_means(joints, markers, dwells))
 

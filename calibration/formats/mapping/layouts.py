@@ -20,7 +20,8 @@ class PlateChannels(Declaration):
         force: Fx, Fy, Fz.
         moment: Mx, My, Mz.
         cop: Centre of pressure x, y, z, against which the convention is checked; may be left out.
-        reversed: Those of `force` whose sign is opposite to that of the others; a centre of pressure feels Fz alone.
+        reversed: Those of `force` whose sign is opposite to that of the others; a centre of pressure depends on Fz
+        alone.
         convention: Whose wrench: `action` of the robot on the plate, or the plate's `reaction`.
         axes: `lab`, or `plate`: those declared for the plate.
         about: Point of the moments: the plate's surface `centre`, or the `lab` origin.
@@ -252,7 +253,7 @@ class BagLayout(Declaration):
     @model_validator(mode="after")
     def _wrist_says_whose(self) -> "BagLayout":
         if (self.wrist is None) != (self.wrist_convention is None):
-            raise ValueError("give `wrist` and `wrist_convention` together: no bag says whose wrench it holds")
+            raise ValueError("give `wrist` and `wrist_convention` together: no bag contains whose wrench it is")
         return self
 
     @property

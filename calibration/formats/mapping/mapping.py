@@ -74,7 +74,7 @@ class MappedBody(Declaration):
             raise ValueError(f"body {self.name}: markers are drawn, so it is neither undrawn, standing nor fitted")
         if (self.undrawn or self.fitted or self.standing) and self.fitted == (self.standing is not None):
             raise ValueError(
-                f"body {self.name}: say how it is placed: `markers` with xyz, `standing`, or `fitted: true`"
+                f"body {self.name}: state how it is placed: `markers` with xyz, `standing`, or `fitted: true`"
             )
         return self
 

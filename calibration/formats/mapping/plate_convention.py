@@ -5,7 +5,7 @@ With the ACTION of the robot on the plate (f, m), lab axes z up, about the surfa
     CoP = c + (-m_y / f_z, m_x / f_z)
 
 which does not change when action and reaction are exchanged: that is shown by the sign of f_z, since a robot presses
-down. So a file with CoP columns tells its own convention. It is not trusted over the mapping, nor the mapping over it:
+down. So a file with CoP columns shows its own convention. It is not trusted over the mapping, nor the mapping over it:
 when they contradict each other, both are reported and nothing is imported.
 """
 

@@ -11,7 +11,7 @@ all, is the clock's. Sweeps wind little and are recorded first, swings that fold
 taken for drift. What all trials share is added at the end. A trial far off the median line is left out and named.
 Times are centred before the line is fitted.
 
-How late an instrument shows a motion, alike in all trials, where no recording can tell it from its clock.
+How late an instrument shows a motion, alike in all trials, where no recording can separate it from its clock.
 
 Robot: a link is late behind viscous friction c on a mesh of stiffness k by c / k, and where dry friction f winds the
 mesh by f / k over the speed,
@@ -57,7 +57,7 @@ class TrialLag:
         s: Time on the instrument's clock [s] at which lag and drift are uncorrelated.
         lag: At s.
         drift: Within the trial [-].
-        drift_sigma: Its standard deviation [-]; infinite where the trial alone does not tell.
+        drift_sigma: Its standard deviation [-]; infinite where the trial alone does not identify it.
         duration: Of the trial [s].
         wound: Mean lateness that the fit laid to gears wound by friction, not in the lag [s].
         unseen: What the fit would lay to the lag of a winding by 0.1 mrad in all loaded joints [s].
@@ -86,8 +86,8 @@ def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> t
     """
     if not trials:
         raise NotEnoughData(
-            f"no calibration trial tells the {instrument} clock from the motion-capture clock: record one with 10 s "
-            "of arm motion"
+            f"no calibration trial identifies the {instrument} clock from the motion-capture clock: record one with "
+            "10 s of arm motion"
         )
     s = np.array([t.s for t in trials])
     lag = np.array([t.lag.value for t in trials])

@@ -5,10 +5,10 @@
 
 for r and S without their parts in U. A hundred nuisances follow a move's residuals as they follow its motion: within a
 block g of some seconds, about a move, e_g is short of the noise by 1 - H_gg, H the projector onto U and S, and just so
-in the directions that tell the clock. Dividing by its root gives the noise its size back; a count of degrees of freedom
-alone, alike for all directions, leaves a drift from 20 moves a quarter short. Residuals stay alike for `MEMORY`; the
-coefficients b, each a block of its own, are independent. A variance summed from few blocks is itself uncertain:
-standard deviations are Student's, so that 1.96 of them hold 95 %,
+in the directions that identify the clock. Dividing by its root gives the noise its size back; a count of degrees of
+freedom alone, alike for all directions, leaves a drift from 20 moves a quarter short. Residuals stay alike for
+`MEMORY`; the coefficients b, each a block of its own, are independent. A variance summed from few blocks is itself
+uncertain: standard deviations are Student's, so that 1.96 of them hold 95 %,
 
     nu = (sum_g v_g)^2 / sum_g v_g^2,   v_g = |(S'S)^-1 S_g'|^2 of the block
 

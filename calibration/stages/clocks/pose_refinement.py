@@ -1,14 +1,15 @@
-"""The robot's clock once more, from whole poses, a provisional geometry and the joints that gravity holds.
+"""The robot's clock once more, from whole poses, a provisional geometry and the joints preloaded by gravity.
 
     r(t) = log6(T_measured(t)^-1 T_B_H(q(t - lag)))
          = (lag + drift (t - t0)) sum_held J_j dq_j + sum_others d_j J_j dq_j + J_theta e + noise
            + sum_held J_j (o_j+- + a_j q_j + b_j tau_j + h_jw lost_w(q_j))
 
 Behind a gear the link is not where the motor is, and a gear without load lags by 4 gap / (pi amplitude omega): ten
-milliseconds and more. So a joint speaks of the clock only while its gravity torque tau_j keeps it on a flank; zeros of
-either flank, elasticity and dry friction (two narrow play operators, weights of 1) are its nuisances. Otherwise it has
-a lag of its own and random errors as large as any gear's. e are the errors of the provisional geometry, as large as its
-fit says. The remaining noise is the markers' and each joint's random reading error, by its lever arm.
+milliseconds and more. So a joint is evidence of the clock only while its gravity torque tau_j keeps it on a flank;
+zeros of either flank, elasticity and dry friction (two narrow play operators, weights of 1) are its nuisances.
+Otherwise it has a lag of its own and random errors as large as any gear's. e are the errors of the provisional
+geometry, as large as its fit says. The remaining noise is the markers' and each joint's random reading error, by its
+lever arm.
 """
 
 import logging
@@ -156,7 +157,7 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
 
 
 def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """Median (k,) of each joint's held readings (n, k); of all of them where it is never held."""
+    """Median (k,) of each joint's preloaded readings (n, k); of all of them where it never is."""
     return np.nanmedian(np.where(held | ~held.any(axis=0), q, np.nan), axis=0)
 
 

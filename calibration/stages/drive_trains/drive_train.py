@@ -73,7 +73,7 @@ class DriveTrain:
         start: Share of [D(tau - f_c), D(tau + f_c)] at which trials start, mean and standard deviation [-].
         torque_sigma: Standard deviation of the torque at which the side changes [N.m].
         residual: Rms that trials left out kept of what the model explains [rad].
-        inertials: (p,) masses and first moments, less the nominal ones, that this joint's load speaks for, in the order
+        inertials: (p,) masses and first moments, less the nominal ones, that this joint's load identifies, in the order
             of `torques.inertials` [kg, kg.m]; empty: nominal.
         parameters: What is reported, with standard deviations.
     """

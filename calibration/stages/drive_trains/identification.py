@@ -169,7 +169,7 @@ def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
 
 
 def _continued(steady: SteadyContact, problem: Problem) -> Candidate:
-    """Where steady contact does not tell friction from the gap: other windows, too, and how far they move it."""
+    """Where steady contact does not separate friction from the gap: other windows, too, and how far they move it."""
     fit = fit_train(steady.continued(problem), steady.theta, _FINE)
     moved = np.append(fit.theta - steady.theta, fit.gamma - steady.gamma)
     return replace(judged(fit, problem), covariance=steady.covariance + np.outer(moved, moved))

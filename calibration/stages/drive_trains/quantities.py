@@ -2,7 +2,7 @@
 
 A parameter is estimated where the trials narrow it: its standard deviation is below half of its prior's, or a third of
 its value. The others are what friction, load and motion of the trials do not show, each with the motion that would.
-Covariance by blocks of time; a direction no block speaks for has that of the prior.
+Covariance by blocks of time; a direction no block identifies has that of the prior.
 """
 
 from dataclasses import replace

@@ -152,7 +152,7 @@ def _verdicts(
         yield Verdict(
             STAGE,
             "warning",
-            f"gauge: {18 - seen.rank} of 18 directions are not separated. A base that stands shows T_base_B^-1 "
+            f"gauge: {18 - seen.rank} of 18 directions are not separated. A base at rest shows T_base_B^-1 "
             "T_base_arm only; spins and drives (stage base_frame) split it",
         )
 

@@ -46,13 +46,13 @@ _STILL = 1e-3  # relative change of s^2 below which it stands still [-]
 
 @dataclass(frozen=True)
 class BaseFrame:
-    """What spins and drives tell.
+    """What spins and drives identify.
 
     Attributes:
         common: T_base_B, the floor's tilt and how the base stood.
         planar: (n, 3) x, y and heading of the base frame at each rest [m, m, rad], about the floor's origin.
         wander: (n_trials,) s, side slip or wander of the centre a step [m].
-        covariance: (p, p) of what is common, in its order; zero rows for what was held.
+        covariance: (p, p) of what is common, in its order; zero rows for what was fixed.
         chi2: Squared whitened residuals per degree of freedom [-].
         converged: Whether the iteration came to rest.
     """

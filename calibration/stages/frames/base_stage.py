@@ -1,8 +1,8 @@
 """Stage `base_frame`: the marker body in the base frame, from yaw spins and straight drives.
 
 See `base_frame` for the model. A base on soft wheels rests neither quite upright nor quite at its nominal place,
-the same at every heading, so that no motion on a floor tells it from a marker body that is mounted so. It may differ
-from trial to trial, and what all trials have in common comes on top of the covariance.
+the same at every heading, so that no motion on a floor separates it from a marker body that is mounted so. It may
+differ from trial to trial, and what all trials have in common comes on top of the covariance.
 """
 
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ def locate_base(lab: Laboratory, stations: Stations) -> tuple[Model | None, tupl
     """Model `base_frame` with `frame.base.<body>.*`; None where there is no spin to fit."""
     short = [i for k, i in enumerate(stations.ids) if (stations.trial == k).sum() < _FEWEST]
     if short or "spin" not in stations.kinds:
-        message = f"at least {_FEWEST} rests are needed in {short}" if short else "no yaw spin: drives tell no centre"
+        message = f"at least {_FEWEST} rests are needed in {short}" if short else "no yaw spin to show the centre"
         return None, (Verdict(STAGE, "missing", f"{message}; spin in steps over a turn, then drive straight"),)
     description, nominal, floor = lab.description, lab.nominal_frames[:6], np.zeros(3)
     if description.plates:
@@ -95,12 +95,12 @@ def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarr
             way = float(np.linalg.norm(np.diff(xy, axis=0), axis=1).sum())
             text = f"{way:.2f} m, side slip {1e3 * found.wander[index]:.3f} mm a step"
         yield Verdict(STAGE, "ok", f"{name}: {text}")
-    missing = [t for t, f in (("height: no plate tells the floor's", free[2]), ("heading: no drive", free[5])) if not f]
+    missing = [t for t, f in (("height: no force plate", free[2]), ("heading: no drive", free[5])) if not f]
     if missing:
         yield Verdict(STAGE, "warning", f"fixed at nominal: {', '.join(missing)}")
     if found.chi2 > _CHI2:
         message = (
-            f"rests differ by {np.sqrt(found.chi2):.1f} times the markers' noise in tilt and height; sigmas say so"
+            f"rests differ by {np.sqrt(found.chi2):.1f} times the markers' noise in tilt and height; sigmas include it"
         )
         yield Verdict(STAGE, "warning", message)
 

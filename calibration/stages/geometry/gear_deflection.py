@@ -3,11 +3,11 @@
     reading = angle + offset + compliance * gravity torque + gap / 2 * tanh(gravity torque / tau_0)
 
 The hand has random errors of its own besides those of the readings, widths of priors follow the data, and which gears
-give and play is averaged over. Play is asked for unless the postures speak strongly against it. On real postures this,
-by cross-validation, is what reaches furthest; a URDF holds its placements and not its gears. No motion is asked: where
-sweeps are recorded it stands beside the rows with joint models.
+are compliant and have backlash is averaged over. Backlash is fitted unless the postures are strong evidence against it.
+On real postures this, by cross-validation, is what reaches furthest; a URDF holds its placements and not its gears. No
+motion is asked: where sweeps are recorded it stands beside the rows with joint models.
 
-A fit averaged over which gears give under load: most of a robot's do not, and asking all of them costs accuracy.
+A fit averaged over which gears are compliant: most of a robot's are not, and estimating all of them costs accuracy.
 """
 
 from collections.abc import Iterator
@@ -68,7 +68,7 @@ class GearFit:
     Attributes:
         fit: Averaged over which gears are compliant and have backlash.
         robust: Before averaging, with the postures it is of.
-        parameters: With backlash, unless the postures speak strongly against it.
+        parameters: With backlash, unless the postures are strong evidence against it.
         known: Rank and combinations.
         rejected: Why it must not be used.
     """
@@ -83,7 +83,7 @@ class GearFit:
 def fit_gears(
     hand: HandModel, parameters: ParameterSet, more: ParameterSet, postures: Postures, errors: NoiseModel
 ) -> GearFit:
-    """Fit `parameters`, and `more` of them, with backlash, unless the postures speak strongly against it."""
+    """Fit `parameters`, and `more` of them, with backlash, unless the postures are strong evidence against it."""
     found = fit_robustly(hand, parameters, postures, errors)
     some = spread(len(found.fit.at.r), postures.components, _SPREAD)
     known = identifiability(found.fit.rows_white(some), parameters)
@@ -119,7 +119,7 @@ def _findings(model: Model, hand: HandModel) -> Iterator[Verdict]:
 
 
 def _averaged(fit: Fit, parameters: ParameterSet, hand: HandModel) -> Fit:
-    """The fit with theta and covariance averaged; `at`'s residuals and derivatives stay those of all gears giving."""
+    """The fit with theta and covariance averaged; `at`'s residuals stay those of all gears compliant."""
     asked = np.array(parameters.indices(averaged_names(hand)))
     width = np.sqrt(parameters.prior.factor(fit.widths.prior)[asked]) * parameters.tolerance[asked]
     found = averaged(fit.theta, fit.covariance, asked, width)

@@ -77,7 +77,7 @@ def unusable_data(chain: Chain, q: np.ndarray, start: Start, components: int) ->
     size = abs(start.scale)
     if not 1.0 / _SCALE < size < _SCALE:
         unit = " (markers recorded in millimetres?)" if 5e-4 < size < 2e-3 else ""
-        yield f"the robot is {size:.3g} times as large as the markers' paths say{unit}; units, joint order, tool frame?"
+        yield f"the robot is {size:.3g} times as large as by the markers' paths{unit}; units, joint order, tool frame?"
     elif start.scale < 0.0:
         yield "the markers move as in a mirror: the laboratory's frame is left-handed; swap two axes or turn one"
 
@@ -142,11 +142,11 @@ def implausible(parameters: ParameterSet, found: Fit, play: np.ndarray, hand: Ha
     reading, joints = found.noise_sigma(reading_names(hand.nominal)), hand.nominal.joints
     for name, s, limit_s, seen in zip(joints, reading, _TOLERANCES * play, _seen(found, len(joints)), strict=True):
         if s * seen > limit_s:
-            yield f"readings of {name} scatter by {s:.2g}, datasheet play is {limit_s / _TOLERANCES:.2g}; units, order?"
+            yield f"readings of {name} scatter by {s:.2g}, tolerance is {limit_s / _TOLERANCES:.2g}; units, order?"
     fitted = float(np.trace(found.covariance @ found.J_white.T @ found.J_white))  # as many residuals theta takes
     chi2 = float((found.r_white**2).sum()) / max(1.0, found.r_white.size - fitted)
     if chi2 > _CHI2:
-        yield f"residuals are {np.sqrt(chi2):.1f} times what noise and play explain"
+        yield f"residuals are {np.sqrt(chi2):.1f} times what noise and backlash explain"
 
 
 def _seen(found: Fit, k: int) -> np.ndarray:

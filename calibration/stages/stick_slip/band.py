@@ -9,8 +9,8 @@ at the start, about that without preload. L the path that the base went while wh
 
     e_k^2 ~ V_k t_nu^2,   (log s, r, p, l) ~ N(PRIOR, WIDTH^2)                 e_k rms of trial k when it was left out
 
-A dozen trials do not tell four numbers: PRIOR is what left-out trials of sampled robots have in common. A trial that
-is left out is predicted by parameters that are less certain: its own shift (x_k - x_(-k))^2 is added to var_e.
+A dozen trials do not identify four numbers: PRIOR is what left-out trials of sampled robots have in common. A trial
+that is left out is predicted by parameters that are less certain: its own shift (x_k - x_(-k))^2 is added to var_e.
 
 Where the band is wider than the slip that is predicted, that prediction is worth nothing:
 

@@ -3,7 +3,7 @@
     (K + G) x + C dx/dt + M d2x/dt2 = w
 
 x displacement of the base frame, w change of the wrench since the first second, both in frame 0, low-passed alike.
-With the plate's wrench M = 0: it is what the floor feels. Inverse dynamics holds the base still, so the base's
+With the plate's wrench M = 0: it is the wrench on the floor. Inverse dynamics takes the base at rest, so the base's
 inertia M and the shift of its weight are on the left. G is no spring's: forces that are there at rest, f_i at p_i, turn
 with the base (wheels are suspended in its axes), and its weight f moves with its centre of mass c,
 

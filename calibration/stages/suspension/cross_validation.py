@@ -4,7 +4,7 @@
 
 Zero is a base that stays, not the mean. One trial may slip more than all others move; an axis is moved only if R2 is
 positive and, with such a trial counting no more than the others together, is worth it with and without the trial that
-speaks most for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
+is most evidence for it: yaw, after a jolt, slips and is where no spring would put it. `explained` takes the motion
 capture's noise (its variance at rest) off both sums: what share of the motion itself is the spring's.
 """
 

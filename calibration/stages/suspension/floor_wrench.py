@@ -1,7 +1,7 @@
 """Wrench of the robot's action on the floor, in frame 0: by the force plate, and by floating-base inverse dynamics.
 
     plate:     w = sum_p [R' f_p ; R' (m_p + (c_p - o) x f_p)]          c_p plate centre, (R, o) = T_lab_0
-    dynamics:  w = -Ad*(T_0_root) tau_1..6(q, dq, ddq)                   RNEA, base held still, nominal masses, payload
+    dynamics:  w = -Ad*(T_0_root) tau_1..6(q, dq, ddq)                   RNEA, base at rest, nominal masses, payload
 
 about the origin of frame 0, in its axes [N, N.m]. What the base's own motion adds to `dynamics` is known from
 
@@ -59,7 +59,7 @@ def plate_load(trial: Trial, plate: Clock, T_lab_0: np.ndarray, cutoff: float = 
 
 
 def floor_load(t: np.ndarray, w: np.ndarray, T_lab_0: np.ndarray, centre: np.ndarray, cutoff: float = CUTOFF) -> Load:
-    """A wrench that the floor felt, w (n, 6) in frame 0 at t (n,) [s], read about a centre (3,) [m, lab]."""
+    """A wrench on the floor, w (n, 6) in frame 0 at t (n,) [s], read about a centre (3,) [m, lab]."""
     T_0_plate = inverse(T_lab_0) @ compose(np.eye(3), centre)
     return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3), T_0_plate)
 

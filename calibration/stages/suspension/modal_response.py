@@ -2,7 +2,7 @@
 
     K x + C dx/dt + M d2x/dt2 = w        =>        x = sum_m a_m (b_m' w) / (1 + tau_m s)
 
-M = 0 where w is what the floor feels. Each mode is a first-order lag, integrated exactly for a wrench that is linear
+M = 0 where w is the wrench on the floor. Each mode is a first-order lag, integrated exactly for a wrench that is linear
 between samples: stiff modes (tau << step) cost nothing and cannot blow up. tau = 0 is a spring without damper.
 
     y_k+1 = e y_k + b0 u_k + b1 u_k+1,   e = exp(-h / tau),   b1 = 1 - tau (1 - e) / h,   b0 = 1 - e - b1

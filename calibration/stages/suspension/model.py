@@ -3,7 +3,7 @@
     (K + G) x + C dx/dt + M d2x/dt2 = w          see wheels, base_response
 
 K, C are small-signal stiffness and damping about the origin of frame 0 in its axes, gravity's part not in them. An axis
-that the springs do not predict better than a base that stays is left still.
+that the springs do not predict better than a base at rest is taken at rest.
 """
 
 from dataclasses import dataclass
@@ -33,12 +33,12 @@ class Suspension:
         C: (6, 6) damping [N.s/m, N.s, N.m.s/rad].
         sigma_K: (6, 6) standard deviations; NaN where they are not known.
         sigma_C: (6, 6).
-        tangent: (6, 6) of preload, for wrenches the floor feels.
+        tangent: (6, 6) of preload, for wrenches on the floor.
         gravity: (6, 6) stiffness that the robot's weight adds, of the nominal robot; not in K. Zeros where there are no
-            joint readings to tell its posture.
+            joint readings of its posture.
         held_out: Leave-one-trial-out, one for each source that was tried.
         parameters: `suspension.{K,C}.<i><j>`, i <= j of x y z rx ry rz as 1 to 6, then those of wheels.
-        combinations: Of the wheels' parameters, as far as one wrench tells them; coefficients in the order of
+        combinations: Of the wheels' parameters, as far as one wrench identifies them; coefficients in the order of
             `parameters`.
     """
 
@@ -60,7 +60,7 @@ class Suspension:
 
     @cached_property
     def modes(self) -> Modes:
-        """Modes of the base under wrenches the floor feels."""
+        """Modes of the base under wrenches on the floor."""
         return modes_of(self.K + self.tangent, self.C, np.zeros((6, 6)))
 
     def moves(self, source: Source) -> np.ndarray:

@@ -4,7 +4,7 @@
     2  the printed form, displacement -> wrench; refused unless K > 0, C >= 0, it settles, and, run forward on trials it
        was not fitted to, it is on no axis worse than a base that stays nor, by 2 % of the motion, than
     3  the reduced 6x6 compliance, fitted wrench -> displacement, which then takes its place
-    4  each axis is moved or left still, by leave-one-trial-out, for each source of the wrench
+    4  each axis is predicted or taken at rest, by leave-one-trial-out, for each source of the wrench
 
 Where there is no plate the wrench is that of inverse dynamics.
 """
@@ -161,7 +161,7 @@ def _judged(source: Source, tried: HeldOut) -> Verdict:
     still = [a for a, moves in zip(AXES, tried.moves, strict=True) if not moves]
     message = f"from {source}, left-out trials: R2 against a base at rest {listed}"
     if still:
-        message += f"; left still: {', '.join(still)} (they slip, or do not move visibly)"
+        message += f"; not predicted: {', '.join(still)} (they slip, or do not move visibly)"
     return Verdict(STAGE, "ok" if tried.moves[3:5].all() else "warning", message)
 
 

@@ -10,13 +10,13 @@ frame at rest, about its origin. r_i: centres of the wheels' hubs, or their cont
 
     K = sum_i A_i' Kt_i A_i + diag(0, Ktheta_i) = sum_p k_p E_p,      A_i = [1, -[r_i]x],      C alike
 
-Six wheels have 36 diagonal stiffnesses; one total wrench tells at most rank(E) = 14 of their combinations (hubs at two
-heights), 11 with all r_i in the floor. The same holds for damping.
+Six wheels have 36 diagonal stiffnesses; one total wrench identifies at most rank(E) = 14 of their combinations (hubs at
+two heights), 11 with all r_i in the floor. The same holds for damping.
 
 Names, uncertainty and status of what a suspension fit found.
 
     suspension.{K,C}.<i><j>      elements about the base frame's origin, i <= j, 1 to 6 for x y z rx ry rz
-    suspension.<wheel>.{kx,...}  of the printed form: one total wrench tells only combinations of them
+    suspension.<wheel>.{kx,...}  of the printed form: one total wrench identifies only combinations of them
 
 Base markers are placed on the base with a tolerance, so where frame 0 is in the floor's plane is uncertain by
 xi = (dx, dy, dpsi), which adds  dK = K ad(xi) + ad(xi)' K.  An element is `estimated` if its standard deviation, over
@@ -66,7 +66,7 @@ class WheelModel:
 
     @property
     def structure(self) -> Identifiability:
-        """What the richest motion could tell of the stiffnesses: rank and combinations."""
+        """What the richest motion could identify of the stiffnesses: rank and combinations."""
         scale = np.array([1.0] * 3 + [_LEVER] * 3)
         rows = (self.E / np.outer(scale, scale)).reshape(len(self.E), 36).T
         return identifiability(rows, self.parameters("k"))

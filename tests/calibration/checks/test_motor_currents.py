@@ -38,7 +38,7 @@ def changed(trial: Trial, order: dict[int, int], turned: tuple[int, ...] = ()) -
 
 @pytest.mark.parametrize(("order", "turned", "words"), [
     ({}, (ARM[3],), "joint arm_4_joint: its motor current falls .* in `reversed_effort`"),
-    ({ARM[1]: ARM[3], ARM[3]: ARM[1]}, (), "joint arm_2_joint: .* gravity asks of arm_4_joint .*; joint arm_4_joint: "),
+    ({ARM[1]: ARM[3], ARM[3]: ARM[1]}, (), "joint arm_2_joint: .* torque of arm_4_joint .*; joint arm_4_joint: "),
     ({ARM[6]: ARM[4], ARM[4]: ARM[6]}, (), "joint arm_7_joint: its motor current follows .* of arm_5_joint"),
 ])  # fmt: skip
 def test_wrong_currents_are_told_by_name(order, turned, words):

@@ -126,7 +126,7 @@ def test_the_wrist_s_reaction_is_turned_into_its_action_and_must_be_told(tmp_pat
     found = read_bag([tmp_path / "log.bag"], layout(wrist="/wrist_ft", wrist_convention="reaction")).joints
     np.testing.assert_array_equal(found.wrist_wrench, -true.wrist_wrench)
     assert read_bag([tmp_path / "log.bag"], LAYOUT).joints.wrist_wrench is None
-    with pytest.raises(ValueError, match="no bag says whose wrench it holds"):
+    with pytest.raises(ValueError, match="no bag contains whose wrench it is"):
         BagLayout.model_validate(EXACT | {"joints": {"a": "a"}, "wrist": "/wrist_ft"})
 
 

@@ -82,7 +82,7 @@ def test_a_body_without_markers_is_refused(tmp_path):
 
 def test_friction_that_nothing_holds_is_refused(tmp_path):
     (line,) = refused(tmp_path, f"twin.friction_held: {{arm_6_joint: {HELD}}}")
-    assert line.startswith("mine.yaml:5:23: twin.friction_held: nothing is held where gear_form is dead_zone; ")
+    assert line.startswith("mine.yaml:5:23: twin.friction_held: gear_form dead_zone has no friction_held; ")
 
 
 @pytest.mark.parametrize("markers", [{"m": (0.01, 0.02, 0.1)}, {"m": (0.01, 0.0, 0.1), "n": (0.01, 0.0, 0.1)}])

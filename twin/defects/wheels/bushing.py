@@ -44,7 +44,7 @@ class TorsionTooStiff(TwinError):
     def __init__(self, wheel: str, what: str, limit: str) -> None:
         super().__init__(
             f"torsional {what} of {wheel!r} is more than its light wheel can turn against at this time step: "
-            f"the base would feel another; use at most {limit}, a shorter step or anchored wheels"
+            f"the base would receive another; use at most {limit}, a shorter step or anchored wheels"
         )
 
 
