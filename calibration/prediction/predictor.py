@@ -220,15 +220,19 @@ class TrialPoses:
         return self._once(("geared",), lambda: bundled.corrected(self.trial))
 
     def base_variance(self, row: LadderRow, source: Base) -> np.ndarray | None:
-        """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known."""
+        """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known.
+
+        Of a row on springs alone: V + (x_slipping - x_springs)^2 where it is known how the base slips, with variance V.
+        """
         if self.loaded is None or source not in SOURCES:
             return None
         known = dict(self.loaded.suspension.held_out)
         tried = next(iter(known.values()))
         if source != "plate" and source != "dynamics":
             return tried.still
-        if row.bundle and (slipped := self.slipped(source)) is not None:
-            return slipped.motion.variance
+        if (slipped := self.slipped(source)) is not None:
+            found = None if row.bundle else self.displaced(source, row.name)
+            return slipped.motion.variance + (0.0 if found is None else (slipped.motion.x - found[1]) ** 2)
         tried = known.get(source, tried)
         return tried.variance(tried.moves)
 

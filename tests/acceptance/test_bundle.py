@@ -46,6 +46,26 @@ def test_a_gap_that_no_load_reversal_shows_is_not_called_estimated(score):
     assert found["status"] == "not_identifiable"
 
 
+def test_a_zero_beside_a_gap_that_is_not_seen_is_as_uncertain_as_half_the_gap(score, quick_run):
+    """A load that never changes its sign makes half the gap a zero."""
+    full = quick_run.estimate.model("full")
+    zero = next(c for c in full.combinations if c.name == "encoder.arm_2_joint.motor.offset")
+    trains = quick_run.estimate.model("drive_trains")
+    gap = next(p for p in trains.parameters if p.name == "backlash.arm_2_joint.gap")
+    assert zero.sigma > 0.4 * gap.sigma > 10.0 * np.sqrt(zero.coefficients @ full.random_covariance @ zero.coefficients)
+    assert score["nees"] <= 2.0 * score["dof"]
+
+
+def test_a_base_on_springs_alone_is_off_by_what_slips(quick_run):
+    trial = next(t for t in quick_run.evaluation.predicted if t.kind != "static")
+    of = {p.model: p.base_variance for p in trial.rows if (p.base, p.encoder) == ("plate", "motor")}
+    motion, sprung = dict(trial.base.slipped)["plate"].motion, dict(trial.base.predicted)["plate"]
+    np.testing.assert_array_equal(of["full"], motion.variance)
+    off = np.sqrt(of["model_2"] - of["full"])
+    np.testing.assert_allclose(off, np.abs(motion.x - sprung), atol=0.05 * off.max())
+    assert off[:, 5].max() > 1e-5
+
+
 def test_the_estimate_reads_back_and_predicts_the_same(quick_run):
     from calibration import load, load_estimate
     from calibration.prediction import predict

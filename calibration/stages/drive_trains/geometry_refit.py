@@ -30,7 +30,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain, harmonic_ter
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
-from calibration.stages.geometry.departures import shown_by, with_departures, with_gears
+from calibration.stages.geometry.departures import TakenForKnown, shown_by, with_departures, with_gears
 from calibration.stages.geometry.hand_residual import NoiseModel
 from calibration.stages.geometry.model_of_fit import hand_of, model_of
 from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
@@ -99,15 +99,18 @@ def refit_geometry(
     for part in parts[1:]:
         postures = postures.joined(part)
     parameters = geometry_parameters(chain, description)
-    known = [joint in [train.joint for train in trains.trains] for joint in chain.joints]
-    floor, play = reading_floor(chain, description), reading_sigma(chain, description) * np.where(known, _READING, 1.0)
+    driven = np.isin(chain.joints, [train.joint for train in trains.trains])
+    floor, play = reading_floor(chain, description), reading_sigma(chain, description) * np.where(driven, _READING, 1.0)
     errors = NoiseModel(np.maximum(play, floor), floor, _HAND[: postures.components // 3])
     robot_hand = hand_model(chain, nominal_frames(chain, description))
     found = fit_robustly(robot_hand, parameters, postures, errors)
     used = postures.rows(found.kept)
-    geared = with_gears(
-        robot_hand, parameters, found.fit, used, _compliance_sigma(trains, chain), _known(bending.sigma)
+    known = TakenForKnown(
+        _sigma(trains, chain, "gear.{}.compliance"),
+        0.5 * _sigma(trains, chain, "backlash.{}.gap"),
+        _known(bending.sigma),
     )
+    geared = with_gears(robot_hand, parameters, found.fit, used, known)
     departed = with_departures(robot_hand, parameters, geared, used)
     tests = shown_by(robot_hand, parameters, found.fit, used)
     model = model_of("full", chain, parameters, departed.fit)
@@ -125,10 +128,10 @@ def _known(sigma: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(sigma), sigma, 0.0)
 
 
-def _compliance_sigma(trains: DriveTrains, chain: Chain) -> np.ndarray:
-    """(k,) standard deviations of the chain's joints' compliances [rad/(N.m)]; 0 where there is none."""
+def _sigma(trains: DriveTrains, chain: Chain, name: str) -> np.ndarray:
+    """(k,) standard deviations of what has that name, {} each joint of the chain; 0 where there is none."""
     sigma = {q.name: q.sigma for q in trains.parameters}
-    return _known(np.array([sigma.get(f"gear.{joint}.compliance", 0.0) for joint in chain.joints]))
+    return _known(np.array([sigma.get(name.format(joint), 0.0) for joint in chain.joints]))
 
 
 def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:

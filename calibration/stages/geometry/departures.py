@@ -62,20 +62,35 @@ def with_departures(hand: HandModel, parameters: ParameterSet, fit: Fit, posture
     return Departed(wider, (f"residuals show {what}; intervals are widened by them",), absorbed)
 
 
-def with_gears(
-    hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures, compliance: np.ndarray, bending: np.ndarray
-) -> Fit:
+@dataclass(frozen=True)
+class TakenForKnown:
+    """Standard deviations of what a fit takes for known of drive trains and column; 0 of what there is none of.
+
+    Attributes:
+        compliance: (k,) of the joints' gears [rad/(N.m)].
+        half_gap: (k,) of half their backlash [rad].
+        bending: (2,) of the first joint's column [rad/(N.m)].
+    """
+
+    compliance: np.ndarray
+    half_gap: np.ndarray
+    bending: np.ndarray
+
+
+def with_gears(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures, known: TakenForKnown) -> Fit:
     """The fit with what it takes for known counted in its covariance, C + sum s^2 (K N) (K N)', K = H^-1 J'.
 
-    N: deflection of each joint by the torque of gravity, and of the first joint's column by its moments, in postures;
-    s: standard deviations of compliances (k,) and of the column's (2,) [rad/(N.m)].
+    N: in postures, deflection of each joint by the torque of gravity, and of the first joint's column by its moments;
+    each joint on the side of its gap where its load has it, which a load that never changes its sign makes a zero.
     """
     chain, at = hand.nominal, hand.with_theta(fit.theta, parameters.names)
     tau, M = chain.gravity_torques(postures.q), chain.gravity_moments(postures.q)
     found = at.kinematics(postures.q, tau)
-    column = _turned(found.J_frame[:, :, 1:], chain, found.q)[:, :, 0, :2] * (M[:, 0, :2] * bending)[:, None]
-    both = np.concatenate([found.J_joint * (tau * compliance)[:, None], column], axis=2)
-    N = (fit.whitener @ _as_residuals(both, found.T, postures)).reshape(fit.r_white.size, -1)
+    column = _turned(found.J_frame[:, :, 1:], chain, found.q)[:, :, 0, :2] * (M[:, 0, :2] * known.bending)[:, None]
+    gears = [found.J_joint * s[:, None] for s in (tau * known.compliance, np.sign(tau) * known.half_gap)]
+    N = (fit.whitener @ _as_residuals(np.concatenate([*gears, column], axis=2), found.T, postures)).reshape(
+        fit.r_white.size, -1
+    )
     H = fit.J_white.T @ fit.J_white + np.diag(parameters.prior.precision(fit.widths.prior))
     moved = np.linalg.solve(H, fit.J_white.T @ N)
     return replace(fit, covariance=fit.covariance + moved @ moved.T)

@@ -3,13 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import mjcf
 from calibration.numerics.lie import adjoint, inverse, jlog6, log6
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.nominal_frames import nominal_frames
-from calibration.stages.geometry.departures import NAMES, departures, with_gears
+from calibration.stages.geometry.departures import NAMES, TakenForKnown, departures, with_gears
 from calibration.stages.geometry.hand_residual import fit
 from calibration.stages.geometry.parameters import geometry_parameters
 from tests.doubles import rigid_robot
@@ -34,17 +35,20 @@ def test_a_column_bends_where_it_slid_to():
     assert chain.is_prismatic(chain.joints[0]) and np.ptp(postures.q[:, chain.columns[0]]) > 0.1
 
 
-def test_a_compliance_that_is_off_moves_the_geometry_as_its_interval_says():
-    description, rng, tiny, c = rigid_robot.described(), np.random.default_rng(0), np.full(8, 1e-4), 1e-6
+@pytest.mark.parametrize("what", ["compliance", "half_gap"])
+def test_what_was_taken_for_known_moves_the_geometry_as_its_interval_says(what):
+    description, rng, tiny = rigid_robot.described(), np.random.default_rng(0), np.full(8, 1e-4)
     chain = chain_of(mjcf.urdf(), description)
     hand, parameters = nominal_hand(chain, nominal_frames(chain, description)), geometry_parameters(chain, description)
     parameters = replace(parameters, group=())
     truth, q = rigid_robot.defects(0), rigid_robot.random_angles(rng, 30)
     seen = rigid_robot.postures(truth, q)
-    compliance = c * (np.array(chain.joints) == "arm_4_joint")
+    off = (1e-6 if what == "compliance" else 1e-5) * (np.array(chain.joints) == "arm_4_joint")
     tau = chain.gravity_torques(seen.q)
-    bent = replace(rigid_robot.postures(truth, q + tau * compliance), q=seen.q, covariance=seen.covariance)
+    delta = off * (tau if what == "compliance" else np.sign(tau))
+    bent = replace(rigid_robot.postures(truth, q + delta), q=seen.q, covariance=seen.covariance)
     before, after = (fit(hand, parameters, some, tiny, tiny) for some in (seen, bent))
-    wider = with_gears(hand, parameters, before, seen, compliance, np.zeros(2))
+    none = TakenForKnown(np.zeros(8), np.zeros(8), np.zeros(2))
+    wider = with_gears(hand, parameters, before, seen, replace(none, **{what: off}))
     added = np.sqrt(np.diag(wider.covariance - before.covariance).clip(0.0))
     np.testing.assert_allclose(added, np.abs(after.theta - before.theta), atol=0.03 * added.max())
