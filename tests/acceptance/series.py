@@ -46,6 +46,10 @@ class Series:
         """Share of the 95 % intervals of all models that contain the truth, by robot."""
         return np.array([score["every_model"]["coverage_95"] for score in self.scores])
 
+    def nees(self, model: str) -> np.ndarray:
+        """Normalised estimation error squared of a model per degree of freedom, by robot."""
+        return np.array([s["models"][model]["nees"] / s["models"][model]["dof"] for s in self.scores])
+
     def base_r2(self, axis: str, source: str = "plate") -> np.ndarray:
         """R2 of the base's predicted motion about an axis over the validation swings, by robot."""
         return np.array(

@@ -23,6 +23,18 @@ BANDS = {
     Key("floor", "measured", "link"): ((0.25, 0.3), (0.05, 0.06)),
 }
 SPREAD = 1.3  # by which errors of `full` may be larger on sampled arms
+INSIDE = {
+    # row: share of the errors inside the 95 % band, all robots together, at least and at most
+    Key("full"): (0.92, 0.98),
+    Key("full", "dynamics"): (0.92, 0.98),
+    Key("full", "measured"): (0.92, 0.98),
+    Key("full", "plate", trials="static"): (0.92, 0.98),
+    Key("full", "measured", trials="static"): (0.92, 0.98),
+    Key("model_3"): (0.92, 0.98),
+    Key("model_2"): (0.92, 0.98),
+    Key("model_2", "measured"): (0.92, 1.0),  # too wide, docs/limits.md: set by static postures, worse than swings
+    Key("registration"): (0.92, 1.0),
+}
 SKILL = {"fixed": (0.95, 0.90), "sampled": (0.88, 0.78)}  # median, worst
 
 
@@ -58,7 +70,22 @@ def test_intervals_hold_the_truth(robots, claim):
     arms, found = robots
     share = found.coverage()
     claim(f"coverage/{arms}/every model", share)
-    assert np.median(share) >= 0.85
+    assert np.median(share) >= 0.90
+
+
+def test_errors_of_the_delivered_parameters_are_as_their_covariance_has_them(robots, claim):
+    arms, found = robots
+    nees = found.nees("full")
+    claim(f"nees/{arms}/full", nees)
+    assert nees.max() <= 2.0
+
+
+@pytest.mark.parametrize("key", INSIDE, ids=lambda key: "-".join((key.model, key.base, key.trials)))
+def test_the_band_on_the_hand_holds_the_share_it_promises(robots, key, claim):
+    arms, found = robots
+    share = found.figures(key, "inside_95")
+    claim(f"band/{arms}/{key.model}/{key.base}/{key.trials}", share)
+    assert INSIDE[key][0] <= share.mean() <= INSIDE[key][1]
 
 
 def test_the_rows_keep_their_order_on_every_robot(robots):

@@ -95,7 +95,7 @@ def fit_bundle(
         hand = refitted.hand(chain)
         found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
-        quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link)))
+        quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link), _moment_sigma(lab)))
     base = None
     if suspension is not None:
         sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
@@ -129,6 +129,13 @@ def _offsets(hand: HandModel) -> np.ndarray:
     offset = np.zeros(len(hand.chain.measured))
     offset[hand.chain.columns] = hand.offset
     return offset
+
+
+def _moment_sigma(lab: Laboratory) -> float:
+    """Share [-] by which a moment of what the first joint carries may be off, its links' masses being independent."""
+    robot = lab.chain.nominal
+    masses = np.array([body.mass for body in robot.inertias[robot.getJointId(lab.chain.joints[0]) + 1 :]])
+    return lab.description.tolerances.link_mass * float(np.linalg.norm(masses) / masses.sum())
 
 
 def _carried_link(lab: Laboratory, base_link: str) -> str:

@@ -47,12 +47,15 @@ class ColumnBending:
         turn[:, :2] = -self.compliance * moment
         return turn
 
-    def parameters(self, link: str) -> tuple[Quantity, ...]:
-        """Stiffness about both axes, of the column's link."""
+    def parameters(self, link: str, off: float) -> tuple[Quantity, ...]:
+        """Stiffness about both axes, of the column's link; `off`: share [-] by which moments err, one sigma.
+
+        Predictions have the same moments: there the share cancels.
+        """
         found = []
         for axis, c, s in zip(("krx", "kry"), self.compliance, self.sigma, strict=True):
             known = c > 3.0 * s
-            k, sigma = (1.0 / c, s / c**2) if known else (np.inf, np.inf)
+            k, sigma = (1.0 / c, float(np.hypot(s / c, off)) / c) if known else (np.inf, np.inf)
             remedy = (
                 "" if known else "hold the arm stretched out forwards and sideways in sight of the shoulder's markers"
             )

@@ -26,7 +26,7 @@ from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
-from calibration.stages.drive_trains.drive_train import DriveTrain, harmonic_terms
+from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -118,8 +118,8 @@ def refit_geometry(
     fitted = hand_of(model, chain, nominal_frames(chain, description))
     offset = np.array(trains.dynamics.offset)
     offset[chain.columns] = fitted.offset
-    referred = tuple(_referred(train, model, trains) for train in trains.trains)
-    trains = replace(trains, trains=referred).with_offset(offset)
+    joints = tuple(referred(train, model, trains) for train in trains.trains)
+    trains = replace(trains, trains=joints).with_offset(offset)
     static = [corrected_trial(trains, trial, None, fitted) for trial in trials if len(trial.dwell_start)]
     return RefittedGeometry(model, bending, trains, rest_errors(trains, static, robot), departed.shown)
 
@@ -134,17 +134,21 @@ def _sigma(trains: DriveTrains, chain: Chain, name: str) -> np.ndarray:
     return _known(np.array([sigma.get(name.format(joint), 0.0) for joint in chain.joints]))
 
 
-def _referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:
-    """The drive train with its link encoder's offset beside the geometry's zero of the motor, and as uncertain."""
-    own = {p.name: p for p in geometry.parameters}
-    motor, name = own.get(f"encoder.{train.joint}.motor.offset"), f"encoder.{train.joint}.link.offset"
+def referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTrain:
+    """The drive train with its link encoder's offset beside the geometry's zero of the motor, and as uncertain.
+
+    So is the phase of its eccentricity: e(theta + d) = (cos1 + d sin1) cos + (sin1 - d cos1) sin + the same of 2 theta
+    """
+    own, name = {p.name: p for p in geometry.parameters}, f"encoder.{train.joint}.link."
+    motor = own.get(f"encoder.{train.joint}.motor.offset")
     if motor is None:
         return train
     moved = motor.value - float(trains.dynamics.offset[trains.joints.index(train.joint)])
-    parameters = tuple(
-        replace(q, value=q.value + moved, sigma=float(np.hypot(q.sigma, motor.sigma))) if q.name == name else q
-        for q in train.parameters
-    )
+    slope = np.append(1.0, train.link[[2, 1, 4, 3]] * (1.0, 1.0, 2.0, 2.0))
+    names = [name + what for what in ("offset", *HARMONICS)]
+    off = dict(zip(names, motor.sigma * slope, strict=True))
+    parameters = tuple(replace(q, sigma=float(np.hypot(q.sigma, off.get(q.name, 0.0)))) for q in train.parameters)
+    parameters = tuple(replace(q, value=q.value + moved) if q.name == names[0] else q for q in parameters)
     return replace(train, link=train.link + np.array([moved, 0.0, 0.0, 0.0, 0.0]), parameters=parameters)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from calibration.inference.identifiability import identifiability
 from calibration.inference.outliers import RobustFit, robust_fit
 from calibration.inference.parameters import Model, ParameterSet
+from calibration.inference.small_sample import small_sample_covariance
 from calibration.mocap.cluster_shape import of_one_shape
 from calibration.mocap.postures import Postures
 from calibration.numerics.alignment import registration_start
@@ -49,7 +50,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     start, floor = reading_sigma(chain, description), reading_floor(chain, description)
     errors = NoiseModel(np.maximum(start, floor), floor, np.zeros(0), stated=True)
     robust = fit_robustly(hand, parameters, postures, errors)
-    found = robust.fit
+    found = replace(robust.fit, covariance=small_sample_covariance(robust.fit))
     known = identifiability(found.J_white, parameters)
     oriented = postures.components == 6
     frames = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 import mjcf
-from calibration.stages.drive_trains.drive_train import DriveTrain, harmonic_terms
+from calibration.inference.parameters import Model, Parameter
+from calibration.stages.drive_trains.column_bending import ColumnBending
+from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, Quantity, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders
+from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, referred
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
 
@@ -36,3 +38,24 @@ def test_offset_and_eccentricity_are_removed_where_a_link_encoder_reads():
     np.testing.assert_allclose(found[10:, COLUMN], (theta + zero)[10:, COLUMN], atol=1e-5)  # phase off by the offset
     np.testing.assert_array_equal(found[:10], behind[:10])
     np.testing.assert_array_equal(np.delete(found, COLUMN, axis=1), np.delete(behind, COLUMN, axis=1))
+
+
+def test_what_a_zero_is_off_by_turns_the_phase_of_a_link_encoder_s_eccentricity():
+    described, off, angle = rigid_robot.described(), 1e-3, np.linspace(-1.0, 1.0, 9)
+    trains = DriveTrains(dynamics(mjcf.urdf(), described, np.zeros(8)), (), np.zeros(8), mjcf.urdf(), described)
+    names = [f"encoder.{JOINT}.link.{what}" for what in ("offset", *HARMONICS)]
+    own = tuple(Quantity(n, "rad", float(x), 0.0, "estimated") for n, x in zip(names, ERRORS, strict=True))
+    train = DriveTrain(JOINT, "dead_zone", np.zeros(7), link=ERRORS, parameters=own)
+    zero = Parameter(f"encoder.{JOINT}.motor.offset", "rad", 0.0, 0.0, off, "combined")
+    found = referred(train, Model("full", (zero,)), trains).parameters
+    assert found[0].sigma == off
+    signs = np.array([1.0, -1.0, 1.0, -1.0])  # of the slopes by the zero
+    moved = signs * np.array([q.sigma for q in found[1:]]) * np.sign(ERRORS[[2, 1, 4, 3]])
+    at, there = (harmonic_terms(angle + d) @ e for d, e in ((off, ERRORS[1:]), (0.0, ERRORS[1:] + moved)))
+    np.testing.assert_allclose(there, at, atol=4.0 * off**2 * np.abs(ERRORS[1:]).sum())
+
+
+def test_a_column_is_no_better_known_than_the_masses_that_bend_it():
+    exact = ColumnBending("torso_lift_joint", np.array([1e-4, 1e-4]), np.array([1e-9, 3e-6]))
+    about_x, about_y = exact.parameters("torso_lift_link", 0.04)
+    np.testing.assert_allclose([about_x.sigma, about_y.sigma], 1e4 * np.hypot([1e-5, 0.03], 0.04), rtol=1e-6)
