@@ -14,6 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from scenarios.plots.style import ESTIMATE, NOMINAL, OTHER, drawing, figure, svg
@@ -54,19 +55,23 @@ def ladder(run: Path) -> str:
 
 
 def screenshot(page: Path, out: Path, browser: str) -> None:
-    """The first screen of a page, 1280 pixels wide, in 64 colours."""
+    """The first screen of a page, 1280 pixels wide, in 128 colours."""
     with tempfile.TemporaryDirectory() as folder:
         shot = Path(folder) / "shot.png"
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1280,820"]
         subprocess.run([browser, *options, f"--screenshot={shot}", page.resolve().as_uri()], check=True, timeout=300)
-        Image.open(shot).convert("RGB").quantize(64, dither=Image.Dither.NONE).save(out, optimize=True)
+        Image.open(shot).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(out, optimize=True)
 
 
 def recorded(folder: Path) -> Path:
-    """A run folder of the recorded postures in tests/data: three of four are calibrated, the fourth is predicted."""
+    """A run folder of the recorded postures in tests/data: three quarters calibrated, one predicted, at random.
+
+    The table has groups of four with the wrist near zero in the first: every fourth row would be a region of its own.
+    """
     data = DOCS.parent / "tests" / "data" / "qualisys_2021-11-30_postures.csv"
     head, *rows = data.read_text(encoding="utf-8").splitlines()
-    days = ([row for k, row in enumerate(rows, 2) if (k % 4 == 0) == unseen] for unseen in (False, True))
+    kept = set(np.random.default_rng(0).permutation(len(rows))[: len(rows) // 4])
+    days = ([row for k, row in enumerate(rows) if (k in kept) == unseen] for unseen in (False, True))
     files = [folder / "day1.csv", folder / "day2.csv"]
     for path, lines in zip(files, days, strict=True):
         path.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")

@@ -22,12 +22,14 @@ def process(
     for note in found.notes:
         typer.echo(note)
     console.show(console.verdicts(found.estimate.verdicts))
+    end = [f"\nStatus: {found.estimate.extent}", f"Report: {out / 'report.html'}"]
     if found.evaluated:
         console.show(console.ladder(out))
         console.show(console.points(out))
+        end = ["", *console.summary(out)]
     elif found.estimate.has_geometry:
         typer.echo("\nNo validation trial: the error is the cross-validated one above; keep trials aside for another.")
-    typer.echo(f"\nStatus: {found.estimate.extent}\nReport: {out / 'report.html'}\nEstimate: {out / 'estimate'}")
+    typer.echo("\n".join([*end, f"Estimate: {out / 'estimate'}"]))
     if not found.estimate.calibrated:
         typer.echo("The estimate must not be used; the refused verdicts state why.", err=True)
         raise typer.Exit(FAILED)

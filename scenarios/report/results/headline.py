@@ -85,8 +85,8 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
     shares = shares or coarse
     gains = tuple(NextStep(s.remedy, s.gain_mm) for s in budget.next_steps) if budget else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
-    found_or_most = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, coarse))
-    ranked = (*refused, *found_or_most)[:_STEPS]
+    others = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, coarse)) or tuple(_to_record(found))
+    ranked = (*refused, *others)[:_STEPS]
     return Headline(badge, _sentence(steps, best), shares, ranked, found)
 
 
@@ -136,6 +136,14 @@ def _next_steps(
     found.sort(key=lambda step: -(step.gain or 0.0))
     asked = [NextStep(f"{n.stage}: {n.message}", None) for n in notices if "record_next" in n.message]
     return (*found, *asked)
+
+
+def _to_record(notices: Sequence[Notice]) -> Iterator[NextStep]:
+    """What the stages that had no data ask for."""
+    for text in dict.fromkeys(n.message.rpartition("; ")[2] for n in notices if n.level == "missing"):
+        if text.startswith("record "):
+            stages = ", ".join(n.stage for n in notices if n.message.endswith(f"; {text}"))
+            yield NextStep(f"for {stages}: {text}", None)
 
 
 def _worth(steps: Sequence[Step], best: Step | None, shares: Sequence[Share]) -> Iterator[NextStep]:

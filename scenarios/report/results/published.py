@@ -41,11 +41,18 @@ def add_medians(steps: Sequence[Step], axis: int, ax: Axes) -> None:
     """Mark the published medians along an axis (0 to 2) in a boxplot of these rows."""
     for y, step in enumerate(steps):
         if step.model in MODELS:
-            ax.plot(MEDIANS[axis][MODELS.index(step.model)], y, marker="D", **_LOOK)
+            _mark(MEDIANS[axis][MODELS.index(step.model)], y, "D", ax)
 
 
 def add_orientation(steps: Sequence[Step], ax: Axes) -> None:
     """Mark the published RMSE of orientation in a boxplot of these rows."""
     for y, step in enumerate(steps):
         if step.model in ORIENTATION:
-            ax.plot(ORIENTATION[step.model], y, marker="s", **_LOOK)
+            _mark(ORIENTATION[step.model], y, "s", ax)
+
+
+def _mark(x: float, y: float, marker: str, ax: Axes) -> None:
+    """A mark that is within the axis, which is made longer for it."""
+    low, high = ax.get_xlim()
+    ax.plot(x, y, marker=marker, **_LOOK)
+    ax.set_xlim(min(low, 0.8 * x), max(high, 1.2 * x))
