@@ -126,12 +126,12 @@ def base_reason(errors: Mapping[str, np.ndarray], finding: str) -> str:
     moved, missed = _rms(fixed - measured), _rms(predicted - measured)
     stays, left = _rms(fixed), _rms(measured)
     moved_by = f"the base moved the hand by {moved:.2f} mm rms per component"
-    even = f"the base measured would leave {left:.2f} mm of {stays:.2f}"
+    even = f"with the measured base the error is {left:.2f} mm instead of {stays:.2f}"
     if finding == "worse" and left >= stays:
-        return f"{moved_by}, against the larger errors of the nominal hand itself: even {even}"
+        return f"{moved_by}, the nominal hand is off by more: even {even}"
     if finding == "worse":
         return f"{moved_by}, its prediction misses that by {missed:.2f} mm; {even}"
-    return f"{moved_by}, predicted to {missed:.2f} mm; {even}, the rest are the nominal hand's own errors"
+    return f"{moved_by}, predicted to {missed:.2f} mm; {even}, the rest is nominal geometry"
 
 
 def _rms(e: np.ndarray) -> float:

@@ -206,8 +206,8 @@ def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, told):
     shutil.rmtree(run / "estimate")
     save_estimate(known_estimate(joint_models=(replace(model, rho=rho), none)), run / "estimate")
     write(run)
-    assert row_of(run, "The printed joint model", JOINT)[1].replace("\u202f", "") == told
-    assert row_of(run, "The printed joint model", PLAIN)[1] == "–"
+    assert row_of(run, "The published joint model", JOINT)[1].replace("\u202f", "") == told
+    assert row_of(run, "The published joint model", PLAIN)[1] == "–"
 
 
 def test_yaw_is_told_with_what_stays(whole):
