@@ -43,7 +43,7 @@ def test_what_is_not_there_is_not_compared(common):
     [
         (1.0, 1.0, "better", "moved the hand by 1.00 mm rms per component, predicted to 0.00 mm"),
         (1.0, -1.0, "worse", "even with the measured base the error is 10.00 mm instead of 9.00"),
-        (-2.0, 1.0, "worse", "its prediction misses that by 3.00 mm; with the measured base the error is 10.00 mm instead of 11.00"),
+        (-2.0, 1.0, "worse", "misses that by 3.00 mm; with the measured base the error is 10.00 mm instead of 11.00"),
     ],
 )
 def test_why_moving_the_base_helps_or_does_not_is_said_in_figures(share, against, finding, said):
