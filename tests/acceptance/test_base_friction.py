@@ -13,7 +13,7 @@ import pytest
 import calibration
 from calibration.stages.stick_slip import planar_forcing, wrenches_of
 from calibration.stages.stick_slip.forcing import STEP
-from calibration.stages.stick_slip.kernel import simulated
+from calibration.stages.stick_slip.kernel import at_rest, simulated
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.rest_frame import rest_of
@@ -46,12 +46,12 @@ def test_friction_of_each_wheel_limits_the_prediction_after_slips(scenario, tmp_
 def errors(model, direction, forcing):
     """(DRAWS,) rms per component [mm]."""
     rng, p = np.random.default_rng(0), direction.parameters
-    rows, none = model.wheels.rows(p), np.zeros(model.wheels.position.shape)
+    rows = model.wheels.rows(p)
 
     def moved(wheels):
         starts = np.array([0, len(forcing.inertia)])
-        settings = body(p, direction.corrected)
-        x, _ = simulated(starts, forcing.drive, forcing.inertia, wheels, settings, STEP, none)
+        bases = at_rest(wheels[None], body(p, direction.corrected)[None])
+        (x,), _ = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, 1)
         return x - x[forcing.rest].mean(axis=0)
 
     still, found = moved(rows), []

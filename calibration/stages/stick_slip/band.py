@@ -102,8 +102,9 @@ def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) 
     """
     rng = np.random.Generator(np.random.PCG64(len(trials.ids)))
     draws = rng.multivariate_normal(logarithms, covariance, size=_DRAWS, method="eigh")
-    costs = np.array([trials.cost(d, trials.errors(d)) for d in draws])
-    excess = costs - trials.cost(logarithms, trials.errors(logarithms))
+    every = np.concatenate([draws, logarithms[None]])
+    costs = np.array([trials.cost(p, e) for p, e in zip(every, trials.errors(every), strict=True)])
+    excess = costs[:-1] - costs[-1]
     order = np.argsort(np.maximum(excess, _UNLIKELY), kind="stable")
     return np.concatenate([logarithms[None], draws[order[: MEMBERS - 1]]])
 

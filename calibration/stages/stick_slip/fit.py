@@ -64,14 +64,14 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
     """Parameters, ensemble, band and what trials say that were left out, from one source of the wrench."""
     found = fitted(trials, start)
     ensemble = ensemble_of(trials, found.logarithms, found.covariance)
-    members = [trials.simulated(own) for own in ensemble]
+    members, _ = trials.simulated(ensemble)
     x, share = left_out(trials, found.others)
-    preloaded = _preloaded(trials, found.parameters, members[0][0])
-    spread = np.var([m[0] for m in members], axis=0)
+    preloaded = _preloaded(trials, found.parameters, members[0])
+    spread = np.var(members, axis=0)
     path = np.concatenate([slid_path(x[a:b], share[a:b]) for a, b in trials.spans])
     error, seen = trials.measured - block_means(trials, x), np.concatenate([m.valid for m in trials.motions])
     masked = np.where(seen[:, None], error, np.nan)
-    less_certain = spread + (members[0][0] - x) ** 2
+    less_certain = spread + (members[0] - x) ** 2
     parts = (_over_trials(trials, block_means(trials, v)) for v in (less_certain, preloaded, path**2))
     band = fitted_band(LeftOut(_over_trials(trials, masked**2), *parts), trials.noise, trials.corrected)
     held_out = _held_out(trials, masked)
@@ -95,14 +95,15 @@ def _over_trials(trials: Trials, x: np.ndarray) -> np.ndarray:
 def _preloaded(trials: Trials, p: SlipParameters, x: np.ndarray) -> np.ndarray:
     """Mean square (n, 3) of what preloaded wheels change of positions x (n, 3)."""
     load = trials.drive[0, 3:6]
-    moved = [trials.simulated(p.logarithms, e)[0] - x for e in preloads(trials.wheels, p, load)]
-    return np.asarray(np.mean(np.square(moved), axis=0))
+    starts = preloads(trials.wheels, p, load)
+    moved, _ = trials.simulated(np.repeat(p.logarithms[None], len(starts), axis=0), starts)
+    return np.asarray(np.mean(np.square(moved - x), axis=0))
 
 
 def left_out(trials: Trials, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n, 3) and shares that slid (n,) of each trial by the parameters (k, 12) of the others."""
-    found = [trials.alone(k).simulated(own) for k, own in enumerate(others)]
-    return np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found])
+    found = [trials.alone(k).simulated(own[None]) for k, own in enumerate(others)]
+    return np.concatenate([f[0][0] for f in found]), np.concatenate([f[1][0] for f in found])
 
 
 def _held_out(trials: Trials, errors: np.ndarray) -> HeldOut:

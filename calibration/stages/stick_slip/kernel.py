@@ -14,24 +14,77 @@ With a force plate, F its reading of sum_i A_i' f_i, the position is corrected a
 
 K_t the stiffness of the wheels that stick, K_0 that of all: P is K_0^-1 where all stick and 0 where all slide, when the
 force does not depend on the position and a correction would run away.
+
+Some bases that differ in their parameters or preloads are integrated under the same load side by side, LANES numbers
+to a row, so that each row is computed by vector instructions.
 Reference: Simo, Hughes, Computational Inelasticity, 1998, ch. 1 (return mapping).
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 PLATE = 8  # first of the plate's columns of `drive`
-STATE = 19  # numbers of a state, see `advance`
 STEPS = 2  # of the integration to a sample
 COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
+LANES = 16  # bases side by side
+_VECTOR = 4  # lanes that one instruction takes
+_WHEEL, _E = 12, 10  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), and its deflections from row _E on
+_X, _V, _DX, _A, _STICKS, _P = 0, 3, 6, 9, 12, 13  # rows of a state: x, v, the correction to come, the acceleration,
+_D, _F, _SLID, _BITS = 19, 25, 28, 29  # which wheels stuck plus one, P; the step's d, force, wheels that slide, stick
+_BODY, _ROWS = 30, 34  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
+
+
+class Bases(NamedTuple):
+    """k bases of m wheels, LANES to a group; the last ones of the last group repeat the last base.
+
+    Attributes:
+        state: (groups, _ROWS, LANES), see above.
+        wheels: (groups, m, _WHEEL, LANES).
+        lanes: (groups,) that count, a multiple of _VECTOR.
+    """
+
+    state: np.ndarray
+    wheels: np.ndarray
+    lanes: np.ndarray
+
+    def deflection(self, i: int) -> np.ndarray:
+        """Of the wheels (m, 2) of a base [m]."""
+        return self.wheels[i // LANES, :, _E:, i % LANES]
+
+
+def at_rest(wheels: np.ndarray, bodies: np.ndarray, preload: np.ndarray | None = None) -> Bases:
+    """Bases at rest.
+
+    Args:
+        wheels: (k, m, 10) x, y, kx, ky, c, mu, n, G.
+        bodies: (k, 4), see _BODY.
+        preload: (k, m, 2) deflections [m]; None: none.
+    """
+    k, m = wheels.shape[:2]
+    groups = -(-k // LANES)
+    own = np.minimum(np.arange(groups * LANES), k - 1)
+    e = np.zeros((k, m, 2)) if preload is None else preload
+    rows = np.concatenate([wheels, e], axis=2)[own].reshape(groups, LANES, m, _WHEEL).transpose(0, 2, 3, 1)
+    lanes = np.minimum(k - LANES * np.arange(groups), LANES)
+    state = np.zeros((groups, _ROWS, LANES))
+    state[:, _BODY:] = bodies[own].reshape(groups, LANES, 4).transpose(0, 2, 1)
+    return Bases(state, np.ascontiguousarray(rows), -(-lanes // _VECTOR) * _VECTOR)
+
+
+@njit(cache=True, error_model="numpy")
+def _cofactors(a: np.ndarray) -> tuple[float, float, float, float, float, float, float]:
+    """Of a symmetric matrix (a00, a01, a02, a11, a12, a22), and 1 / determinant."""
+    c00, c01, c02 = a[3] * a[5] - a[4] * a[4], a[2] * a[4] - a[1] * a[5], a[1] * a[4] - a[2] * a[3]
+    c11, c12, c22 = a[0] * a[5] - a[2] * a[2], a[1] * a[2] - a[0] * a[4], a[0] * a[3] - a[1] * a[1]
+    return c00, c01, c02, c11, c12, c22, 1.0 / (a[0] * c00 + a[1] * c01 + a[2] * c02)
 
 
 @njit(cache=True, error_model="numpy")
 def _solved(a: np.ndarray, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
     """Solution of a symmetric system, a = (a00, a01, a02, a11, a12, a22)."""
-    c00, c01, c02 = a[3] * a[5] - a[4] * a[4], a[2] * a[4] - a[1] * a[5], a[1] * a[4] - a[2] * a[3]
-    c11, c12, c22 = a[0] * a[5] - a[2] * a[2], a[1] * a[2] - a[0] * a[4], a[0] * a[3] - a[1] * a[1]
-    i = 1.0 / (a[0] * c00 + a[1] * c01 + a[2] * c02)
+    c00, c01, c02, c11, c12, c22, i = _cofactors(a)
     return (
         (c00 * b0 + c01 * b1 + c02 * b2) * i,
         (c01 * b0 + c11 * b1 + c12 * b2) * i,
@@ -40,9 +93,9 @@ def _solved(a: np.ndarray, b0: float, b1: float, b2: float) -> tuple[float, floa
 
 
 @njit(cache=True, error_model="numpy")
-def _stiffness(wheels: np.ndarray, i: int, out: np.ndarray) -> None:
-    """Add a wheel's stiffness to (k00, k01, k02, k11, k12, k22)."""
-    px, py, kx, ky = wheels[i, 0], wheels[i, 1], wheels[i, 2], wheels[i, 3]
+def _stiffness(wheels: np.ndarray, o: int, out: np.ndarray) -> None:
+    """Add the stiffness of a wheel, from element o of flat wheels on, to (k00, k01, k02, k11, k12, k22)."""
+    px, py, kx, ky = wheels[o], wheels[o + LANES], wheels[o + 2 * LANES], wheels[o + 3 * LANES]
     out[0] += kx
     out[2] -= kx * py
     out[3] += ky
@@ -51,176 +104,203 @@ def _stiffness(wheels: np.ndarray, i: int, out: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def wheel_force(
-    wheels: np.ndarray, i: int, e: np.ndarray, d: np.ndarray, state: np.ndarray, u: np.ndarray, h: float
-) -> tuple[float, float, bool]:
-    """Force of wheel i after the base has moved by d (5,), which ends in its load's parts; e (m, 2) follows."""
-    px, py, kx, ky, c = wheels[i, 0], wheels[i, 1], wheels[i, 2], wheels[i, 3], wheels[i, 4]
-    N = max(wheels[i, 6] + wheels[i, 7] * d[3] + wheels[i, 8] * d[4] + wheels[i, 9] * d[5], 0.0)
-    qx, qy = -N * u[7], N * u[6]
-    ex, ey = e[i, 0] + d[0] - d[2] * py, e[i, 1] + d[1] + d[2] * px
-    fx = kx * ex + c * (state[3] - state[5] * py) + qx
-    fy = ky * ey + c * (state[4] + state[5] * px) + qy
-    square, limit = fx * fx + fy * fy, wheels[i, 5] * N
-    slides = square > limit * limit
-    if slides:
-        cut, b = limit / np.sqrt(square), c / h
-        fx, fy = fx * cut, fy * cut
-        ex, ey = (fx - qx + b * e[i, 0]) / (kx + b), (fy - qy + b * e[i, 1]) / (ky + b)
-    e[i, 0], e[i, 1] = ex, ey
-    return fx, fy, slides
-
-
-@njit(cache=True, error_model="numpy")
-def _corrector(wheels: np.ndarray, sticks: int, share: float, out: np.ndarray) -> None:
-    """P's six elements, row by row, upper; bit i of `sticks` is set where wheel i sticks."""
-    s, a = np.zeros(6), np.zeros(6)
-    for i in range(len(wheels)):
-        _stiffness(wheels, i, a)
+def _corrector(wheels: np.ndarray, lane: int, share: float, state: np.ndarray) -> None:
+    """P's six elements, row by row, upper, into a lane of a flat state."""
+    s, a, sticks = np.zeros(6), np.zeros(6), int(state[_STICKS * LANES + lane]) - 1
+    for i in range(len(wheels) // (_WHEEL * LANES)):
+        o = i * _WHEEL * LANES + lane
+        _stiffness(wheels, o, a)
         if sticks >> i & 1:
-            _stiffness(wheels, i, s)
+            _stiffness(wheels, o, s)
     for k in range(6):
         a[k] = s[k] + share * a[k]
-    n = 0
+    n = _P
     for i in range(3):
         y0, y1, y2 = _solved(a, 1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2))
         z0, z1 = s[0] * y0 + s[1] * y1 + s[2] * y2, s[1] * y0 + s[3] * y1 + s[4] * y2
         z = _solved(a, z0, z1, s[2] * y0 + s[4] * y1 + s[5] * y2)
         for j in range(i, 3):
-            out[n] = z[j]
+            state[n * LANES + lane] = z[j]
             n += 1
 
 
 @njit(cache=True, error_model="numpy")
-def advance(
-    state: np.ndarray,
-    e: np.ndarray,
-    drive: np.ndarray,
-    inertia: np.ndarray,
-    wheels: np.ndarray,
-    body: np.ndarray,
-    h: float,
-) -> float:
-    """One sample on: state and deflections are changed; the share of wheels that slid is returned.
+def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
+    """d of a step in n lanes of a flat state, its last parts those of the load, and the base's dampers' force."""
+    z, my, mx = u[3], u[4], u[5]
+    z0, z1, z2, my0, my1, my2, mx0, mx1, mx2 = (
+        inertia[6], inertia[7], inertia[8], inertia[9], inertia[10], inertia[11], inertia[12], inertia[13], inertia[14]
+    )  # fmt: skip
+    for l in range(n):
+        a0, a1, a2 = s[_A * LANES + l], s[(_A + 1) * LANES + l], s[(_A + 2) * LANES + l]
+        s[_D * LANES + l] = h * s[_V * LANES + l] + s[_DX * LANES + l]
+        s[(_D + 1) * LANES + l] = h * s[(_V + 1) * LANES + l] + s[(_DX + 1) * LANES + l]
+        s[(_D + 2) * LANES + l] = h * s[(_V + 2) * LANES + l] + s[(_DX + 2) * LANES + l]
+        s[(_D + 3) * LANES + l] = z + z0 * a0 + z1 * a1 + z2 * a2
+        s[(_D + 4) * LANES + l] = my + my0 * a0 + my1 * a1 + my2 * a2
+        s[(_D + 5) * LANES + l] = mx + mx0 * a0 + mx1 * a1 + mx2 * a2
+        s[_F * LANES + l] = s[_BODY * LANES + l] * s[_V * LANES + l]
+        s[(_F + 1) * LANES + l] = s[_BODY * LANES + l] * s[(_V + 1) * LANES + l]
+        s[(_F + 2) * LANES + l] = s[(_BODY + 1) * LANES + l] * s[(_V + 2) * LANES + l]
+        s[_BITS * LANES + l] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float, n: int) -> None:
+    """Add the forces of wheels in n lanes of a flat state, and bit i where wheel i sticks; deflections follow."""
+    rows = _WHEEL * LANES
+    for i in range(len(wheels) // rows):
+        w, bit = wheels[i * rows : (i + 1) * rows], float(1 << i)
+        for l in range(n):
+            px, py, kx, ky = w[l], w[LANES + l], w[2 * LANES + l], w[3 * LANES + l]
+            c, before_x, before_y = w[4 * LANES + l], w[_E * LANES + l], w[(_E + 1) * LANES + l]
+            d3, d4, d5 = s[(_D + 3) * LANES + l], s[(_D + 4) * LANES + l], s[(_D + 5) * LANES + l]
+            N = max(w[6 * LANES + l] + w[7 * LANES + l] * d3 + w[8 * LANES + l] * d4 + w[9 * LANES + l] * d5, 0.0)
+            qx, qy, turn, spin = -N * ry, N * rx, s[(_D + 2) * LANES + l], s[(_V + 2) * LANES + l]
+            ex, ey = before_x + s[_D * LANES + l] - turn * py, before_y + s[(_D + 1) * LANES + l] + turn * px
+            fx = kx * ex + c * (s[_V * LANES + l] - spin * py) + qx
+            fy = ky * ey + c * (s[(_V + 1) * LANES + l] + spin * px) + qy
+            square, limit = fx * fx + fy * fy, w[5 * LANES + l] * N
+            cut, b = limit / np.sqrt(square), c / h
+            slides, x, y = square > limit * limit, fx * cut, fy * cut
+            fx, fy = (x if slides else fx), (y if slides else fy)
+            x, y = (x - qx + b * before_x) / (kx + b), (y - qy + b * before_y) / (ky + b)
+            w[_E * LANES + l], w[(_E + 1) * LANES + l] = (x if slides else ex), (y if slides else ey)
+            s[_F * LANES + l] += fx
+            s[(_F + 1) * LANES + l] += fy
+            s[(_F + 2) * LANES + l] += px * fy - py * fx
+            s[_SLID * LANES + l] += 1.0 if slides else 0.0
+            s[_BITS * LANES + l] += 0.0 if slides else bit
+
+
+@njit(cache=True, error_model="numpy")
+def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int) -> None:
+    """The correction of the next step, by P and the plate's force."""
+    for l in range(n):
+        gain = s[(_BODY + 2) * LANES + l] * h
+        r0 = gain * (fx - s[_F * LANES + l])
+        r1 = gain * (fy - s[(_F + 1) * LANES + l])
+        r2 = gain * (mz - s[(_F + 2) * LANES + l])
+        p0, p1, p2 = s[_P * LANES + l], s[(_P + 1) * LANES + l], s[(_P + 2) * LANES + l]
+        p3, p4, p5 = s[(_P + 3) * LANES + l], s[(_P + 4) * LANES + l], s[(_P + 5) * LANES + l]
+        s[_DX * LANES + l] = p0 * r0 + p1 * r1 + p2 * r2
+        s[(_DX + 1) * LANES + l] = p1 * r0 + p3 * r1 + p4 * r2
+        s[(_DX + 2) * LANES + l] = p2 * r0 + p4 * r1 + p5 * r2
+
+
+@njit(cache=True, error_model="numpy")
+def _ended(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
+    """Accelerations by what the force leaves of the drive, positions and velocities a step on."""
+    c00, c01, c02, c11, c12, c22, i = _cofactors(inertia)
+    wx, wy, wz = u[0], u[1], u[2]
+    for l in range(n):
+        b0, b1, b2 = wx - s[_F * LANES + l], wy - s[(_F + 1) * LANES + l], wz - s[(_F + 2) * LANES + l]
+        a0 = (c00 * b0 + c01 * b1 + c02 * b2) * i
+        a1 = (c01 * b0 + c11 * b1 + c12 * b2) * i
+        a2 = (c02 * b0 + c12 * b1 + c22 * b2) * i
+        s[_A * LANES + l], s[(_A + 1) * LANES + l], s[(_A + 2) * LANES + l] = a0, a1, a2
+        s[_X * LANES + l] += s[_D * LANES + l]
+        s[(_X + 1) * LANES + l] += s[(_D + 1) * LANES + l]
+        s[(_X + 2) * LANES + l] += s[(_D + 2) * LANES + l]
+        s[_V * LANES + l] += h * a0
+        s[(_V + 1) * LANES + l] += h * a1
+        s[(_V + 2) * LANES + l] += h * a2
+
+
+@njit(cache=True, error_model="numpy")
+def _advance(s: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
+    """`advance` with all arrays of the bases flat."""
+    for l in range(LANES):
+        s[_SLID * LANES + l] = 0.0
+    for k in range(len(drive)):
+        u = drive[k]
+        _begun(s, u, inertia, h, n)
+        _on_wheels(wheels, s, u[6], u[7], h, n)
+        if s[(_BODY + 2) * LANES] > 0.0:
+            for l in range(n):
+                if s[_STICKS * LANES + l] != s[_BITS * LANES + l]:
+                    s[_STICKS * LANES + l] = s[_BITS * LANES + l]
+                    _corrector(wheels, l, s[(_BODY + 3) * LANES + l], s)
+            _corrected(s, u[PLATE], u[PLATE + 1], u[PLATE + 2], h, n)
+        _ended(s, u, inertia, h, n)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
+    """One sample on, the first n lanes of a group: states and deflections are changed.
 
     Args:
-        state: (19,) x, v, the correction to come, the acceleration, which wheels stuck plus one, P.
-        e: (m, 2) deflections [m].
+        state: (_ROWS, LANES); wheels that slid are counted in row _SLID.
+        wheels: (m, _WHEEL, LANES).
         drive: (k, 11) at k steps of h [s]: w, (-Fz, My, -Mx), (rx, ry), plate's force.
         inertia: (15,) M's six elements (row by row, upper) and what an acceleration adds to (-Fz, My, -Mx), (3, 3).
-        wheels: (m, 10) x, y, kx, ky, c, mu, n, G.
-        body: (4,) dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-].
         h: [s].
+        n: A multiple of _VECTOR.
     """
-    d, P = np.empty(6), state[13:]
-    slid, m, gain = 0, len(wheels), body[2] * h
-    for s in range(len(drive)):
-        u = drive[s]
-        for k in range(3):
-            d[k] = h * state[3 + k] + state[6 + k]
-            j = 6 + 3 * k
-            d[3 + k] = u[3 + k] + inertia[j] * state[9] + inertia[j + 1] * state[10] + inertia[j + 2] * state[11]
-        F0, F1, F2 = body[0] * state[3], body[0] * state[4], body[1] * state[5]
-        sticks = 0
-        for i in range(m):
-            fx, fy, slides = wheel_force(wheels, i, e, d, state, u, h)
-            F0 += fx
-            F1 += fy
-            F2 += wheels[i, 0] * fy - wheels[i, 1] * fx
-            slid += slides
-            sticks |= (not slides) << i
-        if gain > 0.0:
-            if state[12] != sticks + 1.0:
-                state[12] = sticks + 1.0
-                _corrector(wheels, sticks, body[3], P)
-            r0, r1, r2 = gain * (u[PLATE] - F0), gain * (u[PLATE + 1] - F1), gain * (u[PLATE + 2] - F2)
-            state[6] = P[0] * r0 + P[1] * r1 + P[2] * r2
-            state[7] = P[1] * r0 + P[3] * r1 + P[4] * r2
-            state[8] = P[2] * r0 + P[4] * r1 + P[5] * r2
-        state[9], state[10], state[11] = _solved(inertia, u[0] - F0, u[1] - F1, u[2] - F2)
-        for k in range(3):
-            state[k] += d[k]
-            state[3 + k] += h * state[9 + k]
-    return slid / (m * len(drive))
+    _advance(state.reshape(-1), wheels.reshape(-1), drive, inertia, h, n)
 
 
 @njit(cache=True, error_model="numpy")
 def simulated(
-    starts: np.ndarray,
-    drive: np.ndarray,
-    inertia: np.ndarray,
-    wheels: np.ndarray,
-    body: np.ndarray,
-    h: float,
-    preload: np.ndarray,
+    starts: np.ndarray, drive: np.ndarray, inertia: np.ndarray, bases: Bases, h: float, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (n, 3) [m, rad] and shares of wheels that slid (n,) of trials one after the other.
+    """Positions (k, n, 3) [m, rad] and shares of wheels that slid (k, n) of k bases in trials one after the other.
 
     Args:
-        starts: Sample at which each trial starts, and n; each starts at rest.
-        drive: (n k, 11), k steps to a sample.
+        starts: Sample at which each trial starts, and n.
+        drive: (n steps, 11).
         inertia: (n, 15).
-        wheels: (m, 10).
-        body: (4,).
+        bases: At rest: so each trial starts.
         h: Length of a step [s].
-        preload: (m, 2) deflections at the start of each trial [m].
+        k: How many of them.
     """
-    n, m = len(inertia), len(wheels)
-    k = len(drive) // n
-    x, share, e, state = np.empty((n, 3)), np.empty(n), np.empty((m, 2)), np.empty(STATE)
-    for trial in range(len(starts) - 1):
-        for i in range(m):
-            e[i, 0], e[i, 1] = preload[i, 0], preload[i, 1]
-        for i in range(STATE):
-            state[i] = 0.0
-        for t in range(starts[trial], starts[trial + 1]):
-            share[t] = advance(state, e, drive[t * k : (t + 1) * k], inertia[t], wheels, body, h)
-            for i in range(3):
-                x[t, i] = state[i]
+    n, m = len(inertia), bases.wheels.shape[1]
+    steps = len(drive) // n
+    x, share = np.empty((k, n, 3)), np.empty((k, n))
+    for g in range(len(bases.lanes)):
+        lanes = bases.lanes[g]
+        for trial in range(len(starts) - 1):
+            state, wheels = bases.state[g].copy().reshape(-1), bases.wheels[g].copy().reshape(-1)
+            for t in range(starts[trial], starts[trial + 1]):
+                _advance(state, wheels, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)
+                for l in range(min(lanes, k - LANES * g)):
+                    share[LANES * g + l, t] = state[_SLID * LANES + l] / (m * steps)
+                    for i in range(3):
+                        x[LANES * g + l, t, i] = state[(_X + i) * LANES + l]
     return x, share
 
 
 @njit(cache=True, error_model="numpy")
 def advance_members(
-    states: np.ndarray,
-    e: np.ndarray,
-    drive: np.ndarray,
-    inertia: np.ndarray,
-    wheels: np.ndarray,
-    bodies: np.ndarray,
-    h: float,
+    bases: Bases, drive: np.ndarray, inertia: np.ndarray, h: float, members: int, k: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """`advance` for the members of an ensemble, k of them, then for preloaded ones of the first member's parameters.
+    """`advance` for k bases: the members of an ensemble, then preloaded ones of the first member's parameters.
 
     Args:
-        states: (k + p, STATE), changed.
-        e: (k + p, m, 2), changed.
+        bases: States and deflections are changed.
         drive: (steps, 11).
         inertia: (15,).
-        wheels: (k + p, m, 10).
-        bodies: (k + p, 5): as `advance` takes it, and 1 for a member, 0 for a preloaded one.
         h: [s].
+        members: Of the ensemble.
+        k: Of all.
 
     Returns:
         Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first, share that slid.
     """
-    mean, variance, preloaded, share, members = np.zeros(3), np.zeros(3), np.zeros(3), 0.0, 0
-    for i in range(len(states)):
-        own = advance(states[i], e[i], drive, inertia, wheels[i], bodies[i], h)
-        share = own if i == 0 else share
-        members += bodies[i, 4] > 0.0
-        for a in range(3):
-            if bodies[i, 4] > 0.0:
-                mean[a] += states[i, a]
-            else:
-                preloaded[a] += (states[i, a] - states[0, a]) ** 2
-    others = max(len(states) - members, 1)
+    mean, variance, preloaded = np.zeros(3), np.zeros(3), np.zeros(3)
+    for g in range(len(bases.lanes)):
+        advance(bases.state[g], bases.wheels[g], drive, inertia, h, bases.lanes[g])
     for a in range(3):
-        mean[a] /= members
-        preloaded[a] /= others
+        first = bases.state[0, a, 0]
         for i in range(members):
-            variance[a] += (states[i, a] - mean[a]) ** 2 / members
-    return mean, variance, preloaded, share
+            mean[a] += bases.state[i // LANES, a, i % LANES]
+        for i in range(members, k):
+            preloaded[a] += (bases.state[i // LANES, a, i % LANES] - first) ** 2
+        mean[a] /= members
+        preloaded[a] /= max(k - members, 1)
+        for i in range(members):
+            variance[a] += (bases.state[i // LANES, a, i % LANES] - mean[a]) ** 2 / members
+    return mean, variance, preloaded, bases.state[0, _SLID, 0] / (bases.wheels.shape[1] * len(drive))
 
 
 @njit(cache=True, error_model="numpy")
@@ -265,10 +345,9 @@ def sample_row(wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: 
 
 @njit(cache=True, error_model="numpy")
 def step_members(
-    states: np.ndarray,
-    e: np.ndarray,
+    bases: Bases,
     readings: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    fitted: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    fitted: tuple[int, int, np.ndarray, np.ndarray],
     h: float,
     row: np.ndarray,
     found: np.ndarray,
@@ -276,15 +355,14 @@ def step_members(
     """`advance_members` from one sample to the next, and `banded`; in between, readings are linear.
 
     Args:
-        states: Changed.
-        e: Changed.
+        bases: States and deflections are changed.
         readings: Wrench, tilt, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
-        fitted: Wheels, bodies, K_0^-1 (3, 3), band (4, 3).
+        fitted: Members, bases, K_0^-1 (3, 3), band (4, 3).
         h: [s].
         row: (11,) of this sample, filled.
         found: (6, 3) of `banded`, filled.
     """
-    (wrench, tilt, driving, rest, earlier, before), (wheels, bodies, compliance, band) = readings, fitted
+    (wrench, tilt, driving, rest, earlier, before), (members, k, compliance, band) = readings, fitted
     drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
     sample_row(wrench, tilt, driving, rest, row)
     for s in range(STEPS):
@@ -295,5 +373,5 @@ def step_members(
     for i in range(3):
         for c in range(3):
             elastic[i] += compliance[i, c] * row[PLATE + c]
-    mean, spread, preloaded, share = advance_members(states, e, drive, inertia, wheels, bodies, h)
+    mean, spread, preloaded, share = advance_members(bases, drive, inertia, h, members, k)
     banded((mean, spread, preloaded), before, share, band, elastic, found)

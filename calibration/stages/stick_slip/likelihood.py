@@ -16,7 +16,7 @@ import numpy as np
 
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, PlanarForcing
-from calibration.stages.stick_slip.kernel import simulated
+from calibration.stages.stick_slip.kernel import Bases, at_rest, simulated
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, blocks, pooled_noise
 from calibration.stages.stick_slip.wheels import PRIOR, PRIOR_SIGMA, SlipParameters, WheelSet
 
@@ -93,22 +93,22 @@ class Trials:
         )
 
     def simulated(self, logarithms: np.ndarray, preload: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (n, 3) since the first second of each trial, and shares of wheels that slid (n,).
+        """Positions (k, n, 3) since the first second of each trial, and shares of wheels that slid (k, n).
 
-        Deflections of the wheels (m, 2) at the start of each trial may be given.
+        By parameters (k, p); deflections of the wheels (k, m, 2) at the start of each trial may be given.
         """
-        p = SlipParameters.of(logarithms)
-        e = np.zeros(self.wheels.position.shape) if preload is None else preload
-        x, share = simulated(
-            self.starts, self.drive, self.inertia, self.wheels.rows(p), body(p, self.corrected), STEP, e
-        )
+        bases = bases_of(self.wheels, logarithms, self.corrected, preload)
+        x, share = simulated(self.starts, self.drive, self.inertia, bases, STEP, len(logarithms))
         for a, b in self.spans:
-            x[a:b] -= x[a:b][self.rest[a:b]].mean(axis=0)
+            x[:, a:b] -= x[:, a:b][:, self.rest[a:b]].mean(axis=1, keepdims=True)
         return x, share
 
-    def errors(self, logarithms: np.ndarray) -> np.ndarray:
-        """Measured minus predicted in each window (w, WINDOW, 3), its mean taken off; 0 where it does not count."""
-        x, _ = self.simulated(logarithms)
+    def errors(self, logarithms: np.ndarray) -> list[np.ndarray]:
+        """By each of some parameters (k, p), see `error`."""
+        return [self.error(x) for x in self.simulated(logarithms)[0]]
+
+    def error(self, x: np.ndarray) -> np.ndarray:
+        """Measured minus predicted x (n, 3) by window (w, WINDOW, 3), its mean taken off; 0 where it does not count."""
         e = self.measured - np.concatenate([blocks(x[a:b]) for a, b in self.spans])
         _, index, counts = self.windows
         r = np.clip(np.nan_to_num(e, nan=_FAR, posinf=_FAR, neginf=-_FAR), -_FAR, _FAR)[index]
@@ -137,11 +137,8 @@ class Trials:
         Derivatives are differences, forward or, if `both`, central.
         """
         p = len(logarithms)
-        J = np.empty((p, *errors.shape))
-        for i in range(p):
-            step = DIFFERENCE * np.eye(p)[i]
-            after = self.errors(logarithms + step)
-            J[i] = (after - self.errors(logarithms - step)) / 2.0 if both else after - errors
+        J = np.array(self.errors(logarithms + DIFFERENCE * np.eye(p)))
+        J = (J - self.errors(logarithms - DIFFERENCE * np.eye(p))) / 2.0 if both else J - errors
         J /= DIFFERENCE
         trial, _, _ = self.windows
         count = np.maximum(self.windows[2].sum(axis=1), 1)
@@ -158,6 +155,12 @@ class Trials:
 def body(p: SlipParameters, corrected: bool) -> np.ndarray:
     """(4,) as the kernel takes it."""
     return np.array([p.body_c, p.body_cr, CORRECTION[0] if corrected else 0.0, CORRECTION[1]])
+
+
+def bases_of(wheels: WheelSet, logarithms: np.ndarray, corrected: bool, preload: np.ndarray | None = None) -> Bases:
+    """Bases of parameters (k, p), preloaded by deflections (k, m, 2)."""
+    each = [SlipParameters.of(own) for own in logarithms]
+    return at_rest(np.array([wheels.rows(p) for p in each]), np.array([body(p, corrected) for p in each]), preload)
 
 
 def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]]) -> Trials:

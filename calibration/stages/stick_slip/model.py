@@ -8,7 +8,7 @@ from calibration.errors import NoSuchElement
 from calibration.stages.stick_slip.band import Band, PlainBand, reached, slid_path
 from calibration.stages.stick_slip.forcing import HEAVE, PLANE, STEP, PlanarForcing, Tilting
 from calibration.stages.stick_slip.kernel import simulated
-from calibration.stages.stick_slip.likelihood import body
+from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source
@@ -119,13 +119,12 @@ class StickSlip:
         """
         found = self.direction(forcing.source)
         p = found.parameters
-        members = [self._motion(forcing, SlipParameters.of(own), found.corrected) for own in found.ensemble]
-        one, share = members[0]
-        every = np.array([m[0] for m in members])
         starts = preloads(self.wheels, p, forcing.drive[0, 3:6])
-        preloaded = np.mean([(self._motion(forcing, p, found.corrected, e)[0] - one) ** 2 for e in starts], axis=0)
-        x = every.mean(axis=0)
-        variance = found.band.variance(every.var(axis=0), preloaded, slid_path(x, share))
+        every, share = self._motions(forcing, found, starts)
+        n = len(found.ensemble)
+        preloaded = np.mean((every[n:] - every[0]) ** 2, axis=0)
+        x = every[:n].mean(axis=0)
+        variance = found.band.variance(every[:n].var(axis=0), preloaded, slid_path(x, share))
         elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
         kept = believed(x - elastic, variance - found.band.floor**2)
         x = elastic + kept * (x - elastic)
@@ -133,14 +132,17 @@ class StickSlip:
         variance = np.where(found.slips, variance, found.plain.variance(reached(elastic)))
         return PlanarPrediction(np.where(found.slips, x, plain), variance, share, kept)
 
-    def _motion(
-        self, forcing: PlanarForcing, p: SlipParameters, corrected: bool, preload: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Positions since the first second (n, 3), and shares of wheels that slid (n,)."""
-        starts, settings = np.array([0, len(forcing.inertia)]), body(p, corrected)
-        e = np.zeros(self.wheels.position.shape) if preload is None else preload
-        x, share = simulated(starts, forcing.drive, forcing.inertia, self.wheels.rows(p), settings, STEP, e)
-        return x - x[forcing.rest].mean(axis=0), share
+    def _motions(self, forcing: PlanarForcing, found: Direction, preload: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions since the first second (k, n, 3), and shares of the optimum's wheels that slid (n,).
+
+        Of the ensemble, then of the optimum from preloads (p, m, 2).
+        """
+        k, starts = len(found.ensemble), np.array([0, len(forcing.inertia)])
+        e = np.concatenate([np.zeros((k, *preload.shape[1:])), preload])
+        p = np.concatenate([found.ensemble, np.repeat(found.logarithms[None], len(preload), axis=0)])
+        bases = bases_of(self.wheels, p, found.corrected, e)
+        x, share = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, len(p))
+        return x - x[:, forcing.rest].mean(axis=1, keepdims=True), share[0]
 
     def displacement(self, forcing: PlanarForcing) -> tuple[np.ndarray, np.ndarray]:
         """Displacement of the base frame (n, 6) [m, rad, frame 0] and its variances (n, 6)."""

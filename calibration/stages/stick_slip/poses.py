@@ -10,8 +10,8 @@ import numpy as np
 
 from calibration.recording.trial import Trial
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_forcing, wrenches_of
-from calibration.stages.stick_slip.kernel import STATE, advance
-from calibration.stages.stick_slip.likelihood import body
+from calibration.stages.stick_slip.kernel import advance
+from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source
@@ -69,12 +69,11 @@ def slipping_base_poses(model: StickSlip, sources: WrenchSources, trial: Trial, 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
     """Share (n, m) of its friction that each wheel needs, by the most likely parameters."""
     found = model.direction(forcing.source)
-    rows, settings = model.wheels.rows(found.parameters), body(found.parameters, found.corrected)
-    e, state = np.zeros((len(forcing.t), *model.wheels.position.shape)), np.zeros(STATE)
-    now = np.zeros(model.wheels.position.shape)
+    rows, base = model.wheels.rows(found.parameters), bases_of(model.wheels, found.logarithms[None], found.corrected)
+    e = np.zeros((len(forcing.t), *model.wheels.position.shape))
     for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):
-        advance(state, now, drive, forcing.inertia[k], rows, settings, STEP)
-        e[k] = now
+        advance(base.state[0], base.wheels[0], drive, forcing.inertia[k], STEP, base.lanes[0])
+        e[k] = base.deflection(0)
     drive = forcing.drive[STEPS - 1 :: STEPS]
     N = np.maximum(rows[:, 6] + drive[:, 3:6] @ rows[:, 7:].T, 0.0)
     force = rows[:, 2:4] * e + N[..., None] * np.stack([-drive[:, 7], drive[:, 6]], axis=1)[:, None]

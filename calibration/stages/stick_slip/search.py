@@ -11,6 +11,7 @@ parameters and its place, whose prior is PLACE wide. Right places seem off by 8 
 that is wrong by 30 mm by 11 to 30.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,7 +52,7 @@ class Point:
 def searched(trials: Trials) -> tuple[Point, tuple[float, ...]]:
     """The best point, and the costs to which the starts came."""
     frictions = np.array([float(i in _FRICTIONS) for i in range(len(NAMES))])
-    points = [point(trials, PRIOR + s * frictions) for s in _SPREAD]
+    points = tried(trials, [PRIOR + s * frictions for s in _SPREAD])
     for _ in range(_FIRST):
         points = [p if p.ended else stepped(trials, p) for p in points]
     return descended(trials, scanned(trials, min(points, key=lambda p: p.cost))), tuple(p.cost for p in points)
@@ -59,7 +60,7 @@ def searched(trials: Trials) -> tuple[Point, tuple[float, ...]]:
 
 def warmed(trials: Trials, start: np.ndarray) -> Point:
     """The best point from a start (p,) near it, as another source found it."""
-    return descended(trials, scanned(trials, point(trials, start)))
+    return descended(trials, scanned(trials, tried(trials, [start])[0]))
 
 
 def descended(trials: Trials, best: Point) -> Point:
@@ -77,17 +78,18 @@ def scanned(trials: Trials, at: Point) -> Point:
     """The point with other frictions, one after the other, where that is better by more than a step's least gain."""
     best = at
     for i in _FRICTIONS:
-        tried = [point(trials, best.logarithms + step * np.eye(len(NAMES))[i]) for step in _SCAN]
-        new = min(tried, key=lambda p: p.cost)
+        new = min(
+            tried(trials, [best.logarithms + step * np.eye(len(NAMES))[i] for step in _SCAN]), key=lambda p: p.cost
+        )
         if new.cost < best.cost - _GAIN:
             best = new
     return best
 
 
-def point(trials: Trials, logarithms: np.ndarray) -> Point:
-    """A start."""
-    errors = trials.errors(logarithms)
-    return Point(logarithms, errors, trials.cost(logarithms, errors))
+def tried(trials: Trials, logarithms: Sequence[np.ndarray]) -> list[Point]:
+    """Some starts."""
+    errors = trials.errors(np.array(logarithms))
+    return [Point(own, e, trials.cost(own, e)) for own, e in zip(logarithms, errors, strict=True)]
 
 
 def stepped(trials: Trials, at: Point) -> Point:
@@ -99,7 +101,7 @@ def stepped(trials: Trials, at: Point) -> Point:
     damping = at.damping
     while damping < most:
         step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
-        new = point(trials, at.logarithms + np.clip(step, -_LONGEST, _LONGEST))
+        (new,) = tried(trials, [at.logarithms + np.clip(step, -_LONGEST, _LONGEST)])
         if new.cost < at.cost:
             ended = at.cost - new.cost < _GAIN
             return Point(new.logarithms, new.errors, new.cost, max(damping / factor, least), ended)
@@ -115,7 +117,7 @@ def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     """
     n, m = len(best), len(trials.wheels.position)
     prior = np.concatenate([PRIOR_SIGMA**-2.0, np.full(2 * m, PLACE**-2)])
-    errors = trials.errors(best)
+    (errors,) = trials.errors(best[None])
     weight = np.sqrt(trials.independent / np.maximum(trials.windows[2].sum(axis=1), 1))[:, None]
     weight = (weight / np.sqrt(trials.variances(errors)))[:, None, :]
     steps = np.repeat([DIFFERENCE, _PLACE_STEP], [n, 2 * m])
@@ -135,4 +137,4 @@ def _placed(trials: Trials, best: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Errors with changes (p + 2 m,) of the parameters, then of the places of the wheels."""
     n = len(best)
     wheels = replace(trials.wheels, position=trials.wheels.position + change[n:].reshape(-1, 2))
-    return replace(trials, wheels=wheels).errors(best + change[:n])
+    return replace(trials, wheels=wheels).errors((best + change[:n])[None])[0]

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.forcing import STEPS, UNMOVED
-from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STATE, sample_row, step_members
+from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, Bases, at_rest, sample_row, step_members
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
@@ -50,8 +50,7 @@ class SlipState(NamedTuple):
         rest: (6,) mean of the plate's (Fx, Fy, Mz) and of those of inverse dynamics in the first second.
         n: Samples in that mean.
         before: (11,) the last sample as the kernel takes it.
-        states: (e, STATE) of the members, then of the preloaded optimum.
-        deflections: (e, m, 2).
+        bases: The members, then the preloaded optimum.
         found: (6, 3) see `kernel.banded`.
         x: (3,) x, y, yaw [m, rad, frame 0].
     """
@@ -61,8 +60,7 @@ class SlipState(NamedTuple):
     rest: np.ndarray
     n: int
     before: np.ndarray
-    states: np.ndarray
-    deflections: np.ndarray
+    bases: Bases
     found: np.ndarray
     x: np.ndarray
 
@@ -79,7 +77,7 @@ class SlipStream:
         direction: What was fitted with a plate.
         wheel_set: Of the robot.
         wheels: (e, m, 10) of the members, then of the optimum, once for each preload.
-        bodies: (e, 5): as the kernel takes them, and whether it is a member.
+        bodies: (e, 4) as the kernel takes them.
         compliance: (3, 3) K_0^-1 of the optimum.
         moves: (3,) axes that are moved; linear ones are the compliance's, see `loaded_base`.
         band: (4, 3) s, r, p, l.
@@ -104,22 +102,20 @@ class SlipStream:
                 return self._first(sample.t, row, planar)
             n = before.n + 1
             return before._replace(t=sample.t, rest=before.rest + (planar - before.rest) / n, n=n, before=row)
-        states, e = before.states.copy(), before.deflections.copy()
-        row, found, fitted = (
-            np.empty(COLUMNS),
-            np.empty_like(before.found),
-            (self.wheels, self.bodies, self.compliance, self.band),
-        )
+        was = before.bases
+        bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes)
+        row, found = np.empty(COLUMNS), np.empty_like(before.found)
+        fitted = len(self.direction.ensemble), len(self.bodies), self.compliance, self.band
         readings = sample.wrench, sample.tilt, driving, before.rest, before.before, before.found
-        step_members(states, e, readings, fitted, (sample.t - before.t) / STEPS, row, found)
-        return SlipState(before.start, sample.t, before.rest, before.n, row, states, e, found, found[3] * self.moves)
+        step_members(bases, readings, fitted, (sample.t - before.t) / STEPS, row, found)
+        return SlipState(before.start, sample.t, before.rest, before.n, row, bases, found, found[3] * self.moves)
 
     def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
         none = np.zeros((6, 3))
         none[4] = self.band[0] ** 2
-        states, e = np.zeros((len(self.wheels), STATE)), np.zeros((*self.wheels.shape[:2], 2))
+        e = np.zeros((*self.wheels.shape[:2], 2))
         e[len(self.direction.ensemble) :] = preloads(self.wheel_set, self.direction.parameters, row[3:6])
-        return SlipState(t, t, planar, 1, row * _LOADS, states, e, none, none[3])
+        return SlipState(t, t, planar, 1, row * _LOADS, at_rest(self.wheels, self.bodies, e), none, none[3])
 
 
 def slip_stream(model: StickSlip) -> SlipStream:
@@ -132,8 +128,7 @@ def slip_stream(model: StickSlip) -> SlipStream:
     optimum = found.parameters
     parameters = [*(SlipParameters.of(own) for own in found.ensemble), *[optimum] * PRELOADS]
     wheels = np.array([model.wheels.rows(p) for p in parameters])
-    members = np.arange(len(parameters)) < len(found.ensemble)
-    bodies = np.column_stack([[body(p, found.corrected) for p in parameters], members])
+    bodies = np.array([body(p, found.corrected) for p in parameters])
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
     return SlipStream(
         found,

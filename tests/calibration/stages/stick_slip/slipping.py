@@ -6,8 +6,8 @@ import numpy as np
 
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing
-from calibration.stages.stick_slip.kernel import STATE, advance
-from calibration.stages.stick_slip.likelihood import Trials, body, joined
+from calibration.stages.stick_slip.kernel import advance
+from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks
 from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet
 
@@ -64,13 +64,13 @@ def literal(w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.
 
 def slid(w: np.ndarray, p: SlipParameters = TRUTH) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n, 3) and forces on the floor (n, 3) at every step, by the kernel itself, under w (n, 3)."""
-    state, e, rows, settings = np.zeros(STATE), np.zeros((len(POSITION), 2)), WHEELS.rows(p), body(p, False)
+    (state,), (wheels,), (lanes,) = bases_of(WHEELS, p.logarithms[None], False)
     drive, inertia = np.zeros((len(w), 11)), np.zeros(15)
     drive[:, :3], drive[:, 3:6], inertia[:6] = w, WEIGHT, MASS[np.triu_indices(3)]
     x, a = np.empty((len(w), 3)), np.empty((len(w), 3))
     for k in range(len(w)):
-        advance(state, e, drive[k : k + 1], inertia, rows, settings, STEP)
-        x[k], a[k] = state[:3], state[9:12]
+        advance(state, wheels, drive[k : k + 1], inertia, STEP, lanes)
+        x[k], a[k] = state[:3, 0], state[9:12, 0]
     return x, w - a @ MASS
 
 

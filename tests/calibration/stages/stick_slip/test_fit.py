@@ -34,7 +34,7 @@ def test_a_fit_finds_what_made_the_data_and_is_sure_of_no_more(trials, found):
     np.testing.assert_allclose(error[:4], 0.0, atol=0.02)  # stiffnesses
     np.testing.assert_allclose(error[4:], 0.0, atol=0.05)  # frictions: slip shows mu N, the prior N's share
     assert np.all(np.abs(error) < 4.0 * np.maximum(sigma, 2e-3))
-    assert found.cost <= trials.cost(TRUTH.logarithms, trials.errors(TRUTH.logarithms)) + 1.0
+    assert found.cost <= trials.cost(TRUTH.logarithms, trials.errors(TRUTH.logarithms[None])[0]) + 1.0
 
 
 def test_from_far_off_the_search_comes_to_the_same(trials, found):
@@ -49,11 +49,11 @@ def test_several_starts_are_made_and_the_best_is_kept(trials):
 
 def test_the_gradient_is_that_of_the_cost(trials):
     at = TRUTH.logarithms + 0.02
-    _, g = trials.normal(at, trials.errors(at), both=True)
+    _, g = trials.normal(at, trials.errors(at[None])[0], both=True)
     gradient = 2.0 * (g.sum(axis=0) + (at - PRIOR) / PRIOR_SIGMA**2)
     for i in (0, 2, 3, 6):
         step = 0.01 * np.eye(len(NAMES))[i]
-        ends = [trials.cost(p, trials.errors(p)) for p in (at + step, at - step)]
+        ends = [trials.cost(p, trials.errors(p[None])[0]) for p in (at + step, at - step)]
         assert gradient[i] == pytest.approx((ends[0] - ends[1]) / 0.02, rel=0.05, abs=2.0)
 
 
@@ -72,7 +72,7 @@ def test_trials_left_out_are_predicted(trials):
     assert np.all(direction.held_out.r2 > 0.98)
     assert direction.held_out.error.shape == (4, 3)
     x, share = left_out(trials, np.repeat(direction.logarithms[None], 4, axis=0))
-    np.testing.assert_array_equal(x, trials.simulated(direction.logarithms)[0])
+    np.testing.assert_array_equal(x, trials.simulated(direction.logarithms[None])[0][0])
     assert len(share) == len(x)
 
 
@@ -86,7 +86,7 @@ def test_a_window_that_slips_as_nobody_could_know_counts_little():
 
 def test_twice_the_same(trials):
     p = SlipParameters.of(PRIOR).logarithms
-    np.testing.assert_array_equal(trials.errors(p), trials.errors(p))
+    np.testing.assert_array_equal(trials.errors(p[None])[0], trials.errors(p[None])[0])
 
 
 @pytest.mark.parametrize(("wheel", "axis"), [(0, 0), (3, 1)])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from calibration.stages.stick_slip.forcing import STEP, STEPS
-from calibration.stages.stick_slip.kernel import STATE, advance, simulated, wheel_force
-from calibration.stages.stick_slip.likelihood import body
+from calibration.stages.stick_slip.kernel import LANES, advance, at_rest, simulated
+from calibration.stages.stick_slip.likelihood import bases_of
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import MASS, TRUTH, WEIGHT, WHEELS
 
@@ -13,10 +13,9 @@ STUCK = replace(TRUTH, drive_mu=1e3, front_mu=1e3, back_mu=1e3)
 
 
 def run(one, p=TRUTH, corrected=False, start=None):
-    settings = body(p, corrected)
-    e = np.zeros((6, 2)) if start is None else start
-    starts = np.array([0, len(one.inertia)])
-    return simulated(starts, one.drive, one.inertia, WHEELS.rows(p), settings, STEP, e)
+    bases = bases_of(WHEELS, p.logarithms[None], corrected, None if start is None else start[None])
+    (x,), (share,) = simulated(np.array([0, len(one.inertia)]), one.drive, one.inertia, bases, STEP, 1)
+    return x, share
 
 
 def test_the_kernel_is_the_equations_of_its_docstring():
@@ -52,12 +51,12 @@ def test_wheels_that_slide_leave_a_constant_friction():
 
 def test_a_sprung_base_keeps_its_energy_without_dampers():
     p = replace(STUCK, drive_c=1e-9, caster_c=1e-9, body_c=1e-9, body_cr=1e-9)
-    state, e, rows, K = np.zeros(STATE), np.zeros((6, 2)), WHEELS.rows(p), WHEELS.stiffness(p)
-    state[3:6] = 0.05, -0.03, 0.2
+    ((state,), (wheels,), (lanes,)), K = bases_of(WHEELS, p.logarithms[None], False), WHEELS.stiffness(p)
+    state[3:6] = np.array([[0.05], [-0.03], [0.2]])
     one, energy = slipping.forcing(np.zeros((2000, 3))), []
     for k in range(1000):
-        advance(state, e, one.drive[2 * k : 2 * k + 2], one.inertia[k], rows, body(p, False), STEP)
-        x, v = state[:3] + 0.5 * STEP * state[3:6], state[3:6]  # half a step on, where both are of one time
+        advance(state, wheels, one.drive[2 * k : 2 * k + 2], one.inertia[k], STEP, lanes)
+        x, v = state[:3, 0] + 0.5 * STEP * state[3:6, 0], state[3:6, 0]  # half a step on, where both are of one time
         energy.append(0.5 * v @ MASS @ v + 0.5 * x @ K @ x)
     np.testing.assert_allclose(energy, energy[0], rtol=0.05)
     assert abs(np.mean(energy[-100:]) / np.mean(energy[:100]) - 1.0) < 0.005
@@ -65,12 +64,14 @@ def test_a_sprung_base_keeps_its_energy_without_dampers():
 
 def test_a_wheel_carried_back_and_forth_dissipates_what_jenkins_element_does():
     k, mu, N, amplitude, h = 14e3, 0.25, 190.0, 8e-3, 1e-3
-    row = np.array([[0.0, 0.0, k, k, 0.0, mu, N, 0.0, 0.0, 0.0]])
+    row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, 0.0, 0.0, 0.0]]])
     u = amplitude * np.sin(np.linspace(0.0, 4.0 * np.pi, 40001))
-    e, state, drive, force = np.zeros((1, 2)), np.zeros(STATE), np.zeros(11), np.zeros(len(u))
+    (state,), (wheels,), (lanes,) = at_rest(row, np.zeros((1, 4)))
+    inertia, force = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0, *np.zeros(9)]), np.zeros(len(u))
     for n in range(1, len(u)):
-        d = np.array([u[n] - u[n - 1], 0.0, 0.0, 0.0, 0.0, 0.0])
-        force[n], _, _ = wheel_force(row, 0, e, d, state, drive, h)
+        state[3], drive = (u[n] - u[n - 1]) / h, np.zeros((1, 11))
+        advance(state, wheels, drive, inertia, h, lanes)
+        force[n] = -state[9, 0]  # of a mass of 1 kg that nothing else accelerates
     loop = slice(20000, 40001)
     work = np.trapezoid(force[loop], u[loop])
     assert work == pytest.approx(4.0 * mu * N * (amplitude - mu * N / k), rel=1e-3)
@@ -99,14 +100,25 @@ def test_the_correction_is_none_where_every_wheel_slides():
 def test_trials_one_after_the_other_do_not_know_of_each_other():
     one = slipping.forcing(slipping.push(np.random.default_rng(4), seconds=3.0))
     n = len(one.inertia)
-    twice = simulated(
-        np.array([0, n, 2 * n]),
-        np.concatenate([one.drive] * 2),
-        np.concatenate([one.inertia] * 2),
-        WHEELS.rows(TRUTH),
-        body(TRUTH, False),
-        STEP,
-        np.zeros((6, 2)),
-    )[0]
+    drive, inertia = np.concatenate([one.drive] * 2), np.concatenate([one.inertia] * 2)
+    bases = bases_of(WHEELS, TRUTH.logarithms[None], False)
+    (twice,), _ = simulated(np.array([0, n, 2 * n]), drive, inertia, bases, STEP, 1)
     np.testing.assert_array_equal(twice[:n], twice[n:])
     np.testing.assert_array_equal(twice[:n], run(one)[0])
+
+
+def test_bases_side_by_side_do_not_know_of_each_other():
+    """More than a group of them, each with its own parameters and preload: to the last bit as if alone."""
+    rng = np.random.default_rng(5)
+    w = slipping.push(rng, seconds=3.0)
+    one, k = slipping.forcing(w, w), LANES + 3
+    p, e = TRUTH.logarithms + 0.2 * rng.normal(size=(k, 12)), 1e-4 * rng.normal(size=(k, 6, 2))
+    starts = np.array([0, len(one.inertia)])
+    x, share = simulated(starts, one.drive, one.inertia, bases_of(WHEELS, p, True, e), STEP, k)
+    for i in range(k):
+        (alone,), (slid,) = simulated(
+            starts, one.drive, one.inertia, bases_of(WHEELS, p[i : i + 1], True, e[i : i + 1]), STEP, 1
+        )
+        np.testing.assert_array_equal(x[i], alone)
+        np.testing.assert_array_equal(share[i], slid)
+    assert share.mean() > 0.005
