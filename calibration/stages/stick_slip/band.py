@@ -23,6 +23,7 @@ the model does not move stays, or is linear, the better the less the base is sha
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.optimize import minimize
 
 from calibration.stages.stick_slip.likelihood import Trials
@@ -160,3 +161,34 @@ def _fitted(square: np.ndarray, parts: np.ndarray, prior: np.ndarray, width: np.
 def block_means(trials: Trials, x: np.ndarray) -> np.ndarray:
     """Means (b, c) over blocks of x (n, c), trial by trial."""
     return np.concatenate([blocks(x[a:b]) for a, b in trials.spans])
+
+
+@njit(cache=True, error_model="numpy")
+def banded(
+    ensemble: tuple[np.ndarray, np.ndarray, np.ndarray],
+    before: np.ndarray,
+    share: float,
+    band: np.ndarray,
+    elastic: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Band and believed motion of one sample, see `band`: rows mean, path, largest square of a slip, x, variance, G.
+
+    Args:
+        ensemble: As of `advance_members`, (3,) each.
+        before: (6, 3) as returned a sample ago.
+        share: That slid.
+        band: (4, 3) s, r, p, l.
+        elastic: (3,) what springs alone do.
+        out: (6, 3), filled.
+    """
+    moved, spread, preloaded = ensemble
+    for a in range(3):
+        path = before[1, a] + share * abs(moved[a] - before[0, a])
+        slip = moved[a] - elastic[a]
+        excess = band[1, a] ** 2 * spread[a] + band[2, a] ** 2 * preloaded[a] + (band[3, a] * path) ** 2
+        largest = max(before[2, a], slip * slip)
+        kept = 1.0 - min(excess / largest, 1.0) if largest > 0.0 else 0.0
+        out[0, a], out[1, a], out[2, a] = moved[a], path, largest
+        out[3, a], out[4, a] = elastic[a] + kept * slip, band[0, a] ** 2 + excess
+        out[5, a] = max(before[5, a], elastic[a] * elastic[a])

@@ -32,7 +32,7 @@ LANES = 16  # bases side by side
 _VECTOR = 4  # lanes that one instruction takes
 _WHEEL, _E = 12, 10  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), and its deflections from row _E on
 _X, _V, _DX, _A, _STICKS, _P = 0, 3, 6, 9, 12, 13  # rows of a state: x, v, the correction to come, the acceleration,
-_D, _F, _SLID, _BITS = 19, 25, 28, 29  # which wheels stuck plus one, P; the step's d, force, wheels that slide, stick
+_D, _F, SLID, _BITS = 19, 25, 28, 29  # which wheels stuck plus one, P; the step's d, force, wheels that slide, stick
 _BODY, _ROWS = 30, 34  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 
 
@@ -169,7 +169,7 @@ def _on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float
             s[_F * LANES + l] += fx
             s[(_F + 1) * LANES + l] += fy
             s[(_F + 2) * LANES + l] += px * fy - py * fx
-            s[_SLID * LANES + l] += 1.0 if slides else 0.0
+            s[SLID * LANES + l] += 1.0 if slides else 0.0
             s[_BITS * LANES + l] += 0.0 if slides else bit
 
 
@@ -211,7 +211,7 @@ def _ended(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
 def _advance(s: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
     """`advance` with all arrays of the bases flat."""
     for l in range(LANES):
-        s[_SLID * LANES + l] = 0.0
+        s[SLID * LANES + l] = 0.0
     for k in range(len(drive)):
         u = drive[k]
         _begun(s, u, inertia, h, n)
@@ -230,7 +230,7 @@ def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: n
     """One sample on, the first n lanes of a group: states and deflections are changed.
 
     Args:
-        state: (_ROWS, LANES); wheels that slid are counted in row _SLID.
+        state: (_ROWS, LANES); wheels that slid are counted in row SLID.
         wheels: (m, _WHEEL, LANES).
         drive: (k, 11) at k steps of h [s]: w, (-Fz, My, -Mx), (rx, ry), plate's force.
         inertia: (15,) M's six elements (row by row, upper) and what an acceleration adds to (-Fz, My, -Mx), (3, 3).
@@ -264,114 +264,7 @@ def simulated(
             for t in range(starts[trial], starts[trial + 1]):
                 _advance(state, wheels, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)
                 for l in range(min(lanes, k - LANES * g)):
-                    share[LANES * g + l, t] = state[_SLID * LANES + l] / (m * steps)
+                    share[LANES * g + l, t] = state[SLID * LANES + l] / (m * steps)
                     for i in range(3):
                         x[LANES * g + l, t, i] = state[(_X + i) * LANES + l]
     return x, share
-
-
-@njit(cache=True, error_model="numpy")
-def advance_members(
-    bases: Bases, drive: np.ndarray, inertia: np.ndarray, h: float, members: int, k: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """`advance` for k bases: the members of an ensemble, then preloaded ones of the first member's parameters.
-
-    Args:
-        bases: States and deflections are changed.
-        drive: (steps, 11).
-        inertia: (15,).
-        h: [s].
-        members: Of the ensemble.
-        k: Of all.
-
-    Returns:
-        Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first, share that slid.
-    """
-    mean, variance, preloaded = np.zeros(3), np.zeros(3), np.zeros(3)
-    for g in range(len(bases.lanes)):
-        advance(bases.state[g], bases.wheels[g], drive, inertia, h, bases.lanes[g])
-    for a in range(3):
-        first = bases.state[0, a, 0]
-        for i in range(members):
-            mean[a] += bases.state[i // LANES, a, i % LANES]
-        for i in range(members, k):
-            preloaded[a] += (bases.state[i // LANES, a, i % LANES] - first) ** 2
-        mean[a] /= members
-        preloaded[a] /= max(k - members, 1)
-        for i in range(members):
-            variance[a] += (bases.state[i // LANES, a, i % LANES] - mean[a]) ** 2 / members
-    return mean, variance, preloaded, bases.state[0, _SLID, 0] / (bases.wheels.shape[1] * len(drive))
-
-
-@njit(cache=True, error_model="numpy")
-def banded(
-    ensemble: tuple[np.ndarray, np.ndarray, np.ndarray],
-    before: np.ndarray,
-    share: float,
-    band: np.ndarray,
-    elastic: np.ndarray,
-    out: np.ndarray,
-) -> None:
-    """Band and believed motion of one sample, see `band`: rows mean, path, largest square of a slip, x, variance, G.
-
-    Args:
-        ensemble: As of `advance_members`, (3,) each.
-        before: (6, 3) as returned a sample ago.
-        share: That slid.
-        band: (4, 3) s, r, p, l.
-        elastic: (3,) what springs alone do.
-        out: (6, 3), filled.
-    """
-    moved, spread, preloaded = ensemble
-    for a in range(3):
-        path = before[1, a] + share * abs(moved[a] - before[0, a])
-        slip = moved[a] - elastic[a]
-        excess = band[1, a] ** 2 * spread[a] + band[2, a] ** 2 * preloaded[a] + (band[3, a] * path) ** 2
-        largest = max(before[2, a], slip * slip)
-        kept = 1.0 - min(excess / largest, 1.0) if largest > 0.0 else 0.0
-        out[0, a], out[1, a], out[2, a] = moved[a], path, largest
-        out[3, a], out[4, a] = elastic[a] + kept * slip, band[0, a] ** 2 + excess
-        out[5, a] = max(before[5, a], elastic[a] * elastic[a])
-
-
-@njit(cache=True, error_model="numpy")
-def sample_row(wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: np.ndarray, row: np.ndarray) -> None:
-    """A sample as `advance` takes it (11,), less what rests (6,): the plate's (Fx, Fy, Mz), inverse dynamics'."""
-    for a in range(3):
-        row[a] = driving[a] - rest[3 + a]
-    row[3], row[4], row[5], row[6], row[7] = -wrench[2], wrench[4], -wrench[3], tilt[0], tilt[1]
-    row[8], row[9], row[10] = wrench[0] - rest[0], wrench[1] - rest[1], wrench[5] - rest[2]
-
-
-@njit(cache=True, error_model="numpy")
-def step_members(
-    bases: Bases,
-    readings: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    fitted: tuple[int, int, np.ndarray, np.ndarray],
-    h: float,
-    row: np.ndarray,
-    found: np.ndarray,
-) -> None:
-    """`advance_members` from one sample to the next, and `banded`; in between, readings are linear.
-
-    Args:
-        bases: States and deflections are changed.
-        readings: Wrench, tilt, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
-        fitted: Members, bases, K_0^-1 (3, 3), band (4, 3).
-        h: [s].
-        row: (11,) of this sample, filled.
-        found: (6, 3) of `banded`, filled.
-    """
-    (wrench, tilt, driving, rest, earlier, before), (members, k, compliance, band) = readings, fitted
-    drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
-    sample_row(wrench, tilt, driving, rest, row)
-    for s in range(STEPS):
-        for c in range(COLUMNS):
-            drive[s, c] = earlier[c] + (s + 1.0) / STEPS * (row[c] - earlier[c])
-    for i in range(6):
-        inertia[i] = driving[3 + i]
-    for i in range(3):
-        for c in range(3):
-            elastic[i] += compliance[i, c] * row[PLATE + c]
-    mean, spread, preloaded, share = advance_members(bases, drive, inertia, h, members, k)
-    banded((mean, spread, preloaded), before, share, band, elastic, found)

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from calibration.recording.trial import REST
-from calibration.stages.stick_slip.forcing import STEPS, UNMOVED
-from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, Bases, at_rest, sample_row, step_members
+from calibration.stages.stick_slip.band import banded
+from calibration.stages.stick_slip.forcing import UNMOVED
+from calibration.stages.stick_slip.kernel import COLUMNS, LANES, PLATE, SLID, STEPS, Bases, advance, at_rest
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
@@ -139,3 +141,79 @@ def slip_stream(model: StickSlip) -> SlipStream:
         found.slips,
         np.array([found.band.floor, found.band.spread, found.band.start, found.band.slip]),
     )
+
+
+@njit(cache=True, error_model="numpy")
+def advance_members(
+    bases: Bases, drive: np.ndarray, inertia: np.ndarray, h: float, members: int, k: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """`advance` for k bases: the members of an ensemble, then preloaded ones of the first member's parameters.
+
+    Args:
+        bases: States and deflections are changed.
+        drive: (steps, 11).
+        inertia: (15,).
+        h: [s].
+        members: Of the ensemble.
+        k: Of all.
+
+    Returns:
+        Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first, share that slid.
+    """
+    mean, variance, preloaded = np.zeros(3), np.zeros(3), np.zeros(3)
+    for g in range(len(bases.lanes)):
+        advance(bases.state[g], bases.wheels[g], drive, inertia, h, bases.lanes[g])
+    for a in range(3):
+        first = bases.state[0, a, 0]
+        for i in range(members):
+            mean[a] += bases.state[i // LANES, a, i % LANES]
+        for i in range(members, k):
+            preloaded[a] += (bases.state[i // LANES, a, i % LANES] - first) ** 2
+        mean[a] /= members
+        preloaded[a] /= max(k - members, 1)
+        for i in range(members):
+            variance[a] += (bases.state[i // LANES, a, i % LANES] - mean[a]) ** 2 / members
+    return mean, variance, preloaded, bases.state[0, SLID, 0] / (bases.wheels.shape[1] * len(drive))
+
+
+@njit(cache=True, error_model="numpy")
+def sample_row(wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: np.ndarray, row: np.ndarray) -> None:
+    """A sample as `advance` takes it (11,), less what rests (6,): the plate's (Fx, Fy, Mz), inverse dynamics'."""
+    for a in range(3):
+        row[a] = driving[a] - rest[3 + a]
+    row[3], row[4], row[5], row[6], row[7] = -wrench[2], wrench[4], -wrench[3], tilt[0], tilt[1]
+    row[8], row[9], row[10] = wrench[0] - rest[0], wrench[1] - rest[1], wrench[5] - rest[2]
+
+
+@njit(cache=True, error_model="numpy")
+def step_members(
+    bases: Bases,
+    readings: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    fitted: tuple[int, int, np.ndarray, np.ndarray],
+    h: float,
+    row: np.ndarray,
+    found: np.ndarray,
+) -> None:
+    """`advance_members` from one sample to the next, and `banded`; in between, readings are linear.
+
+    Args:
+        bases: States and deflections are changed.
+        readings: Wrench, tilt, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
+        fitted: Members, bases, K_0^-1 (3, 3), band (4, 3).
+        h: [s].
+        row: (11,) of this sample, filled.
+        found: (6, 3) of `banded`, filled.
+    """
+    (wrench, tilt, driving, rest, earlier, before), (members, k, compliance, band) = readings, fitted
+    drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
+    sample_row(wrench, tilt, driving, rest, row)
+    for s in range(STEPS):
+        for c in range(COLUMNS):
+            drive[s, c] = earlier[c] + (s + 1.0) / STEPS * (row[c] - earlier[c])
+    for i in range(6):
+        inertia[i] = driving[3 + i]
+    for i in range(3):
+        for c in range(3):
+            elastic[i] += compliance[i, c] * row[PLATE + c]
+    mean, spread, preloaded, share = advance_members(bases, drive, inertia, h, members, k)
+    banded((mean, spread, preloaded), before, share, band, elastic, found)
