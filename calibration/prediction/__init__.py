@@ -3,9 +3,8 @@
 from calibration.estimate.rows import BASELINE, LADDER, NOMINAL
 from calibration.prediction.another_day import on_another_day
 from calibration.prediction.compensator import Compensator
-from calibration.prediction.predict import predict
+from calibration.prediction.predict import predict, predictor
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction, read_predicted
-from calibration.robot.hand_uncertainty import Session
 
 __all__ = [
     "BASELINE",
@@ -16,8 +15,8 @@ __all__ = [
     "JointSamples",
     "PredictedTrial",
     "Prediction",
-    "Session",
     "on_another_day",
     "predict",
+    "predictor",
     "read_predicted",
 ]

@@ -9,8 +9,8 @@ V that of `LinkAngles`, with the readings' random error as the hand's markers sh
 link encoders showed; of a joint at rest at least what they showed in dwells. sigma_c, sigma_b are the standard
 deviations of the meshes' and the column's compliance.
 
-The base is taken to be level and at rest. Readings of which no motion is known are each taken to be at rest: the load
-decides the side of a mesh, else the link is anywhere in what friction holds.
+The base's tilt and accelerations load the drive trains, where its pose is known. Readings of which no motion is known
+are each taken to be at rest: the load decides the side of a mesh, else the link is anywhere in what friction holds.
 """
 
 from dataclasses import dataclass
@@ -18,13 +18,16 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from calibration.numerics.lie import adjoint, inverse
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending, moved
 from calibration.stages.drive_trains.drive_trains import DriveTrains, Stream, StreamState, stream_of
 from calibration.stages.drive_trains.torques import LinkLoads
+from calibration.stages.suspension.floor_wrench import root_in_base
 
+_AT_REST = np.zeros((2, 3))
 _RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
 
 
@@ -72,44 +75,70 @@ class BundledArm:
     bending: ColumnBending
     rest_sigma: np.ndarray
 
-    def along(self, t: np.ndarray, q_motor: np.ndarray, velocity: np.ndarray | None = None) -> ArmPositions:
-        """Of readings q_motor (n, k) [rad, m] at t (n,) [s]; velocity (n, k) where it is known.
+    def along(
+        self,
+        t: np.ndarray,
+        q_motor: np.ndarray,
+        velocity: np.ndarray | None = None,
+        T_lab_base: np.ndarray | None = None,
+    ) -> ArmPositions:
+        """Of readings q_motor (n, k) [rad, m] at t (n,) [s]; velocity (n, k) and the base (n, 4, 4) where known.
 
         Raises:
             NotEnoughData: Less than a second of readings and no velocity.
         """
         robot = self.trains.dynamics
+        base = None if T_lab_base is None else self.trains.base_acceleration(t, T_lab_base, t)
         if velocity is None:
-            loads = robot.loads("", t, q_motor, None, regressors=True)
+            loads = robot.loads("", t, q_motor, base, regressors=True)
         else:
             a = np.gradient(velocity, t, axis=0) if len(t) > 1 else np.zeros_like(velocity)
-            found = robot.evaluated(q_motor, velocity, a, None, True)
+            found = robot.evaluated(q_motor, velocity, a, base, True)
             loads = LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
         angles = self.trains.of_loads(loads)
         return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < _RESTS)
 
-    def at_rest(self, q_motor: np.ndarray) -> ArmPositions:
-        """Of readings (n, k) at rest, each for itself."""
-        still = np.zeros(q_motor.shape[1])
-        states, angles = zip(*(self._stream.begin(0.0, q, still, still) for q in q_motor), strict=True)
+    def at_rest(self, q_motor: np.ndarray, T_lab_base: np.ndarray | None = None) -> ArmPositions:
+        """Of readings (n, k) at rest, each for itself; the base (4, 4) where it is known."""
+        still, base = np.zeros(q_motor.shape[1]), self.proper(T_lab_base)
+        states, angles = zip(*(self._stream.begin(0.0, q, still, still, base) for q in q_motor), strict=True)
         q, variance = (np.concatenate([getattr(f, name) for f in angles]) for name in ("q", "variance"))
         moment, torque = (np.concatenate([getattr(s, name) for s in states]) for name in ("moment", "torque"))
         return ArmPositions(q, variance, moment, torque, np.ones(q.shape, dtype=bool))
 
-    def stepped(self, t: float, q_motor: np.ndarray, velocity: np.ndarray | None, before: ArmState | None) -> ArmState:
-        """One sample q_motor (k,) on; accelerations are differences of the velocities (k,).
+    def moving(self, t: float, q_motor: np.ndarray, velocity: np.ndarray | None, before: ArmState | None) -> np.ndarray:
+        """(3, k) readings, velocities and accelerations of one sample, differences of the velocities.
 
-        Without a velocity the torques are those of rest, and the meshes follow the readings.
+        Without a velocity it is at rest.
         """
-        v, a = np.zeros_like(q_motor) if velocity is None else velocity, np.zeros_like(q_motor)
+        found = np.zeros((3, len(q_motor)))
+        found[0] = q_motor
+        if velocity is not None:
+            found[1] = velocity
+            if before is not None:
+                found[2] = (velocity - before.drives.moving[1]) / (t - before.drives.t)
+        return found
+
+    def stepped(
+        self, t: float, moving: np.ndarray, before: ArmState | None, base: np.ndarray | None = None
+    ) -> ArmState:
+        """One sample on, `moving` (3, k) as of `moving`, `base` (6,) as of `proper`."""
         if before is None:
-            drives, angles = self._stream.begin(t, q_motor, v, a)
+            drives, angles = self._stream.begin(t, moving[0], moving[1], moving[2], base)
         else:
-            if velocity is not None:
-                a = (v - before.drives.moving[1]) / (t - before.drives.t)
-            drives, angles = self._stream.step(before.drives, t, q_motor, v, a)
-        rests = np.abs(v[None]) < _RESTS
+            drives, angles = self._stream.step(before.drives, t, moving[0], moving[1], moving[2], base)
+        rests = np.abs(moving[1:2]) < _RESTS
         return ArmState(drives, ArmPositions(angles.q, angles.variance, drives.moment, drives.torque, rests))
+
+    def proper(self, T_lab_base: np.ndarray | None, accelerations: np.ndarray | None = None) -> np.ndarray | None:
+        """Proper acceleration (6,) of the root, the base frame at T_lab_base (4, 4); None where that is not known.
+
+        `accelerations` (2, 3) of the base frame, linear and angular, lab axes [m/s2, rad/s2]; at rest where not given.
+        """
+        if T_lab_base is None:
+            return None
+        a = _AT_REST if accelerations is None else accelerations
+        return np.asarray(_proper(T_lab_base, self._T_base_root, self.trains.dynamics.gravity, a))
 
     def bends(self, hand: HandModel, positions: ArmPositions) -> np.ndarray:
         """Q (n, 4, 4) in the base's marker body."""
@@ -138,5 +167,28 @@ class BundledArm:
         return np.asarray(J * (sigma * positions.moment)[:, None, :] ** 2 @ np.swapaxes(J, 1, 2))
 
     @cached_property
+    def _T_base_root(self) -> np.ndarray:
+        return np.asarray(root_in_base(self.trains.dynamics.model, self.trains.description).homogeneous)
+
+    @cached_property
     def _stream(self) -> Stream:
         return stream_of(self.trains)
+
+
+@njit(cache=True, error_model="numpy")
+def _proper(T_lab_base: np.ndarray, T_base_root: np.ndarray, gravity: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """R' (a_base + alpha x p - gravity) and R' alpha (6,) of the root, p its place beside the base frame [m]."""
+    push, R, p, found = np.empty(3), np.zeros((3, 3)), np.zeros(3), np.zeros(6)
+    for i in range(3):
+        for k in range(3):
+            p[i] += T_lab_base[i, k] * T_base_root[k, 3]
+            for c in range(3):
+                R[i, c] += T_lab_base[i, k] * T_base_root[k, c]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        push[i] = a[0, i] + a[1, j] * p[k] - a[1, k] * p[j] - gravity[i]
+    for c in range(3):
+        for i in range(3):
+            found[c] += R[i, c] * push[i]
+            found[3 + c] += R[i, c] * a[1, i]
+    return found

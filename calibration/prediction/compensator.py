@@ -25,7 +25,7 @@ from calibration.estimate.estimate import Estimate
 from calibration.estimate.files import load_estimate
 from calibration.estimate.rows import LADDER, row_of
 from calibration.numerics.lie import from_vector, inverse
-from calibration.prediction.base_pose import LoadedBase, base_at, loaded_base
+from calibration.prediction.base_pose import BaseState, LoadedBase, base_at, loaded_base
 from calibration.prediction.bundled_arm import ArmPositions, BundledArm
 from calibration.prediction.hand_pose import HandPose, RobotState, at_readings, in_lab, needed, uncertain
 from calibration.prediction.slipping_base import SlippingBase
@@ -172,7 +172,9 @@ class Compensator:
             variance = partial(np.asarray, spread)
         known = velocity is not None or _continuous(t)
         if self.arm is not None:
-            found = self._on_links(self.arm.along(t, q, velocity) if known else self.arm.at_rest(q))
+            T = _placed(T_lab_base_start, moved, len(t))
+            along = self.arm.along(t, q, velocity, T) if known else self.arm.at_rest(q, T_lab_base_start)
+            found = self._on_links(along)
         else:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
         return in_lab(found, base, moved, T_lab_base_start, variance)
@@ -227,20 +229,34 @@ class Compensator:
         q, base = np.asarray(q_motor, dtype=float)[None], self._base(T_lab_base_start)
         v = None if velocity is None else np.asarray(velocity, dtype=float)[None]
         self._refuse_impossible(q)
-        before, arm, motion = before or RobotState(), None, None
+        before, moving, state, variance = before or RobotState(), None, None, None
         if self.arm is not None:
-            arm = self.arm.stepped(t, q[0], None if v is None else v[0], before.arm)
-            motion = None if v is None else arm.drives.moving
-        in_base = self._hand(np.array([t]), q, v) if arm is None else self._on_links(arm.positions)
-        if wrench is None:
-            return in_lab(in_base, base, None, T_lab_base_start, state=RobotState(arm))
-        w, there, variance = np.asarray(wrench, dtype=float), needed(base), None
-        if self.slipping is None or self.slipping.source != "plate":
-            state = there.stepped(t, w, before.base)
-        else:
-            state = self.slipping.stepped(there, t, w, motion, before.base)
-            variance = partial(self.slipping.variance, state)
-        return in_lab(in_base, base, state.moved, T_lab_base_start, variance, RobotState(arm, state))
+            moving = self.arm.moving(t, q[0], None if v is None else v[0], before.arm)
+        if wrench is not None:
+            w, there = np.asarray(wrench, dtype=float), needed(base)
+            if self.slipping is None or self.slipping.source != "plate":
+                state = there.stepped(t, w, before.base)
+            else:
+                state = self.slipping.stepped(there, t, w, None if v is None else moving, before.base)
+                variance = partial(self.slipping.variance, state)
+        arm, in_base = None, None
+        if self.arm is not None and moving is not None:
+            arm = self.arm.stepped(t, moving, before.arm, self._loads_of(state, T_lab_base_start, base))
+            in_base = self._on_links(arm.positions)
+        in_base = in_base or self._hand(np.array([t]), q, v)
+        moved = None if state is None else state.moved
+        return in_lab(in_base, base, moved, T_lab_base_start, variance, RobotState(arm, state))
+
+    def _loads_of(
+        self, state: BaseState | None, T_lab_base: np.ndarray | None, base: LoadedBase | None
+    ) -> np.ndarray | None:
+        """Proper acceleration (6,) of the root after a sample, the base at the start at T_lab_base (4, 4)."""
+        if self.arm is None:
+            return None
+        if state is None or base is None:
+            return self.arm.proper(T_lab_base)
+        T = state.moved[0] if T_lab_base is None else state.moved[0] @ T_lab_base
+        return self.arm.proper(T, None if self.slipping is None else self.slipping.accelerations(base, state))
 
     def _refuse_impossible(self, q: np.ndarray) -> None:
         if beyond(q, *self._limits) and (wrong := list(implausible_readings(self.hand.nominal, q))):
@@ -292,6 +308,14 @@ class Compensator:
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
         return np.asarray(covariance + np.diag(self.spread.hand_variances))
+
+
+def _placed(T_lab_base: np.ndarray | None, moved: np.ndarray | None, n: int) -> np.ndarray | None:
+    """The base (n, 4, 4) from its pose at the start and how it moved in the lab; None where neither is known."""
+    if moved is None and T_lab_base is None:
+        return None
+    start = np.eye(4) if T_lab_base is None else np.asarray(T_lab_base, dtype=float)
+    return np.broadcast_to(start, (n, 4, 4)) if moved is None else moved @ start
 
 
 def _continuous(t: np.ndarray) -> bool:

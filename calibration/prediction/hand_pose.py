@@ -73,7 +73,7 @@ def at_readings(t: np.ndarray, clocks: Sequence[Clock], t_wrench: np.ndarray, wr
         raise NotEnoughData(f"clock of {missing} not known: pass the wrench at the times of the readings")
     at = clock["plate"].from_mocap(clock["robot"].to_mocap(t))
     beyond = max(float(t_wrench[0] - at[0]), float(at[-1] - t_wrench[-1]))
-    if beyond > 0.0:
+    if beyond > 1e-9:  # [s] rounding
         raise NotEnoughData(
             f"wrenches end {beyond:.3g} s before the readings do, or begin after them; cut the readings"
         )

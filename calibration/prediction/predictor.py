@@ -11,8 +11,8 @@ q, readings the geometry is evaluated at:      motor      q_motor by the robot's
 Row `full` has link angles behind its drive trains, the column bent, and the base that sticks and slips in place of the
 suspension, where those were identified.
 
-Of a trial nothing else is read: encoders, plate, base markers of its first second (throughout where the base is
-`measured`), never hand or shoulder.
+The base's motion from the same source loads the drive trains. Of a trial nothing else is read: encoders, plate, base
+markers of its first second (throughout where the base is `measured`), never hand or shoulder.
 """
 
 from collections.abc import Callable, Iterator
@@ -75,9 +75,7 @@ class Predictor:
 
     def __call__(self, entry: TrialEntry, trial: Trial) -> PredictedTrial:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
-        (T_lab_B, start), corrected = measured_base(self.description.base_body, trial), self._corrected(trial)
-        still = np.broadcast_to(start, T_lab_B.shape)
-        poses = TrialPoses(self, entry, trial, T_lab_B, still, self._base(entry, trial, still[0]), corrected)
+        poses = self.poses(entry, trial)
         rows = tuple(
             Prediction(
                 row.name,
@@ -86,7 +84,7 @@ class Predictor:
                 entry.id,
                 entry.kind,
                 trial.t_mocap,
-                T @ poses.in_base(row, encoder),
+                T @ poses.in_base(row, encoder, source),
                 poses.base_variance(row, source),
             )
             for row, _, encoder in self._rows()
@@ -97,14 +95,29 @@ class Predictor:
         if poses.loaded is not None and NOMINAL in self.models:
             found = [(source, poses.displaced(source, NOMINAL)) for source, _ in poses.loaded.suspension.held_out]
             slipped = [(source, poses.slipped(source)) for source, _ in poses.loaded.suspension.held_out]
-            motion = base_motion(T_lab_B, found, tuple((s, one) for s, one in slipped if one is not None))
+            motion = base_motion(poses.T_lab_B, found, tuple((s, one) for s, one in slipped if one is not None))
         moves = entry.kind != "static"
         samples = tuple(joint_samples(self.joints, self.bundled, trial, poses.geared())) if moves else ()
         delivered = poses.delivered() if moves else None
         dwells = dwell_windows(trial)
         return PredictedTrial(
-            entry.id, entry.kind, trial.t_mocap, rows, motion, samples, T_lab_B, dwells, corrected, delivered
+            entry.id,
+            entry.kind,
+            trial.t_mocap,
+            rows,
+            motion,
+            samples,
+            poses.T_lab_B,
+            dwells,
+            poses.corrected,
+            delivered,
         )
+
+    def poses(self, entry: TrialEntry, trial: Trial) -> "TrialPoses":
+        """What the rows of one trial are made of."""
+        T_lab_B, start = measured_base(self.description.base_body, trial)
+        still, corrected = np.broadcast_to(start, T_lab_B.shape), self._corrected(trial)
+        return TrialPoses(self, entry, trial, T_lab_B, still, self._base(entry, trial, start), corrected)
 
     def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
         """Predictions of posture means, one a posture in `t`: the base measured or its markers' own frame, motor side.
@@ -133,10 +146,13 @@ class Predictor:
                     yield row, self.models[row.name], encoder
 
     def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
-        """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times."""
+        """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times.
+
+        The base is measured throughout the trial, by which other sessions are registered.
+        """
         side = self.side(row_of(name), encoder)
-        if side == "bundled" and self.bundled is not None:
-            return self.readings(side, trial, self.bundled.corrected(trial).trial.q_motor)
+        if side == "bundled" and self.bundled is not None and self.robot is not None:
+            return self.readings(side, trial, self.bundled.corrected(trial, self.robot).trial.q_motor)
         corrected = self._corrected(trial) if side == "corrected" else None
         return self.readings(side, trial, None if corrected is None else corrected.q)
 
@@ -195,11 +211,11 @@ class TrialPoses:
     corrected: Corrected | None
     _known: dict[tuple[object, ...], Any] = field(default_factory=dict)
 
-    def in_base(self, row: LadderRow, encoder: Encoder) -> np.ndarray:
-        """T_B_H (n, 4, 4) of a row, NaN where a reading is missing."""
+    def in_base(self, row: LadderRow, encoder: Encoder, source: Base) -> np.ndarray:
+        """T_B_H (n, 4, 4) of a row, NaN where a reading is missing; `source` of the base's motion, which loads it."""
         p, side = self.predictor, self.predictor.side(row, encoder)
-        hand = p.models[row.name]
-        return self._once(("in base", id(hand), side), lambda: self._in_base(hand, side))
+        hand, geared = p.models[row.name], self.geared(source) if side in ("bundled", "bundled link") else None
+        return self._once(("in base", id(hand), side, id(geared)), lambda: self._in_base(hand, side, geared))
 
     def base(self, row: LadderRow, source: Base) -> np.ndarray | None:
         """T_lab_B (n, 4, 4) of a row by a source of the base's motion; None where that was not recorded."""
@@ -212,12 +228,17 @@ class TrialPoses:
         found = self.displaced(source, row.name)
         return None if found is None else found[0].poses(found[1])
 
-    def geared(self) -> CorrectedTrial | None:
-        """Link angles behind the drive trains; None where none was identified."""
-        bundled = self.predictor.bundled
-        if bundled is None or not bundled.trains.trains or not len(self.trial.t_robot):
+    def geared(self, source: Base | None = None) -> CorrectedTrial | None:
+        """Link angles behind the drive trains, the base moved by a source, by the best where none is named.
+
+        None where no drive train was identified.
+        """
+        bundled, robot = self.predictor.bundled, self.predictor.robot
+        if bundled is None or robot is None or not bundled.trains.trains or not len(self.trial.t_robot):
             return None
-        return self._once(("geared",), lambda: bundled.corrected(self.trial))
+        row = next(row for row in LADDER if row.bundle)
+        chosen: Base = next(s for s in ((source,) if source else SOURCES) if self.base(row, s) is not None)
+        return self._once(("geared", chosen), lambda: bundled.corrected(self.trial, robot, self.base(row, chosen)))
 
     def base_variance(self, row: LadderRow, source: Base) -> np.ndarray | None:
         """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known.
@@ -239,12 +260,13 @@ class TrialPoses:
     def delivered(self) -> Delivered | None:
         """Parts of the row that is delivered; None where it has no prediction of this trial."""
         p, row = self.predictor, row_of(self.predictor.main)
-        bases = (self.base(row, source) for source in SOURCES if source in row.bases and row.name in p.models)
-        T_lab_B = next((T for T in bases if T is not None), None)
-        if T_lab_B is None:
+        sources = (source for source in SOURCES if source in row.bases and row.name in p.models)
+        found = ((source, T) for source in sources if (T := self.base(row, source)) is not None)
+        source, T_lab_B = next(found, (None, None))
+        if source is None or T_lab_B is None:
             return None
         side, hand = p.side(row, "motor"), p.models[row.name].carrying(self.entry.payload)
-        T_B_H, columns = self.in_base(row, "motor"), hand.chain.columns
+        T_B_H, columns = self.in_base(row, "motor", source), hand.chain.columns
         q, motor = self._readings(side), self._readings("motor")
         link = readings_at(self.trial, p.robot, self.trial.t_mocap, self.trial.q_link) if p.robot else motor
         known = np.isfinite(q).all(axis=1) & np.isfinite(motor).all(axis=1)
@@ -262,8 +284,8 @@ class TrialPoses:
         hand = self.predictor.models[model]
         return self._once(("displaced", source, id(hand)), lambda: self._displaced(source, hand))
 
-    def _in_base(self, hand: HandModel, side: Side) -> np.ndarray:
-        p, geared = self.predictor, self.geared() if side in ("bundled", "bundled link") else None
+    def _in_base(self, hand: HandModel, side: Side, geared: CorrectedTrial | None) -> np.ndarray:
+        p = self.predictor
         if geared is not None and p.bundled is not None and p.robot is not None:
             return p.bundled.hand_poses(geared, p.robot, "motor" if side == "bundled" else "link")
         q = self._readings(side)

@@ -81,6 +81,12 @@ class SlippingBase:
         found[list(HEAVE)] = own.heave_variance
         return found
 
+    def accelerations(self, at: LoadedBase, state: BaseState) -> np.ndarray | None:
+        """(2, 3) linear and angular of the base frame [m/s2, rad/s2, lab axes], mean of the members; None at rest."""
+        if state.slip is None:
+            return None
+        return np.asarray(_accelerations(state.slip.states, len(self._stream.direction.ensemble), at.T_lab_0))
+
     def _driven(self, gravity: np.ndarray, moving: np.ndarray) -> np.ndarray:
         """What the arm does to the base in the floor's plane (9,), see `Sample`; gravity (3,) in frame 0."""
         tree, actions, work, found = self._robot
@@ -101,6 +107,17 @@ class SlippingBase:
     @cached_property
     def _stream(self) -> SlipStream:
         return slip_stream(self.model)
+
+
+@njit(cache=True, error_model="numpy")
+def _accelerations(states: np.ndarray, members: int, T_lab_0: np.ndarray) -> np.ndarray:
+    """`SlippingBase.accelerations` of the first of the states."""
+    found = np.zeros((2, 3))
+    for k in range(members):
+        for i in range(3):
+            found[0, i] += (T_lab_0[i, 0] * states[k, 9] + T_lab_0[i, 1] * states[k, 10]) / members
+            found[1, i] += T_lab_0[i, 2] * states[k, 11] / members
+    return found
 
 
 @njit(cache=True, error_model="numpy")

@@ -70,15 +70,13 @@ def _corrections(dataset: "Dataset", estimate: "Estimate", robot: "RobotClock") 
     """Link angles (n, k), NaN where a motor reading is missing, of a trial by each correction."""
     from calibration.mocap import relabelled_trials
     from calibration.options import Terms
+    from calibration.prediction import predictor
     from calibration.robot import Laboratory
-    from calibration.stages.bundle import BundledRobot
     from calibration.stages.geometry import hand_of
     from calibration.stages.joints import JointModels, correct, fit_joint_models
 
     lab = Laboratory(dataset.urdf, dataset.description)
-    hands = {
-        m.name: hand_of(m, lab.chain, lab.nominal_frames) for m in estimate.models if m.name in ("model_2", "full")
-    }
+    hand = hand_of(estimate.model("model_2"), lab.chain, lab.nominal_frames)
     trials = [trial for _, trial in relabelled_trials(dataset, "calibration")]
 
     def sigmoid(models: JointModels, trial: "Trial") -> np.ndarray:
@@ -89,11 +87,16 @@ def _corrections(dataset: "Dataset", estimate: "Estimate", robot: "RobotClock") 
 
     found: dict[str, Correction] = {"none": lambda trial: trial.q_motor}
     for terms in get_args(Terms):
-        models, _ = fit_joint_models(lab, trials, robot, hands["model_2"], terms)
+        models, _ = fit_joint_models(lab, trials, robot, hand, terms)
         found[f"sigmoid_{terms}"] = lambda trial, models=models: sigmoid(models, trial)  # type: ignore[misc]
     if estimate.bundle is not None:
-        full = BundledRobot.of(hands["full"], estimate.bundle, dataset.urdf, dataset.description)
-        found["physical"] = lambda trial: full.corrected(trial).trial.q_motor
+        predict, entries = predictor(estimate, dataset), {entry.id: entry for entry in dataset.description.trials}
+
+        def physical(trial: "Trial") -> np.ndarray:
+            geared = predict.poses(entries[trial.id], trial).geared()
+            return trial.q_motor if geared is None else geared.trial.q_motor
+
+        found["physical"] = physical
     return found
 
 

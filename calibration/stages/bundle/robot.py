@@ -75,20 +75,20 @@ class BundledRobot:
         return cls(hand, trains, parts.bending, parts.stick_slip, at_rest)
 
     def hand_in_base(self, trial: Trial, robot: Clock) -> np.ndarray:
-        """T_B_H (n, 4, 4) at a trial's mocap times by motor readings, NaN where one is missing."""
-        return self.hand_poses(self.corrected(trial), robot)
+        """T_B_H (n, 4, 4) at a trial's mocap times by motor readings, NaN where one is missing; the base measured."""
+        return self.hand_poses(self.corrected(trial, robot), robot)
 
     def hand_poses(self, corrected: CorrectedTrial, robot: Clock, encoder: Encoder = "motor") -> np.ndarray:
         """T_B_H (n, 4, 4) at a trial's mocap times by one side's encoders, NaN where a reading is missing."""
         one = corrected if encoder == "motor" else by_link_encoders(self.trains, corrected)
         return hand_poses(self.hand, self.bending, one, robot)
 
-    def corrected(self, trial: Trial) -> CorrectedTrial:
-        """Link angles in place of a trial's motor readings.
+    def corrected(self, trial: Trial, robot: Clock, T_lab_B: np.ndarray | None = None) -> CorrectedTrial:
+        """Link angles in place of a trial's motor readings; the base's marker body predicted at T_lab_B (n, 4, 4).
 
-        The base is taken to be level and at rest: none of its markers is read.
+        Where that is not given, its markers are read throughout.
         """
-        return corrected_trial(self.trains, trial, None, self.hand)
+        return corrected_trial(self.trains, trial, robot, self.hand, T_lab_B)
 
     def encoder_differences(self, corrected: CorrectedTrial) -> dict[str, np.ndarray]:
         """Motor minus link reading (3, n) [rad] by each drive train with a link encoder: as predicted, on both flanks.

@@ -26,7 +26,8 @@ from calibration.robot.rigid_tree import TreeDynamics, room, scratch
 from calibration.stages.drive_trains import link_motion
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Drives
-from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, inertials
+from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, inertials
+from calibration.stages.suspension.floor_wrench import root_in_base
 
 _SURE = 0.5  # share of the half gap
 _RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
@@ -114,6 +115,11 @@ class DriveTrains:
         """The same with other zeros (k,) of the motor readings."""
         return replace(self, dynamics=replace(self.dynamics, offset=offset))
 
+    def base_acceleration(self, t: np.ndarray, T_lab_base: np.ndarray, at: np.ndarray) -> np.ndarray | None:
+        """`torques.base_acceleration` by poses (m, 4, 4) of the base frame."""
+        T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
+        return base_acceleration(self.dynamics.gravity, t, T_lab_root, at)
+
     def link_angles(
         self, t: np.ndarray, q_motor: np.ndarray, base: np.ndarray | None = None, start: np.ndarray | None = None
     ) -> LinkAngles:
@@ -122,7 +128,7 @@ class DriveTrains:
         Args:
             t: Times, increasing; a second of them at least.
             q_motor: Readings.
-            base: (n, 6) proper acceleration of the base, `torques.base_acceleration`; level and at rest if not given.
+            base: (n, 6) proper acceleration of the base, see `base_acceleration`; level and at rest if not given.
             start: (k,) delta at the first reading [rad], where it is known.
 
         Raises:

@@ -65,8 +65,7 @@ class RefittedGeometry:
         model: Parameters of the geometry.
         bending: Of the column.
         trains: The drive trains; `dynamics.offset` are the new zeros.
-        at_rest: (m,) rms error of each train's angle in dwells, by link encoders [rad], as of predictions, which read
-            no base marker; 0 where not known.
+        at_rest: (m,) rms error of each train's angle in dwells, by link encoders [rad]; 0 where not known.
         shown: Effects that the residuals show and the model leaves out, as messages.
     """
 
@@ -120,7 +119,7 @@ def refit_geometry(
     offset[chain.columns] = fitted.offset
     joints = tuple(referred(train, model, trains) for train in trains.trains)
     trains = replace(trains, trains=joints).with_offset(offset)
-    static = [corrected_trial(trains, trial, None, fitted) for trial in trials if len(trial.dwell_start)]
+    static = [corrected_trial(trains, trial, robot, fitted) for trial in trials if len(trial.dwell_start)]
     return RefittedGeometry(model, bending, trains, rest_errors(trains, static, robot), departed.shown)
 
 
@@ -152,9 +151,11 @@ def referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTr
     return replace(train, link=train.link + np.array([moved, 0.0, 0.0, 0.0, 0.0]), parameters=parameters)
 
 
-def corrected_trial(trains: DriveTrains, trial: Trial, robot: Clock | None, hand: HandModel) -> CorrectedTrial:
-    """A trial with link angles in place of its motor readings; without the clock no base marker is read."""
-    loads = loads_of_trial(trains, trial, robot, hand)
+def corrected_trial(
+    trains: DriveTrains, trial: Trial, robot: Clock, hand: HandModel, T_lab_B: np.ndarray | None = None
+) -> CorrectedTrial:
+    """A trial with link angles in place of its motor readings; the base as of `loads_of_trial`."""
+    loads = loads_of_trial(trains, trial, robot, hand, T_lab_B)
     angles = trains.of_loads(loads)
     q = np.full(trial.q_motor.shape, np.nan)
     q[np.isfinite(trial.q_motor).all(axis=1)] = angles.q

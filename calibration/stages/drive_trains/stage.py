@@ -5,13 +5,15 @@ zeros, the nominal robot with each trial's payload. Choices are made by trials l
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from calibration.checks.joint_readings import wrong_links
 from calibration.errors import NotEnoughData
+from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.postures import dwell_windows
-from calibration.numerics.lie import from_vector
+from calibration.numerics.lie import from_vector, inverse
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
@@ -24,7 +26,6 @@ from calibration.stages.drive_trains.steady_contact import Slip, slipped_encoder
 from calibration.stages.drive_trains.torques import (
     Dynamics,
     LinkLoads,
-    base_acceleration,
     dynamics,
     inertial_tolerances,
 )
@@ -71,20 +72,21 @@ def fit_drive_trains(
 
 
 def loads_of_trial(
-    trains: DriveTrains, trial: Trial, robot: Clock | None, hand: HandModel, regressors: bool = True
+    trains: DriveTrains, trial: Trial, robot: Clock, hand: HandModel, T_lab_B: np.ndarray | None = None
 ) -> LinkLoads:
-    """Loads in a trial with its payload, its base as its markers show it where they do."""
-    rows = _complete(trial)
-    base = None
-    if robot is not None:
-        model = trains.dynamics.model
-        frame = model.frames[model.getFrameId(hand.chain.base_frame)]
-        T_root_B = frame.placement.homogeneous @ from_vector(hand.base)
-        base = base_acceleration(trains.description, trial, robot, T_root_B)
-    here = trains.of_trial(trial.id).dynamics
-    return here.loads(
-        trial.id, trial.t_robot[rows], trial.q_motor[rows], None if base is None else base[rows], regressors
-    )
+    """Loads in a trial with its payload, the base's markers at T_lab_B (n, 4, 4); where not given, as they are seen.
+
+    Without them, or where they are not in the lab, the base is level and at rest.
+    """
+    rows, base, description = _complete(trial), None, trains.description
+    t = trial.t_robot[rows]
+    if T_lab_B is None:
+        with suppress(NotEnoughData):
+            T_lab_B = poses_of(description.base_body, trial).T
+    if T_lab_B is not None and description.marker_frame == "lab":
+        T_lab_base = T_lab_B @ inverse(from_vector(hand.base))
+        base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t))
+    return trains.of_trial(trial.id).dynamics.loads(trial.id, t, trial.q_motor[rows], base, regressors=True)
 
 
 def _dynamics(urdf: str, description: Description, hand: HandModel) -> Dynamics:

@@ -4,9 +4,10 @@
     tau + R(q, v, a) dphi                  of other masses and first moments (m, m c) by body [kg, kg.m], a tilt of the
                                            base about x and y [rad], and bending of the first joint's column [rad/(N.m)]
 
-at angles q_m - offset. The base is level and at rest, or moves as its markers show: its proper acceleration a_0
-(gravity included) is that of the tree's root. A tilt u turns a_0 by -u x a_0; a column that bends turns all it
-carries by its compliance times the moment of what it carries. 5 mrad are a fifth of a newton metre at the shoulder.
+at angles q_m - offset. The base is level and at rest, or moves as its markers or a prediction show: its proper
+acceleration a_0 (gravity included) is that of the tree's root. A tilt u turns a_0 by -u x a_0; a column that bends
+turns all it carries by its compliance times the moment of what it carries. 5 mrad are a fifth of a newton metre at the
+shoulder.
 """
 
 from dataclasses import dataclass
@@ -18,12 +19,9 @@ from scipy.linalg import block_diag
 from scipy.ndimage import uniform_filter1d
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import from_vector, inverse, mean, to_vector
-from calibration.numerics.signals import RATE, Signal, even, low_passed
-from calibration.recording.clock import Clock
+from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
 from calibration.recording.schema import Description
-from calibration.recording.trial import Trial
 from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
 
@@ -114,7 +112,9 @@ class Dynamics:
         """Twist, zero, and proper acceleration (n, 12) of the base; `base` (n, 6) as of `loads`."""
         if base is None:
             return np.concatenate([np.zeros(6), -self.gravity, np.zeros(3)])[None]
-        return np.hstack([np.zeros_like(base), base])
+        found = np.zeros((len(base), 12))
+        found[:, 6:] = base
+        return found
 
 
 def dynamics(urdf: str, description: Description, offset: np.ndarray) -> Dynamics:
@@ -156,27 +156,29 @@ def derivatives(t: np.ndarray, q: np.ndarray, cutoff: float) -> tuple[np.ndarray
     return out[0].T.copy(), out[1].T.copy(), out[2].T.copy()
 
 
-def base_acceleration(description: Description, trial: Trial, robot: Clock, T_base_B: np.ndarray) -> np.ndarray | None:
-    """Proper acceleration (n, 6) of the base at the trial's robot times, linear [m/s2] and angular [rad/s2], its axes.
+def base_acceleration(gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray, at: np.ndarray) -> np.ndarray | None:
+    """Proper acceleration (n, 6) of the tree's root at times `at` (n,), linear [m/s2] and angular [rad/s2], its axes.
 
-    From the base's markers, T_base_B (4, 4) the pose of their body; None where they are not seen.
+    Args:
+        gravity: (3,) in the lab [m/s2].
+        t: (m,) [s, the clock of `at`].
+        T_lab_root: (m, 4, 4) its poses, measured or predicted, NaN where not known; of less than a second of them the
+            tilt alone, and None where there are none.
+        at: Times.
     """
+    seen = np.isfinite(T_lab_root).all(axis=(1, 2))
+    if not seen.any():
+        return None
+    middle = mean(T_lab_root[seen])
     try:
-        T = poses_of(description.base_body, trial).T @ inverse(T_base_B)
+        seen_at = even(t, to_vector(inverse(middle) @ T_lab_root))
     except NotEnoughData:
-        return None
-    seen = np.isfinite(T).all(axis=(1, 2))
-    if seen.sum() < RATE or description.marker_frame != "lab":
-        return None
-    middle = mean(T[seen])
-    seen_at = even(trial.t_mocap, to_vector(inverse(middle) @ T))
-    moved = low_passed(seen_at, _SLOW)
+        return np.tile(np.append(-gravity @ middle[:3, :3], np.zeros(3)), (len(at), 1))
+    moved = from_vector(low_passed(seen_at, _SLOW).x)[:, :3, :3]
     a = _accelerations(seen_at)
-    R = (middle @ from_vector(moved.x))[:, :3, :3]
-    turned = np.swapaxes(from_vector(moved.x)[:, :3, :3], 1, 2)
-    proper = (turned @ a[:, :3, None])[..., 0] - np.swapaxes(R, 1, 2) @ np.array(description.gravity)
-    columns = np.concatenate([proper, a[:, 3:]], axis=1).T
-    return np.stack([np.interp(robot.to_mocap(trial.t_robot), moved.t, c) for c in columns], axis=1)
+    linear = a[:, :3] - (gravity @ middle[:3, :3])
+    columns = np.concatenate([(linear[:, None] @ moved)[:, 0], a[:, 3:]], axis=1)
+    return interpolate_columns(at, seen_at.t, columns)
 
 
 def _accelerations(x: Signal) -> np.ndarray:
