@@ -8,9 +8,16 @@ import pinocchio as pin
 import pytest
 
 from calibration.estimate.plain_values import plain, restored
+from calibration.numerics.lie import from_vector
 from calibration.stages.drive_trains import DriveTrain, DriveTrains, stream_of
 from calibration.stages.drive_trains.drive_train import Quantity
-from calibration.stages.drive_trains.torques import Dynamics, derivatives, inertial_tolerances, inertials
+from calibration.stages.drive_trains.torques import (
+    Dynamics,
+    base_acceleration,
+    derivatives,
+    inertial_tolerances,
+    inertials,
+)
 
 LINK = (
     '<link name="{0}"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>'
@@ -115,3 +122,17 @@ def test_drive_trains_come_back_from_json() -> None:
     read = restored(tuple[DriveTrain, ...], json.loads(json.dumps(plain(of.trains))))
     again = replace(of, trains=read)
     assert (again.link_angles(T, Q).q == of.link_angles(T, Q).q).all()
+
+
+def test_a_base_that_tilts_and_turns_loads_the_joints_by_its_proper_acceleration() -> None:
+    gravity, turn = np.array([0.0, 0.0, -9.81]), 0.02 * np.sin(2.0 * np.pi * 0.5 * T)
+    tilt = from_vector(np.array([0.0, 0.0, 0.0, 0.004, 0.0, 0.0]))
+    twist = np.zeros((len(T), 6))
+    twist[:, 5] = turn
+    found = base_acceleration(gravity, T, tilt @ from_vector(twist), T)
+    inside = slice(100, -100)
+    assert found[inside, 1] == pytest.approx(9.81 * 0.004 * np.cos(turn[inside]), rel=1e-3)
+    assert found[inside, 5] == pytest.approx(-((2.0 * np.pi * 0.5) ** 2) * turn[inside], abs=2e-3)
+    short = base_acceleration(gravity, T[:50], np.broadcast_to(tilt, (50, 4, 4)), T[:3])
+    assert short[:, 1] == pytest.approx(9.81 * np.sin(0.004), rel=1e-9) and short.shape == (3, 6)
+    assert base_acceleration(gravity, T, np.full((len(T), 4, 4), np.nan), T) is None
