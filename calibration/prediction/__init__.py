@@ -3,7 +3,7 @@
 from calibration.estimate.rows import BASELINE, LADDER, NOMINAL
 from calibration.prediction.another_day import on_another_day
 from calibration.prediction.compensator import Compensator
-from calibration.prediction.predict import predict, predictor
+from calibration.prediction.predict import link_angles, predict
 from calibration.prediction.predicted_trial import BaseMotion, JointSamples, PredictedTrial, Prediction, read_predicted
 
 __all__ = [
@@ -15,8 +15,8 @@ __all__ = [
     "JointSamples",
     "PredictedTrial",
     "Prediction",
+    "link_angles",
     "on_another_day",
     "predict",
-    "predictor",
     "read_predicted",
 ]

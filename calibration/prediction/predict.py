@@ -1,6 +1,6 @@
 """Predictions of a dataset by every row of an estimate: every trial read once."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from calibration.prediction.predicted_trial import PredictedTrial, Prediction
 from calibration.prediction.predictor import Predictor
 from calibration.prediction.recordings import clocks_of
 from calibration.recording.dataset import Dataset
-from calibration.recording.schema import Role
+from calibration.recording.schema import Role, TrialEntry
+from calibration.recording.trial import Trial
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.laboratory import Laboratory
@@ -65,6 +66,17 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     return Predictor(
         models, dataset.urdf, description, robot, plate, estimate.suspension, joints, bundled, estimate.main
     )
+
+
+def link_angles(estimate: Estimate, dataset: Dataset) -> Callable[[TrialEntry, Trial], np.ndarray]:
+    """What corrects a trial's motor readings as row `full` does, (n, k) [rad, m], NaN where one is missing."""
+    prepared = predictor(estimate, dataset)
+
+    def corrected(entry: TrialEntry, trial: Trial) -> np.ndarray:
+        geared = prepared.poses(entry, trial).geared()
+        return trial.q_motor if geared is None else geared.trial.q_motor
+
+    return corrected
 
 
 def predict(estimate: Estimate, dataset: Dataset, role: Role = "validation") -> Iterator[PredictedTrial]:

@@ -70,7 +70,7 @@ def _corrections(dataset: "Dataset", estimate: "Estimate", robot: "RobotClock") 
     """Link angles (n, k), NaN where a motor reading is missing, of a trial by each correction."""
     from calibration.mocap import relabelled_trials
     from calibration.options import Terms
-    from calibration.prediction import predictor
+    from calibration.prediction import link_angles
     from calibration.robot import Laboratory
     from calibration.stages.geometry import hand_of
     from calibration.stages.joints import JointModels, correct, fit_joint_models
@@ -90,13 +90,8 @@ def _corrections(dataset: "Dataset", estimate: "Estimate", robot: "RobotClock") 
         models, _ = fit_joint_models(lab, trials, robot, hand, terms)
         found[f"sigmoid_{terms}"] = lambda trial, models=models: sigmoid(models, trial)  # type: ignore[misc]
     if estimate.bundle is not None:
-        predict, entries = predictor(estimate, dataset), {entry.id: entry for entry in dataset.description.trials}
-
-        def physical(trial: "Trial") -> np.ndarray:
-            geared = predict.poses(entries[trial.id], trial).geared()
-            return trial.q_motor if geared is None else geared.trial.q_motor
-
-        found["physical"] = physical
+        physical, entries = link_angles(estimate, dataset), {entry.id: entry for entry in dataset.description.trials}
+        found["physical"] = lambda trial: physical(entries[trial.id], trial)
     return found
 
 
