@@ -34,7 +34,7 @@ _SURE = 5.0  # standard deviations
 _FAR_OFF = 4.0  # tolerances of a body of markers the hand may be off throughout
 _MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
 _LATE, _SLOW = 3e-3, 0.02  # [s]; [rad/s, m/s] below which backlash is not on one side
-_HALF, _TOLD = 0.3, 0.08  # of a difference between sides that moves the hand; its standard deviation [-]
+_HALF, _KNOWN = 0.3, 0.08  # of a difference between sides that moves the hand; its standard deviation [-]
 _WRONG = 3.0  # times what is explained beyond which the effect is not bounded
 
 
@@ -149,14 +149,14 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
     loose = np.array([lag[k] > _play(left, description, int(j))[0] for k, j in enumerate(known)])
     value, S, _ = left.fitted(left.J[:, :, known] * d[:, None])
     sigma = np.sqrt(np.diag(S))
-    wrong = loose & (value < _HALF) & (1.0 - value > _SURE * sigma) & (sigma < _TOLD)
+    wrong = loose & (value < _HALF) & (1.0 - value > _SURE * sigma) & (sigma < _KNOWN)
     if wrong.any():
         names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
         message = (
             f"motor and link readings of {names} are exchanged: the motor readings place the hand "
             f"({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
         )
-        unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~loose | (sigma >= _TOLD)))
+        unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~loose | (sigma >= _KNOWN)))
         message += f"; sides of {unclear} differ too little to be judged, check them too" if unclear else ""
         yield Verdict(STAGE, "refused", f"{message}; exchange the columns")
 

@@ -34,7 +34,7 @@ class Reading:
 
     order: tuple[int, ...]
     sign: tuple[float, ...]
-    said: str = ""
+    meaning: str = ""
 
     def of(self, q: np.ndarray) -> np.ndarray:
         """The readings (n, k) so taken."""

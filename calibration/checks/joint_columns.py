@@ -64,10 +64,10 @@ def check_columns(description: Description, chain: Chain, trials: Sequence[tuple
         odd = None
     if odd is not None:
         raise InputError(*odd)
-    said = _judge(chain, shown) if shown else None
-    if said is not None:
+    meaning = _judge(chain, shown) if shown else None
+    if meaning is not None:
         more = f" and {len(shown) - 1} more" if len(shown) > 1 else ""
-        raise InputError(shown[0].file + more, said)
+        raise InputError(shown[0].file + more, meaning)
 
 
 def wrong_columns(description: Description, chain: Chain, trials: Sequence[Trial | PostureMeans]) -> Iterator[Verdict]:
@@ -114,9 +114,9 @@ def _odd_one(chain: Chain, shown: Sequence[Shown]) -> tuple[str, str] | None:
         return None
     far = f"the hand's markers are {1e3 * off:.0f} mm (mean) from where its readings put them, {1e3 * rest:.0f} mm in"
     far = f"{far} the other files, frames fitted to those"
-    left, said = min((left_by(r), r.said) for r in readings(chain))
+    left, meaning = min((left_by(r), r.meaning) for r in readings(chain))
     if left < min(_HALF * off, _ANOTHER):
-        return shown[k].file, f"{said}: {far}, {1e3 * left:.0f} mm otherwise; correct this file's columns"
+        return shown[k].file, f"{meaning}: {far}, {1e3 * left:.0f} mm otherwise; correct this file's columns"
     if off < _STRANGE:
         return None
     return shown[k].file, (
@@ -140,11 +140,13 @@ def _judge(chain: Chain, shown: Sequence[Shown]) -> str | None:
     d = _distances(chain, shown, as_declared(chain))
     if d is None or (off := float(d.mean())) < _OFF:
         return None
-    found = [(float(d_h.mean()), r.said) for r in readings(chain) if (d_h := _distances(chain, shown, r)) is not None]
-    left, said = min(found, default=(off, ""))
+    found = [
+        (float(d_h.mean()), r.meaning) for r in readings(chain) if (d_h := _distances(chain, shown, r)) is not None
+    ]
+    left, meaning = min(found, default=(off, ""))
     far = f"the hand's markers are {1e3 * off:.0f} mm (mean) from where the readings put them, frames fitted"
     if left < min(off / _CLEAR, _ANOTHER):
-        return f"{said}: {far}, {1e3 * left:.0f} mm otherwise; correct the mapping file"
+        return f"{meaning}: {far}, {1e3 * left:.0f} mm otherwise; correct the mapping file"
     if float(np.median(d)) > _ANOTHER:
         return (
             f"{far}; no joint reversed and no two swapped explain it: columns of several joints or of markers are "

@@ -39,15 +39,15 @@ def check_currents(chain: Chain, trials: Sequence[tuple[str, Trial | PostureMean
     problems = [
         InputError(file, message)
         for (file, _), x in zip(logged, at_rest, strict=True)
-        if (message := _said(chain, [x]))
+        if (message := _finding(chain, [x]))
     ]
     if problems:
         raise InputErrors(problems)
-    if message := _said(chain, at_rest):
+    if message := _finding(chain, at_rest):
         raise InputError(f"{logged[0][0]} and {len(logged) - 1} more", message)
 
 
-def _said(chain: Chain, at_rest: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
+def _finding(chain: Chain, at_rest: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
     """What is wrong with the currents of these files, if anything."""
     q, effort = (np.concatenate(x) for x in zip(*at_rest, strict=True)) if at_rest else (np.zeros((0, 0)),) * 2
     if len(q) < _FEWEST:

@@ -112,7 +112,7 @@ def prospect(
     found = model.poses_and_derivatives(q, names=parameters.names)
     W, J, J_joint = _whitened(found, description, reading_sigma)
     A = (W @ J) * parameters.scale
-    V = told_directions(A) if known is None else np.eye(p)
+    V = identified_directions(A) if known is None else np.eye(p)
     P = model.poses_and_derivatives(at, names=parameters.names).J[:, :3] * parameters.scale @ V
     C = np.eye(V.shape[1]) if known is None else known
     none = np.zeros((*A.shape[:2], 0)), np.zeros((*P.shape[:2], 0))
@@ -140,7 +140,7 @@ def dwell_noise(T: np.ndarray, description: Description) -> np.ndarray:
     return np.asarray(R @ S[:, :3, :3] @ np.swapaxes(R, 1, 2) + description.sigmas.marker**2 / n * np.eye(3))
 
 
-def told_directions(A: np.ndarray) -> np.ndarray:
+def identified_directions(A: np.ndarray) -> np.ndarray:
     """V (p, r): what whitened, scaled derivatives A (n, d, p) identify at all."""
     _, s, Vt = np.linalg.svd(np.linalg.qr(A.reshape(-1, A.shape[2]), mode="r"))
     return np.asarray(Vt[: int((s > _CLIFF * s[0]).sum())].T)

@@ -24,7 +24,7 @@ import numpy as np
 
 from calibration.design.candidates import room_of
 from calibration.design.collisions import shapes_of
-from calibration.design.information import dwell_noise, prospect, told_directions
+from calibration.design.information import dwell_noise, identified_directions, prospect
 from calibration.design.plan import Plan, Task, plan
 from calibration.errors import NotEnoughData
 from calibration.inference.marginal_likelihood import Hyperparameters, log_marginal
@@ -123,7 +123,7 @@ def _known(
     description = _as_measured(description, postures)
     low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits())
     anywhere = rng.uniform(low, high, size=(_PROBES, len(low)))
-    V = told_directions(prospect(hand, parameters, description, play, anywhere, anywhere[:1], np.eye(p)).B)
+    V = identified_directions(prospect(hand, parameters, description, play, anywhere, anywhere[:1], np.eye(p)).B)
     told = prospect(hand, parameters, description, play, postures.q, anywhere[:1], np.eye(p))
     C = by_tolerance = told.after(np.arange(len(postures)))
     if not refused:
@@ -167,7 +167,7 @@ def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> Exp
 
 
 def _directions(found: Plan) -> int:
-    return int(told_directions(found.design.prospect.B).shape[1])
+    return int(identified_directions(found.design.prospect.B).shape[1])
 
 
 def believed_play(

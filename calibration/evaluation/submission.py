@@ -20,6 +20,7 @@ from calibration.errors import InputError
 from calibration.evaluation.pose_errors import PoseErrors
 from calibration.evaluation.submitted_poses import check_clock, check_poses, doubts
 from calibration.numerics.lie import compose
+from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.predicted_trial import Prediction
 from calibration.recording import netcdf
 from calibration.recording.dataset import Dataset
@@ -201,5 +202,5 @@ def _at(one: SubmittedTrial, t: np.ndarray) -> np.ndarray:
     if len(known) > 1 and between.any():
         between &= np.diff(known)[after - 1] <= _GAP
         turned = Slerp(known, Rotation.from_matrix(T[:, :3, :3]))(t[between]).as_matrix()
-        out[between] = compose(turned, np.stack([np.interp(t[between], known, p) for p in T[:, :3, 3].T], axis=1))
+        out[between] = compose(turned, interpolate_columns(t[between], known, T[:, :3, 3]))
     return out

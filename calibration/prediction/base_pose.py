@@ -23,7 +23,7 @@ import numpy as np
 from calibration.errors import NotEnoughData, ShapeError
 from calibration.mocap.cluster_pose import body_poses, poses_of
 from calibration.numerics.lie import adjoint, from_vector, inverse, mean
-from calibration.numerics.signals import CUTOFF
+from calibration.numerics.signals import CUTOFF, interpolate_columns
 from calibration.numerics.wrench import in_frame
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import REST, Trial
@@ -62,7 +62,7 @@ class LoadedBase:
         """
         forcing = forcing_of(self.load(t, wrench), float(t[0]))
         x = self.suspension.displaced(forcing, "plate")
-        return self.in_lab(np.stack([np.interp(t, forcing.t, column) for column in x.T], axis=1))
+        return self.in_lab(interpolate_columns(t, forcing.t, x))
 
     def load(self, t: np.ndarray, wrench: np.ndarray, cutoff: float = CUTOFF) -> Load:
         """The wrench (n, 6) as the floor has it, without what is faster than `cutoff` [Hz].
@@ -215,8 +215,7 @@ class BaseInTrial:
 
     def _driven(self, load: Load, source: Source) -> np.ndarray:
         forcing = forcing_of(load, float(self.trial.t_mocap[0]))
-        x = self.suspension.displaced(forcing, source)
-        return np.stack([np.interp(self.trial.t_mocap, forcing.t, column) for column in x.T], axis=1)
+        return interpolate_columns(self.trial.t_mocap, forcing.t, self.suspension.displaced(forcing, source))
 
 
 def base_poses(suspension: Suspension, lab: WrenchSources, trial: Trial, source: Source) -> np.ndarray:

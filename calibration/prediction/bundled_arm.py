@@ -90,10 +90,10 @@ class BundledArm:
         robot = self.trains.dynamics
         base = None if T_lab_base is None else self.trains.base_acceleration(t, T_lab_base, t)
         if velocity is None:
-            loads = robot.loads("", t, q_motor, base, regressors=True)
+            loads = robot.loads("", t, q_motor, base)
         else:
             a = np.gradient(velocity, t, axis=0) if len(t) > 1 else np.zeros_like(velocity)
-            found = robot.evaluated(q_motor, velocity, a, base, True)
+            found = robot.evaluated(q_motor, velocity, a, base)
             loads = LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
         angles = self.trains.of_loads(loads)
         return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < _RESTS)

@@ -24,24 +24,24 @@ def without_holes(trial: Trial) -> Trial:
     """The trial without samples that miss a joint's position or a channel of the plate; itself if whole."""
     trial = _by_links(trial)
     read = np.isfinite(trial.q_motor).all(axis=1)
-    felt = np.isfinite(trial.plate_wrench).all(axis=(1, 2))
+    pressed = np.isfinite(trial.plate_wrench).all(axis=(1, 2))
     hidden = ~np.isfinite(trial.marker_position) & ~np.isnan(trial.marker_position)
-    if read.all() and felt.all() and not hidden.any():
+    if read.all() and pressed.all() and not hidden.any():
         return trial
-    kept = {name: getattr(trial, name)[read] for name in _OF_ROBOT} | {n: getattr(trial, n)[felt] for n in _OF_PLATE}
+    kept = {name: getattr(trial, name)[read] for name in _OF_ROBOT} | {n: getattr(trial, n)[pressed] for n in _OF_PLATE}
     return replace(trial, **kept, marker_position=np.where(hidden, np.nan, trial.marker_position))
 
 
 def _by_links(trial: Trial) -> Trial:
     """The trial with link readings in place of the motor readings that are missing."""
-    stands_in = ~np.isfinite(trial.q_motor) & np.isfinite(trial.q_link)
+    replaced = ~np.isfinite(trial.q_motor) & np.isfinite(trial.q_link)
     d = trial.q_motor - trial.q_link
-    joints = [j for j in np.flatnonzero(stands_in.any(axis=0)) if np.isfinite(d[:, j]).any()]
+    joints = [j for j in np.flatnonzero(replaced.any(axis=0)) if np.isfinite(d[:, j]).any()]
     if not joints:
         return trial
     q, link = trial.q_motor.copy(), trial.q_link.copy()
     for j in joints:
-        rows, known = stands_in[:, j], np.isfinite(d[:, j])
+        rows, known = replaced[:, j], np.isfinite(d[:, j])
         q[rows, j] = link[rows, j] + np.interp(trial.t_robot[rows], trial.t_robot[known], d[known, j])
         link[rows, j] = np.nan
     return replace(trial, q_motor=q, q_link=link)

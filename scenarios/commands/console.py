@@ -24,6 +24,7 @@ PLAIN_WIDTH = 120
 
 PLAIN_PERIOD = 5.0
 """Time between two progress lines of one step where there is no terminal [s]."""
+_MOST = 5  # failed runs that are shown
 
 
 @contextmanager
@@ -92,17 +93,17 @@ def show(table: Table | None) -> None:
     console.print(table)
 
 
-def show_rows(rows: "Sequence[Row]", most: int = 5) -> None:
+def show_rows(rows: "Sequence[Row]") -> None:
     """Print how many runs of a collection ended well, and on stderr why some did not."""
     bad = [row for row in rows if row.status != "ok"]
     Console().print(
         f"{len(rows) - len(bad)} of {len(rows)} runs, {sum(row.bytes for row in rows) / 1e6:.1f} MB", highlight=False
     )
     errors = Console(stderr=True)
-    for row in bad[:most]:
+    for row in bad[:_MOST]:
         errors.print(f"run {row.id} {row.status}: {row.reason}", markup=False, highlight=False, soft_wrap=True)
-    if len(bad) > most:
-        errors.print(f"and {len(bad) - most} more; index.csv has them all", highlight=False)
+    if len(bad) > _MOST:
+        errors.print(f"and {len(bad) - _MOST} more; index.csv has them all", highlight=False)
 
 
 def summary(run: Path) -> list[str]:

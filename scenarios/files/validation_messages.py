@@ -105,8 +105,8 @@ def _message(detail: Mapping[str, Any], path: Sequence[str], known: Sequence[str
     if detail["type"] in MISSING:
         return "missing"
     if detail["type"] == UNKNOWN_NAME:
-        name, said = detail["input"], detail["ctx"]
-        return _unknown(f"no {said['kind']} named {name}", name, said["known"].split(", "))
+        name, context = detail["input"], detail["ctx"]
+        return _unknown(f"no {context['kind']} named {name}", name, context["known"].split(", "))
     if detail["type"] in UNKNOWN:
         return _unknown("unknown field", path[-1], known)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")

@@ -50,7 +50,7 @@ def looked_at(dataset: Dataset, entry: TrialEntry) -> Looked:
             *_plates(trial),
             *_at_rest(trial),
             *_encoders(trial),
-            *_felt(trial),
+            *_pressures(trial),
         ),
     )
 
@@ -141,7 +141,7 @@ def _at_rest(trial: Trial) -> Iterator[str]:
     yield f"plates: Fz {first:+.2f} N in the first second, {last:+.2f} N in the last: {last - first:+.2f} N"
 
 
-def _felt(trial: Trial) -> Iterator[str]:
+def _pressures(trial: Trial) -> Iterator[str]:
     """Efforts of motors, wrench at the wrist."""
     if not len(trial.t_robot):
         return

@@ -109,8 +109,8 @@ def replayed(config: TwinConfig, seed: int, trial: Recorded, condition: Conditio
     """
     robot = sampled(config, seed)
     plate = sample_plate("plate", robot.instruments.plate, generator(seed, "plate"))
-    felt = (trial.w - plate.drift * trial.t[:, None]) @ np.linalg.inv(plate.gain).T
+    wrench = (trial.w - plate.drift * trial.t[:, None]) @ np.linalg.inv(plate.gain).T
     floor = floor_of(config, seed, condition, -float(trial.rest[2]))
-    x = replay(massless_base_on(floor, robot.timestep), WrenchHistory(trial.t, trial.rest + felt))
+    x = replay(massless_base_on(floor, robot.timestep), WrenchHistory(trial.t, trial.rest + wrench))
     shift = trial.shifting(generator(seed, "shift", trial.trial_id)) if condition.shifting else 0.0
     return trial.seen(x, robot.instruments.marker_noise, generator(seed, "seen", trial.trial_id), shift)

@@ -38,8 +38,8 @@ def moved(config: RobotConfig, T_lab_base: np.ndarray, seed: int, session: str =
     return T
 
 
-def session_parameters(robot: Robot, session: str = CONFIRMATION) -> tuple[Parameter, ...]:
-    """What is true in that session only, `session.` before each name."""
+def session_parameters(robot: Robot) -> tuple[Parameter, ...]:
+    """What is true in the confirmation only, `confirmation.` before each name."""
     motor = (e for e in robot.encoders if e.side == "motor")
     found = (p for source in (*motor, *robot.clusters) for p in source.parameters())
-    return tuple(p._replace(name=f"{session}.{p.name}") for p in found)
+    return tuple(p._replace(name=f"{CONFIRMATION}.{p.name}") for p in found)

@@ -229,5 +229,5 @@ def _check_increasing(path: Path, topic: str, t: np.ndarray) -> None:
         check_times(path, topic, t)
     if len(back):
         k = int(back[0])
-        said = "has the stamp of the one before" if t[k + 1] == t[k] else "has an earlier stamp than the one before"
-        raise InputError(path, f"{topic}: message {k + 1} of our joints {said} ({t[k + 1]:.6f} s); log one publisher")
+        why = "has the stamp of the one before" if t[k + 1] == t[k] else "has an earlier stamp than the one before"
+        raise InputError(path, f"{topic}: message {k + 1} of our joints {why} ({t[k + 1]:.6f} s); log one publisher")

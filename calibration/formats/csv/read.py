@@ -186,8 +186,8 @@ def _check_times(text: CsvText, column: str, t: np.ndarray) -> None:
     back = np.flatnonzero(~(np.diff(t) > 0.0))
     if len(back):
         row = int(back[0]) + 1
-        said = "is the same as in the row before" if t[row] == t[row - 1] else "does not increase"
-        raise text.error(row, column, f"time {text.cells[row, text.index(column)]} {said}; remove or sort such rows")
+        why = "is the same as in the row before" if t[row] == t[row - 1] else "does not increase"
+        raise text.error(row, column, f"time {text.cells[row, text.index(column)]} {why}; remove or sort such rows")
     check_times(text.path, column, t)
 
 

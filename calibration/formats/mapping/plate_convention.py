@@ -63,10 +63,10 @@ def checked_against_cop(
     _check_sign(place, wrench, loaded, channels, plate)
     if cop is None:
         _check_inside(place, wrench, loaded, plate)
-        return f"plate {plate.name}: {_told(channels)} as declared; the file has no CoP to confirm it"
+        return f"plate {plate.name}: {_words(channels)} as declared; the file has no CoP to confirm it"
     error = _disagreement(wrench, loaded, cop, plate)
     if error < _AGREES:
-        return f"plate {plate.name}: {_told(channels)}, confirmed by its CoP to {_length(error)}"
+        return f"plate {plate.name}: {_words(channels)}, confirmed by its CoP to {_length(error)}"
     fitting = next(_conventions(force, moment, loaded, cop, channels, plate), None)
     remedy = (
         f"its CoP agrees with {fitting}; map that"
@@ -77,7 +77,7 @@ def checked_against_cop(
     )
     raise InputError(
         place,
-        f"plate {plate.name} declared as {_told(channels)}, but then its CoP is {_length(error)} off the file's own; "
+        f"plate {plate.name} declared as {_words(channels)}, but then its CoP is {_length(error)} off the file's own; "
         f"{remedy}",
     )
 
@@ -88,7 +88,7 @@ def _check_sign(place: str, wrench: np.ndarray, loaded: np.ndarray, channels: Pl
         other = "reaction" if channels.convention == "action" else "action"
         raise InputError(
             place,
-            f"plate {plate.name} declared as {_told(channels)}, but then the robot would pull it up with {fz:.0f} N; "
+            f"plate {plate.name} declared as {_words(channels)}, but then the robot would pull it up with {fz:.0f} N; "
             f"map convention: {other}, or turn the plate's axes if it is upside down",
         )
 
@@ -121,7 +121,7 @@ def _conventions(
             other = channels.model_copy(update={"axes": axes, "about": about, "moment_unit": unit})
             scaled = moment * (MOMENTS[unit] / MOMENTS[channels.moment_unit])
             if _disagreement(to_action(force, scaled, other, candidate), loaded, cop, plate) < _AGREES:
-                yield _told(other) + ("" if candidate is plate else f" with plate axes {candidate.axes}")
+                yield _words(other) + ("" if candidate is plate else f" with plate axes {candidate.axes}")
 
 
 def _upright_axes() -> Iterator[tuple[tuple[float, ...], ...]]:
@@ -131,7 +131,7 @@ def _upright_axes() -> Iterator[tuple[tuple[float, ...], ...]]:
         yield first, (-up * first[1], up * first[0], 0.0), (0.0, 0.0, up)
 
 
-def _told(c: PlateChannels) -> str:
+def _words(c: PlateChannels) -> str:
     about = "surface centre" if c.about == "centre" else "lab origin"
     return f"{c.convention}, {c.axes} axes, about the {about}, moments in {c.moment_unit}"
 

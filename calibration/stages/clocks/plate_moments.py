@@ -127,9 +127,11 @@ def _carried(part: Carrier, trial: MeasuredTrial, q: Signal) -> tuple[np.ndarray
     along = dynamics_along(tree, q.x[rows], rates[rows], accelerations[rows], root)
     whole = _action(T[rows], trial) @ along.root[..., None]
     R = T_lab_link[rows, :3, :3]
-    felt = link_pushes[rows]
-    felt[:, :3] -= part.model.gravity.linear @ R
-    Y = np.array([pin.bodyRegressor(pin.Motion(v), pin.Motion(a)) for v, a in zip(link_turns[rows], felt, strict=True)])
+    at_link = link_pushes[rows]
+    at_link[:, :3] -= part.model.gravity.linear @ R
+    Y = np.array(
+        [pin.bodyRegressor(pin.Motion(v), pin.Motion(a)) for v, a in zip(link_turns[rows], at_link, strict=True)]
+    )
     found = np.concatenate([np.swapaxes(whole, 1, 2), np.swapaxes(_action(T_lab_link[rows], trial) @ Y, 1, 2)], axis=1)
     return CubicSpline(rows, found)(np.arange(len(q.t))), valid
 

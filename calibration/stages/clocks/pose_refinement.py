@@ -153,7 +153,7 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     wound = played @ reduced.coefficients(change)[-played.shape[1] :]
     late = float(S[:, 0] @ wound / (S[:, 0] @ S[:, 0]))
     unseen = -reduced.taken_for(known[0].sum(axis=2).ravel())
-    return replace(_told(change, C, x.t, middle, trial_id, clock), wound=late, unseen=unseen)
+    return replace(_estimated(change, C, x.t, middle, trial_id, clock), wound=late, unseen=unseen)
 
 
 def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
@@ -161,7 +161,7 @@ def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
     return np.nanmedian(np.where(held | ~held.any(axis=0), q, np.nan), axis=0)
 
 
-def _told(  # noqa: PLR0913  the parts of one line
+def _estimated(  # noqa: PLR0913  the parts of one line
     change: np.ndarray, C: np.ndarray, t: np.ndarray, middle: float, trial_id: str, clock: Clock
 ) -> TrialLag:
     """Lag and drift at the instant where they are uncorrelated, from those at `middle` with covariance C."""

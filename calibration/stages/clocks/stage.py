@@ -41,13 +41,13 @@ def synchronise(lab: Laboratory, trials: Sequence[Trial]) -> tuple[tuple[Clock, 
         NotEnoughData: There are encoder readings, but their clock cannot be determined from the motion capture's.
     """
     with_robot, with_plate = ([t for t in trials if len(getattr(t, f"t_{name}"))] for name in ("robot", "plate"))
-    robot, model, said = None, None, _missing("robot", "no encoder readings")
+    robot, model, findings = None, None, _missing("robot", "no encoder readings")
     if with_robot:
-        robot, model, said = _robot_clock(lab, with_robot)
+        robot, model, findings = _robot_clock(lab, with_robot)
     plate, more = None, _missing("plate", "no force plate")
     if with_plate:
         plate, more = _plate_clock(lab, with_plate, robot, model)
-    return tuple(c for c in (robot, plate) if c is not None), (*said, *more)
+    return tuple(c for c in (robot, plate) if c is not None), (*findings, *more)
 
 
 def _missing(instrument: str, why: str) -> tuple[Verdict, ...]:
@@ -59,19 +59,19 @@ def _robot_clock(lab: Laboratory, trials: Sequence[Trial]) -> tuple[Clock, Provi
     """The robot's clock, and the provisional robot the plate's is determined with."""
     if "robot" not in lab.description.mocap_clock:
         return _estimated_robot_clock(lab, trials)
-    said: tuple[Verdict, ...] = (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
+    findings: tuple[Verdict, ...] = (Verdict("clocks", "ok", "robot: on the motion capture's clock"),)
     try:
         found = _estimated_robot_clock(lab, trials)[0]
     except NotEnoughData:
-        return shared_clock("robot"), None, said
+        return shared_clock("robot"), None, findings
     late = float(found.to_mocap(np.array([found.epoch]))[0]) - found.epoch
     if abs(late) > max(_LATE, _FAR * found.sigma):
         message = (
             f"robot: declared on the motion capture's clock, but its stamps are {-1e3 * late:+.1f} ms late "
             f"(+- {1e3 * found.sigma:.1f}); take robot out of mocap_clock, or mend the stamps"
         )
-        said = (*said, Verdict("clocks", "warning", message))
-    return shared_clock("robot"), None, said
+        findings = (*findings, Verdict("clocks", "warning", message))
+    return shared_clock("robot"), None, findings
 
 
 def _estimated_robot_clock(

@@ -136,7 +136,7 @@ class DriveTrains:
         """
         if q_motor.shape != (len(t), len(self.joints)):
             raise ShapeError("q_motor", q_motor.shape, (len(t), len(self.joints)))
-        return self.of_loads(self.dynamics.loads("", t, q_motor, base, regressors=True), start)
+        return self.of_loads(self.dynamics.loads("", t, q_motor, base), start)
 
     def of_loads(self, loads: LinkLoads, start: np.ndarray | None = None) -> LinkAngles:
         """Link angles of a trial whose loads are known, with regressors."""

@@ -19,6 +19,7 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import adjoint, inverse, log6
+from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
@@ -161,7 +162,7 @@ def seen_joint(
     C = (other.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)) * trains.description.sigmas.marker**2
     q = trains.of_loads(loads).q  # the geometry is of link angles
     s = robot.from_mocap(trial.t_mocap)
-    at, moment = (np.stack([np.interp(s, loads.t, column) for column in x.T], axis=1) for x in (q, loads.moment))
+    at, moment = (interpolate_columns(s, loads.t, x) for x in (q, loads.moment))
     known = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2))
     if known.sum() < 2:
         raise NotEnoughData(f"{trial.id}: the hand is not seen")

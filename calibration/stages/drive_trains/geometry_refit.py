@@ -19,6 +19,7 @@ from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model
 from calibration.mocap.postures import Postures, dwell_windows, passing_postures, readings_at, static_postures
 from calibration.numerics.lie import inverse
+from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
@@ -204,8 +205,7 @@ def hand_poses(hand: HandModel, bending: ColumnBending, corrected: CorrectedTria
 
 def _at(corrected: CorrectedTrial, robot: Clock, t: np.ndarray) -> np.ndarray:
     """Moments (n, 2) of the column at mocap times (n,)."""
-    s = robot.from_mocap(t)
-    return np.stack([np.interp(s, corrected.loads.t, m) for m in corrected.loads.moment.T], axis=1)
+    return interpolate_columns(robot.from_mocap(t), corrected.loads.t, corrected.loads.moment)
 
 
 def _postures(  # noqa: PLR0913  the parts of one line

@@ -16,7 +16,7 @@ from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, TrainFi
 
 _NARROWED, _SHARE = 0.5, 0.33
 _RARER = 0.01  # share of the samples, at least, in which a mesh may lie on its rarer side
-_SPOKEN = 1e-6  # share of the prior's standard deviation: less, and no block speaks for a parameter
+_SEEN = 1e-6  # share of the prior's standard deviation: less, and no block speaks for a parameter
 _MOTOR = np.array([3e-4, 3e-4, 1e-4, 1e-4])  # [rad] prior of a motor encoder's eccentricity, seen at the joint
 _REMEDIES = {
     "half_gap": "move {0} back and forth in postures where its load changes sign",
@@ -49,9 +49,9 @@ def covariance_of(fit: TrainFit) -> np.ndarray:
         return np.asarray(floor)
     sigma, least = (np.sqrt(np.maximum(np.diag(C), np.finfo(float).tiny)) for C in (found.covariance, floor))
     most = np.maximum(1.0 / np.sqrt(np.maximum(information, np.finfo(float).tiny)), least)
-    wanted, spoken = np.clip(sigma, least, most), sigma > _SPOKEN * least
-    factor = np.where(spoken, wanted / sigma, 0.0)
-    return np.asarray(np.outer(factor, factor) * found.covariance + np.diag(np.where(spoken, 0.0, wanted**2)))
+    wanted, seen = np.clip(sigma, least, most), sigma > _SEEN * least
+    factor = np.where(seen, wanted / sigma, 0.0)
+    return np.asarray(np.outer(factor, factor) * found.covariance + np.diag(np.where(seen, 0.0, wanted**2)))
 
 
 def reported(train: DriveTrain, fit: TrainFit, covariance: np.ndarray, motor_offset: float) -> DriveTrain:

@@ -86,7 +86,7 @@ def loads_of_trial(
     if T_lab_B is not None and description.marker_frame == "lab":
         T_lab_base = T_lab_B @ inverse(from_vector(hand.base))
         base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t))
-    return trains.of_trial(trial.id).dynamics.loads(trial.id, t, trial.q_motor[rows], base, regressors=True)
+    return trains.of_trial(trial.id).dynamics.loads(trial.id, t, trial.q_motor[rows], base)
 
 
 def _dynamics(urdf: str, description: Description, hand: HandModel) -> Dynamics:

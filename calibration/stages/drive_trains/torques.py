@@ -45,7 +45,7 @@ class LinkLoads:
         a: Motor accelerations.
         torque: tau [N.m, N].
         inertia: M_jj [kg.m2, kg].
-        regressor: (n, k, p) R of the parameters dphi; p = 0 where not asked for.
+        regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
     """
 
@@ -82,21 +82,17 @@ class Dynamics:
         """The model made ready for its dynamics."""
         return tree_of(self.model, self.joints)
 
-    def loads(
-        self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None = None, regressors: bool = False
-    ) -> LinkLoads:
+    def loads(self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None = None) -> LinkLoads:
         """Loads at motor readings q (n, k) taken at t (n,) [s], without NaN; `base` (n, 6) as `base_acceleration`."""
         smooth, v, a = derivatives(t, q, CUTOFF)
-        return LinkLoads(trial_id, t, q, smooth - self.offset, v, a, *self.evaluated(smooth, v, a, base, regressors))
+        return LinkLoads(trial_id, t, q, smooth - self.offset, v, a, *self.evaluated(smooth, v, a, base))
 
     def evaluated(
-        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, regressors: bool
+        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Torques and inertias (n, k), regressors (n, k, p), moments (n, 2) at readings and derivatives (n, k)."""
         root = self.root(base)
-        found = dynamics_along(self.tree, q - self.offset, v, a, root, regressors)
-        if not regressors:
-            return found.torque, found.inertia, found.regressor, found.moment
+        found = dynamics_along(self.tree, q - self.offset, v, a, root, True)
         push, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
         tilt = np.stack(
             [

@@ -166,8 +166,8 @@ def prior_of(data: JointData, form: Form, backlash: float, deflection: float) ->
     return Prior(nominal, width, least, step, np.zeros(5), np.diag(np.append(width**-2.0, GAMMA_INFORMATION)))
 
 
-def fit_train(problem: Problem, theta: np.ndarray, floors: Sequence[float] = FLOORS, hasty: bool = False) -> TrainFit:
-    """Fit from theta (p,); `hasty`: by derivatives without the link's inertia only."""
+def fit_train(problem: Problem, theta: np.ndarray, floors: Sequence[float] = FLOORS) -> TrainFit:
+    """Fit from theta (p,)."""
     gamma = np.append(np.nanmedian(problem.data.y), np.zeros(4))
     for _ in range(2):
         difference = problem.data.y - problem.deltas(theta, gamma)
@@ -179,7 +179,7 @@ def fit_train(problem: Problem, theta: np.ndarray, floors: Sequence[float] = FLO
         quick = _quick(problem)
         for _ in range(_STEPS):
             before, state = state.cost, _improved(problem, quick, state, scales)
-            if before - state.cost < _LESS and quick is not problem and not hasty:
+            if before - state.cost < _LESS and quick is not problem:
                 quick, state = problem, replace(state, damping=1e-2)
             elif before - state.cost < _LESS:
                 break

@@ -38,7 +38,7 @@ def locate_base(lab: Laboratory, stations: Stations) -> tuple[Model | None, tupl
     printed = printed_base_frame(stations)
     found = fit_base_frame(stations, np.where(free, printed.start(nominal), nominal), floor, free, STANDING[2:5])
     model = _model(description, found, nominal, free)
-    return model, (*_refused(description, model, found), *_told(stations, found, printed, free))
+    return model, (*_refused(description, model, found), *_findings(stations, found, printed, free))
 
 
 def _model(description: Description, found: BaseFrame, nominal: np.ndarray, free: np.ndarray) -> Model:
@@ -71,7 +71,7 @@ def _refused(description: Description, model: Model, found: BaseFrame) -> Iterat
             )
 
 
-def _told(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarray) -> Iterator[Verdict]:
+def _findings(stations: Stations, found: BaseFrame, printed: Printed, free: np.ndarray) -> Iterator[Verdict]:
     """What was found, trial by trial where the base wandered."""
     away = found.common.base - printed.start(found.common.base)
     forward = f", forward {1e3 * abs(away[5]):.2f} mrad" if free[5] else ""

@@ -148,10 +148,10 @@ def _not_better(message: str, delivered: str) -> Verdict:
 def _errors(name: str, chain: Chain, description: Description, fitted: Postures, predicted: Postures) -> np.ndarray:
     """Distances (n,) [m] at `predicted` of a row fitted to `fitted`, NaN where that must not be used."""
     try:
-        model, said = _FITS[name](chain, description, fitted)
+        model, findings = _FITS[name](chain, description, fitted)
     except CalibrationError:
         return np.full(len(predicted), np.nan)
-    if any(v.verdict == "refused" for v in said):
+    if any(v.verdict == "refused" for v in findings):
         return np.full(len(predicted), np.nan)
     T = hand_of(model, chain, nominal_frames(chain, description)).poses(predicted.q)
     p = T[:, :3, 3] + T[:, :3, :3] @ predicted.point

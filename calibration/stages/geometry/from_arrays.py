@@ -150,11 +150,11 @@ def _verdicts(
     left_out: tuple[int, ...], n: int, known: Identifiability, parameters: ParameterSet
 ) -> tuple[Verdict, ...]:
     message = f"{known.rank} combinations of {len(parameters)} parameters from {n - len(left_out)} postures"
-    said = [Verdict(_STAGE, "ok", f"{message}, condition {known.condition:.0f}")]
+    verdicts = [Verdict(_STAGE, "ok", f"{message}, condition {known.condition:.0f}")]
     if left_out:
         message = f"{len(left_out)} of {n} postures contradict the others and were left out, counted from 0: "
-        said.append(Verdict(_STAGE, "warning", message + ", ".join(map(str, left_out))))
-    return tuple(said)
+        verdicts.append(Verdict(_STAGE, "warning", message + ", ".join(map(str, left_out))))
+    return tuple(verdicts)
 
 
 def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarray, np.ndarray]:

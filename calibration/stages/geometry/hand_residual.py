@@ -119,11 +119,9 @@ def fit(model: HandModel, parameters: ParameterSet, postures: Postures, reading:
     return solve(problem, problem.linearise(parameters.nominal))
 
 
-def hand_problem(
-    model: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel, tau: np.ndarray | None = None
-) -> Problem:
-    """The problem of `fit`, with the hand's own random errors where they are given; tau as the residual takes it."""
-    tau = model.nominal.gravity_torques(postures.q) if tau is None else tau
+def hand_problem(model: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> Problem:
+    """The problem of `fit`, with the hand's own random errors where they are given."""
+    tau = model.nominal.gravity_torques(postures.q)
     residual = HandResidual(model, parameters.names, postures, errors, tau=tau)
     return Problem((residual,), parameters, errors.stated)
 

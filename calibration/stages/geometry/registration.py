@@ -69,13 +69,13 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
     model = replace(model, hand_error=_hand_error(found.at.r, used.motion))
     shift = 1e3 * np.linalg.norm(found.theta[6:9] - parameters.nominal[6:9])
     message = f"marker frames from {kept.sum()} postures; hand {shift:.1f} mm from nominal"
-    said = [Verdict(STAGE, "ok", "; ".join((message, *departed.shown)))]
+    verdicts = [Verdict(STAGE, "ok", "; ".join((message, *departed.shown)))]
     if not kept.all():
         outliers = np.flatnonzero(~kept)
         names = ", ".join(postures.label[outliers] if len(postures.label) else outliers.astype(str))
         message = f"{len(outliers)} of {len(kept)} postures are outliers and were excluded from the registration"
-        said.append(Verdict(STAGE, "warning", f"{message}, counted from 0: {names}"))
-    return model, tuple(said)
+        verdicts.append(Verdict(STAGE, "warning", f"{message}, counted from 0: {names}"))
+    return model, tuple(verdicts)
 
 
 def _hand_error(r: np.ndarray, motion: np.ndarray) -> np.ndarray:

@@ -101,8 +101,8 @@ def left_out(postures: Postures, found: RobustFit, usual: float = 0.0) -> Iterat
     odd = np.flatnonzero(~found.kept)
     if len(odd):
         names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
-        said = (
+        message = (
             f"{len(odd)} of {len(postures)} postures contradict the others and were left out, counted from 0: {names}"
         )
         share = len(odd) / len(postures)
-        yield Verdict(STAGE, "refused" if share > MANY_ODD else "warning" if share > usual else "ok", said)
+        yield Verdict(STAGE, "refused" if share > MANY_ODD else "warning" if share > usual else "ok", message)

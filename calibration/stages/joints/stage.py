@@ -110,7 +110,7 @@ def verdicts(
         yield Verdict(STAGE, "missing", f"no joint model without a link encoder: {', '.join(without)}")
     used = [m for m in models if m.degree is not None]
     if used:
-        yield Verdict(STAGE, "ok", f"{used[0].terms} terms; {'; '.join(_told(m) for m in used)}")
+        yield Verdict(STAGE, "ok", f"{used[0].terms} terms; {'; '.join(_summary(m) for m in used)}")
         yield from _at_limits(used)
         yield from _few_blocks(used)
     if worse:
@@ -157,7 +157,7 @@ def _few_blocks(used: Sequence[JointModel]) -> Iterator[Verdict]:
         yield Verdict(STAGE, "ok", message)
 
 
-def _told(model: JointModel) -> str:
+def _summary(model: JointModel) -> str:
     q = model.quality
     limit = " (its limit)" if limit_of(model.rho) else ""
     return (

@@ -83,8 +83,8 @@ def fit_stick_slip(
     model = StickSlip(wheels, tilting, tuple(directions))
     misplaced = _misplaced(wheels.names, shift, gain) if directions[0].is_of_wheels else ()
     names = [one.trial.id for one in read]
-    said = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
-    return model, said
+    findings = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
+    return model, findings
 
 
 def _read(sources: WrenchSources, trials: Sequence[Trial]) -> list[Read]:

@@ -30,7 +30,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.suspension.floor_wrench import Load, dynamics_load, plate_load
+from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 
 _INDEPENDENT = 2.0 * CUTOFF * REST  # samples of low-passed noise in the first second
@@ -92,16 +92,14 @@ def forcing_of(load: Load, start: float) -> Forcing:
     return Forcing(t, w - rest, rest, load.inertia, _tangent(rest, load), load.T_0_plate)
 
 
-def base_response_of(
-    description: Description, trial: Trial, rest: Rest, load: Load, cutoff: float = CUTOFF
-) -> BaseResponse:
+def base_response_of(description: Description, trial: Trial, rest: Rest, load: Load) -> BaseResponse:
     """Displacement by the base markers, and the forcing on its grid.
 
     Raises:
         NotEnoughData: Markers or wrench are missing.
     """
     forcing = forcing_of(load, float(trial.t_mocap[0]))
-    found = low_passed(even(trial.t_mocap, rest.displacement(MeasuredTrial.of(description, trial).base.T)), cutoff)
+    found = low_passed(even(trial.t_mocap, rest.displacement(MeasuredTrial.of(description, trial).base.T)), CUTOFF)
     keep = (found.t >= forcing.t[0]) & (found.t <= forcing.t[-1])
     if keep.sum() < 2.0 * RATE:
         raise NotEnoughData(f"{trial.id}: base markers and wrench overlap for less than two seconds")
@@ -160,7 +158,7 @@ class WrenchSources:
         """
         if self.robot is None or len(trial.t_robot) == 0:
             raise NotEnoughData(f"{trial.id}: no encoder readings on a known clock")
-        return dynamics_load(self.lab, trial, self.robot, T_lab_0)
+        return motion_load(self.lab, self.robot.to_mocap(trial.t_robot), trial.q_motor, T_lab_0, CUTOFF)
 
 
 @dataclass(frozen=True)

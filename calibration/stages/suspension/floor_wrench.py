@@ -64,11 +64,6 @@ def floor_load(t: np.ndarray, w: np.ndarray, T_lab_0: np.ndarray, centre: np.nda
     return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3), T_0_plate)
 
 
-def dynamics_load(lab: Laboratory, trial: Trial, robot: Clock, T_lab_0: np.ndarray, cutoff: float = CUTOFF) -> Load:
-    """What the nominal robot does along q_motor, its base standing still."""
-    return motion_load(lab, robot.to_mocap(trial.t_robot), trial.q_motor, T_lab_0, cutoff)
-
-
 def motion_load(lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np.ndarray, cutoff: float) -> Load:
     """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock]."""
     description = lab.description

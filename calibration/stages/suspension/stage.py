@@ -81,8 +81,8 @@ def fit_suspension(
         return None, tuple(found)
     if not responses.plate:
         found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
-    suspension, said = _fitted(lab.description, responses, form or Form())
-    return suspension, (*found, *said)
+    suspension, findings = _fitted(lab.description, responses, form or Form())
+    return suspension, (*found, *findings)
 
 
 def _moved_bases(responses: Sequence[BaseResponse]) -> dict[str, str]:
@@ -94,10 +94,10 @@ def _moved_bases(responses: Sequence[BaseResponse]) -> dict[str, str]:
 def _fitted(description: Description, responses: BaseResponses, form: Form) -> tuple[Suspension, list[Verdict]]:
     used = responses.plate or responses.dynamics
     springs = compliance_springs(description, used, form.coupled)
-    said = []
+    findings = []
     if description.wheels and responses.plate:
         springs, verdict = _chosen(description, used, form, springs)
-        said.append(verdict)
+        findings.append(verdict)
     sources: list[tuple[Source, tuple[BaseResponse, ...]]] = [
         ("plate", responses.plate),
         ("dynamics", responses.dynamics),
@@ -126,7 +126,7 @@ def _fitted(description: Description, responses: BaseResponses, form: Form) -> t
         parameters,
         combinations,
     )
-    return suspension, said + [_judged(s, h) for s, h in tried]
+    return suspension, findings + [_judged(s, h) for s, h in tried]
 
 
 def _chosen(

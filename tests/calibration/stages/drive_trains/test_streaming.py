@@ -58,7 +58,7 @@ def trains() -> DriveTrains:
 def test_gravity_and_inertia_of_a_pendulum() -> None:
     robot, q = dynamics(), np.array([[0.3, 0.0]])
     still = np.zeros((1, 2))
-    torque, inertia, _, _ = robot.evaluated(q, still, still, None, False)
+    torque, inertia, _, _ = robot.evaluated(q, still, still, None)
     assert torque[0, 1] == pytest.approx(2.0 * 9.81 * 0.3 * np.sin(0.3), rel=1e-12)
     assert inertia[0, 1] == pytest.approx(0.02 + 2.0 * 0.3**2, rel=1e-12)
 
@@ -66,10 +66,10 @@ def test_gravity_and_inertia_of_a_pendulum() -> None:
 def test_regressors_are_what_other_masses_do() -> None:
     robot, q = dynamics(), np.array([[0.3, -0.5]])
     v, a = np.array([[0.7, 0.2]]), np.array([[1.0, -2.0]])
-    torque, _, R, _ = robot.evaluated(q, v, a, None, True)
+    torque, _, R, _ = robot.evaluated(q, v, a, None)
     heavier = robot.model.copy()
     heavier.inertias[3] = heavier.inertias[3] + pin.Inertia(0.1, np.array([0.01, 0.0, 0.2]), np.zeros((3, 3)))
-    again, _, _, _ = replace(robot, model=heavier).evaluated(q, v, a, None, False)
+    again, _, _, _ = replace(robot, model=heavier).evaluated(q, v, a, None)
     dphi = np.zeros(R.shape[2])
     dphi[4:8] = 0.1, 1e-3, 0.0, 0.02
     point = 0.1 * np.array([0.2**2 + 0.01**2])  # of a point mass about its joint, which first moments leave out
@@ -79,16 +79,16 @@ def test_regressors_are_what_other_masses_do() -> None:
 
 def test_a_tilt_of_the_base_is_a_turned_gravity() -> None:
     robot, q, still = dynamics(), np.array([[0.3, -0.5]]), np.zeros((1, 2))
-    torque, _, R, _ = robot.evaluated(q, still, still, None, True)
+    torque, _, R, _ = robot.evaluated(q, still, still, None)
     tilted = replace(robot, gravity=9.81 * np.array([np.sin(1e-5), 0.0, -np.cos(1e-5)]))
-    again, _, _, _ = tilted.evaluated(q, still, still, None, False)
+    again, _, _, _ = tilted.evaluated(q, still, still, None)
     assert (again - torque)[0] / 1e-5 == pytest.approx(R[0, :, -2], rel=1e-4)
 
 
 def test_samples_one_by_one_are_the_recording_in_one_go() -> None:
     of = trains()
     smooth, v, a = derivatives(T, Q, 20.0)
-    loads = replace(of.dynamics.loads("", T, Q, None, True), q=smooth)
+    loads = replace(of.dynamics.loads("", T, Q), q=smooth)
     batch, stream = of.of_loads(loads), stream_of(of)
     state, angles = stream.begin(T[0], smooth[0], v[0], a[0])
     found = [angles]
