@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
+from calibration.numerics.signals import play
 from calibration.stages.hysteretic_base.log import BaseLog, compared
-from calibration.stages.hysteretic_base.operators import plays
 from calibration.stages.hysteretic_base.yaw import SlippingYaw, fit_yaw
 
 Form = Literal["still", "linear", "play", "follows", "slip 1", "slip 2"]
@@ -83,7 +83,8 @@ def columns(form: Form, a: int, w: np.ndarray, x: np.ndarray, widths: np.ndarray
     if form == "follows":
         return x[:, 3:]
     if form == "play":
-        return np.column_stack([compared(w), compared(plays(w[:, a], widths))])
+        moment = np.tile(np.append(0.0, w[:, a])[:, None], len(widths))
+        return np.column_stack([compared(w), compared(play(moment, widths)[1:])])
     return compared(w)
 
 

@@ -4,17 +4,24 @@
 
 (a_x, a_y) [m] place the point about which it turns. Parameters are logarithms, a_x and a_y as they are, with a normal
 prior about a spring as stiff as the log's moment over its angle; least squares from several starts.
+
+Maxwell-slip: a spring, a damper and elements that stick and slip side by side,
+
+    c dpsi/dt + ke psi + sum_j k_j clamp(psi - s_j, +-D_j) = u,        the slider s_j follows beyond D_j
+
+implicit in time. Reference: Al-Bender, Lampaert, Swevers, The generalized Maxwell-slip model, IEEE Trans. Autom.
+Control 50 (2005).
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.optimize import least_squares
 
 from calibration.numerics.signals import RATE
 from calibration.stages.hysteretic_base.log import BaseLog, compared
-from calibration.stages.hysteretic_base.operators import maxwell_slip
 
 _SHARE = 0.1  # of the motion: error of the fit that counts as one [-]
 _WIDTH, _ARM = 1.5, 0.3  # prior standard deviations of a logarithm [-] and of a_x, a_y [m]
@@ -23,6 +30,38 @@ _SLIPS = (0.4, 0.05, 0.01)  # D over the largest angle
 _FACTORS = (0.5, 1.0, 2.0)  # of D, between starts
 _STEP = 1e-3  # of derivatives
 _MOST, _NEAR = 30, 10  # steps from a start, and from one that is near
+_ITERATIONS = 40  # of Newton on a monotone, piecewise linear function
+_SOLVED = 1e-12  # [rad]
+
+
+@njit(cache=True, error_model="numpy")
+def maxwell_slip(u: np.ndarray, k: np.ndarray, D: np.ndarray, ke: float, c: float, h: float) -> np.ndarray:
+    """psi (n,) [rad] under u (n,) [N.m], samples h [s] apart.
+
+    Args:
+        u: (n,).
+        k: (m,) stiffness of the elements [N.m/rad].
+        D: (m,) where they slip [rad].
+        ke: Of the spring [N.m/rad].
+        c: Of the damper [N.m.s/rad].
+        h: [s].
+    """
+    psi, s, before = np.empty(len(u)), np.zeros(len(k)), 0.0
+    for t in range(len(u)):
+        x = before
+        for _ in range(_ITERATIONS):
+            force, slope = c / h * (x - before) + ke * x - u[t], c / h + ke
+            for j in range(len(k)):
+                e = x - s[j]
+                force += k[j] * min(max(e, -D[j]), D[j])
+                slope += k[j] * (abs(e) <= D[j])
+            x -= force / slope
+            if abs(force) < _SOLVED * slope:
+                break
+        for j in range(len(k)):
+            s[j] = min(max(s[j], x - D[j]), x + D[j])
+        psi[t] = before = x
+    return psi
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
-from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
+from calibration.numerics.signals import RATE, Signal, even, low_passed
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
@@ -134,7 +134,7 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     tilt, load, rows, drive = heave(fine), _at(main.signal, fine), np.zeros((n, 15)), np.zeros((len(fine), COLUMNS))
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
-        M = interpolate_columns(t, wrenches.t, wrenches.M.reshape(-1, 36)).reshape(-1, 6, 6)
+        M = _resampled(wrenches.t, wrenches.M, t)
         shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], heave(fine, 2))
         drive[:, :3] = (_at(dynamics.signal, fine) - shift)[:, PLANE]
         drive[:, :3] -= drive[rest, :3].mean(axis=0)
@@ -163,3 +163,9 @@ def composite_inertia(
     none = np.zeros_like(rows)
     M = dynamics_along(lab.tree, rows, none, none, np.zeros((1, 12))).composite
     return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
+
+
+def _resampled(t: np.ndarray, M: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """M (n, 6, 6) at times (n,), linear."""
+    columns = [np.interp(at, t, c) for c in M.reshape(len(M), 36).T]
+    return np.stack(columns, axis=1).reshape(len(at), 6, 6)

@@ -15,7 +15,7 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.cluster_pose import poses_of
-from calibration.numerics.signals import GAP, RATE, interpolate_columns
+from calibration.numerics.signals import GAP, RATE
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.stages.stick_slip.forcing import PlanarForcing
@@ -49,7 +49,7 @@ def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: P
     d = rest.displacement(poses_of(body, trial).T)
     good = np.isfinite(d).all(axis=1)
     t, n = trial.t_mocap[good], len(forcing.t)
-    x = interpolate_columns(forcing.t, t, d[good])
+    x = np.stack([np.interp(forcing.t, t, column) for column in d[good].T], axis=1)
     right = np.clip(np.searchsorted(t, forcing.t), 1, len(t) - 1)
     seen = (np.diff(t)[right - 1] <= GAP) & (forcing.t >= t[0]) & (forcing.t <= t[-1])
     c_z = float(rest.T_0_B[2, 3] + (rest.T_0_B[:3, :3] @ np.mean([m.xyz for m in body.markers], axis=0))[2])

@@ -5,11 +5,10 @@ from calibration.stages.suspension.base_response import base_response_of, labora
 from calibration.stages.suspension.floor_wrench import plate_load
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of
-from calibration.stages.suspension.stage import Form, fit_suspension
+from calibration.stages.suspension.stage import fit_suspension
 from calibration.stages.suspension.wheels import Point, wheel_model
 
 __all__ = [
-    "Form",
     "Point",
     "Rest",
     "STAGE",

@@ -57,10 +57,10 @@ def printed_springs(description: Description, wheels: WheelModel, responses: Seq
     )
 
 
-def compliance_springs(description: Description, responses: Sequence[BaseResponse], coupled: bool) -> Springs:
+def compliance_springs(description: Description, responses: Sequence[BaseResponse]) -> Springs:
     """The reduced form, wrench to displacement."""
     couples = np.ones((6, 6), dtype=bool)
-    if description.wheels and not coupled:
+    if description.wheels:
         couples = wheel_model(description.wheels, "contact").couples
     found = fit_compliance(responses, couples)
     K, C = found.K, found.C

@@ -10,7 +10,6 @@ Where there is no plate the wrench is that of inverse dynamics.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,36 +35,18 @@ from calibration.stages.suspension.wheels import Point, element_parameters, whee
 from calibration.verdict import Verdict
 
 
-@dataclass(frozen=True)
-class Form:
-    """What is fitted.
-
-    Attributes:
-        point: r_i of the printed form: `centre` of the hub or `contact`; None: what predicts left-out trials better.
-        full: Whether Kt, Ct, Ktheta, Ctheta are symmetric matrices instead of diagonal ones.
-        coupled: Whether the compliance couples all six axes, as hub centres do, or (x, y, rz) and (z, rx, ry) apart,
-            as contact points in the floor do.
-    """
-
-    point: Point | None = None
-    full: bool = False
-    coupled: bool = False
-
-
 def fit_suspension(
     lab: Laboratory,
     trials: Sequence[Trial],
     robot: Clock | None,
     plate: Clock | None,
-    T_base_B: np.ndarray | None = None,
-    form: Form | None = None,
+    full: bool = False,
 ) -> tuple[Suspension | None, tuple[Verdict, ...]]:
     """The suspension by calibration trials, None where there is none to be had, and the verdicts on it.
 
-    T_base_B (4, 4) places the base's marker body on the base; nominal where it is not given.
+    `full`: Kt, Ct, Ktheta, Ctheta of the printed form are symmetric matrices instead of diagonal ones.
     """
-    sources = WrenchSources(lab, robot, plate, lab.T_base_B if T_base_B is None else T_base_B)
-    responses = read_responses(sources, trials)
+    responses = read_responses(WrenchSources(lab, robot, plate, lab.T_base_B), trials)
     found = list(wrong_plate(lab, *responses.forcings)) if responses.plate else []
     moved = _moved_bases(responses.dynamics or responses.plate)
     listed = ", ".join(f"{name} by {how}" for name, how in moved.items())
@@ -81,7 +62,7 @@ def fit_suspension(
         return None, tuple(found)
     if not responses.plate:
         found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
-    suspension, findings = _fitted(lab.description, responses, form or Form())
+    suspension, findings = _fitted(lab.description, responses, full)
     return suspension, (*found, *findings)
 
 
@@ -91,12 +72,12 @@ def _moved_bases(responses: Sequence[BaseResponse]) -> dict[str, str]:
     return {name: how for name, how in after.items() if how}
 
 
-def _fitted(description: Description, responses: BaseResponses, form: Form) -> tuple[Suspension, list[Verdict]]:
+def _fitted(description: Description, responses: BaseResponses, full: bool) -> tuple[Suspension, list[Verdict]]:
     used = responses.plate or responses.dynamics
-    springs = compliance_springs(description, used, form.coupled)
+    springs = compliance_springs(description, used)
     findings = []
     if description.wheels and responses.plate:
-        springs, verdict = _chosen(description, used, form, springs)
+        springs, verdict = _chosen(description, used, full, springs)
         findings.append(verdict)
     sources: list[tuple[Source, tuple[BaseResponse, ...]]] = [
         ("plate", responses.plate),
@@ -130,13 +111,13 @@ def _fitted(description: Description, responses: BaseResponses, form: Form) -> t
 
 
 def _chosen(
-    description: Description, responses: Sequence[BaseResponse], form: Form, reduced: Springs
+    description: Description, responses: Sequence[BaseResponse], full: bool, reduced: Springs
 ) -> tuple[Springs, Verdict]:
     """The printed form, about the points that predict better, or the reduced one where that is refused."""
-    points: tuple[Point, ...] = (form.point,) if form.point else ("centre", "contact")
+    points: tuple[Point, ...] = ("centre", "contact")
     found: list[tuple[float, Springs, str, Point]] = []
     for point in points:
-        springs = printed_springs(description, wheel_model(description.wheels, point, form.full), responses)
+        springs = printed_springs(description, wheel_model(description.wheels, point, full), responses)
         why, worth = not_positive(springs), -np.inf
         if not why:
             tried = held_out(responses, springs.folds.__getitem__)
@@ -172,8 +153,8 @@ def suspension_model(suspension: Suspension) -> Model:
 
 
 def _run(data: StageInput) -> StageResult:
-    form = Form(full=data.options.suspension == "full")
-    found, findings = fit_suspension(data.lab, data.trials, data.clock("robot"), data.clock("plate"), form=form)
+    full = data.options.suspension == "full"
+    found, findings = fit_suspension(data.lab, data.trials, data.clock("robot"), data.clock("plate"), full)
     return StageResult(() if found is None else (suspension_model(found),), findings, found)
 
 

@@ -1,6 +1,7 @@
 import numpy as np
 
-from calibration.stages.hysteretic_base.operators import maxwell_slip, plays
+from calibration.numerics.signals import play
+from calibration.stages.hysteretic_base.yaw import maxwell_slip
 
 K, D, SPRING, DAMPER, STEP = np.array([900.0, 1700.0]), np.array([12e-3, 1.5e-3]), 350.0, 20.0, 0.01
 
@@ -32,4 +33,4 @@ def test_without_slip_it_is_a_spring():
 
 def test_play_follows_at_its_width():
     u = np.array([0.0, 0.5, 3.0, 2.5, -2.0, -1.5])
-    np.testing.assert_allclose(plays(u, np.array([1.0]))[:, 0], [0.0, 0.0, 2.0, 2.0, -1.0, -1.0])
+    np.testing.assert_allclose(play(u[:, None], np.array([1.0]))[:, 0], [0.0, 0.0, 2.0, 2.0, -1.0, -1.0])

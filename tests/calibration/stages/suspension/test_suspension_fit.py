@@ -14,7 +14,7 @@ from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.modal_response import modes_of
 from calibration.stages.suspension.printed_fit import matrices
 from calibration.stages.suspension.rest_frame import rest_of, upright
-from calibration.stages.suspension.stage import Form, fit_suspension
+from calibration.stages.suspension.stage import fit_suspension
 from calibration.stages.suspension.wheels import wheel_model
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved, values
@@ -60,8 +60,8 @@ def trials(recorded):
     return tuple(trial for name, (trial, _) in recorded.items() if name != "d")
 
 
-def fit(trials, plate=PLATE, form=None):
-    return fit_suspension(Laboratory(mjcf.urdf(), DESCRIPTION), trials, ROBOT, plate, None, form)
+def fit(trials, plate=PLATE):
+    return fit_suspension(Laboratory(mjcf.urdf(), DESCRIPTION), trials, ROBOT, plate)
 
 
 @pytest.fixture(scope="module")
@@ -185,12 +185,6 @@ def test_too_little_is_told(trials):
     suspension, verdicts = fit(trials[:1])
     assert suspension is None
     assert "two trials" in said(verdicts, "missing")
-
-
-def test_the_form_can_be_asked_for(trials):
-    suspension, _ = fit(trials, form=Form(point="contact"))
-    names = {p.name for p in suspension.parameters}
-    assert "suspension.K.44" in names and "suspension.C.44" in names
 
 
 def test_frame_0_stands_on_the_floor():
