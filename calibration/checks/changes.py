@@ -34,7 +34,7 @@ _SURE = 5.0  # standard deviations
 _FAR_OFF = 4.0  # tolerances of a body of markers the hand may be off throughout
 _MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
 _LATE, _SLOW = 3e-3, 0.02  # [s]; [rad/s, m/s] below which backlash is not on one side
-_HALF, _KNOWN = 0.3, 0.08  # of a difference between sides that moves the hand; its standard deviation [-]
+_HALF = 0.4  # of a difference between sides that moves the hand [-]
 _WRONG = 3.0  # times what is explained beyond which the effect is not bounded
 
 
@@ -134,37 +134,31 @@ def _pulled(model: Model, names: Sequence[str], off: np.ndarray, tolerance: np.n
 
 
 def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Verdict]:
-    """Joints whose motor reading is where the link is: r = x J_j (motor - link), x = 1 as the sides are meant to be.
+    """Joints whose motor reading is where the link is: r = x J_j (motor - link) + J_j w(q_j), x = 1 as they are named.
 
-    A joint is judged where the gear's lag is larger than other errors: without it an eccentric link encoder, which
-    moves no hand, would look exchanged.
+    w are waves of one and two periods a turn, fitted as well: an eccentric encoder of the link adds them to its
+    readings alone and moves no hand. A joint is judged where its sigma tells x = 0 from 1.
     """
     joints, columns = left.hand.nominal.joints, left.hand.nominal.columns
     d = (left.x.q - left.x.link)[:, columns]
     known = np.flatnonzero(np.isfinite(d).all(axis=0))
     if not len(known):
         return
+    q, J = left.x.q[:, columns][:, known], left.J[:, :, known]
+    waves = [J * f(n * q)[:, None] for n in (1, 2) for f in (np.cos, np.sin)]
     d = d[:, known] - np.median(d[:, known], axis=0)
-    lag = [float(_without_waves(d[:, k], left.x.q[:, columns[j]]).std()) for k, j in enumerate(known)]
-    loose = np.array([lag[k] > _play(left, description, int(j))[0] for k, j in enumerate(known)])
-    value, S, _ = left.fitted(left.J[:, :, known] * d[:, None])
+    value, S, _ = left.fitted(np.concatenate([J * d[:, None], *waves], axis=2), len(known))
     sigma = np.sqrt(np.diag(S))
-    wrong = loose & (value < _HALF) & (1.0 - value > _SURE * sigma) & (sigma < _KNOWN)
+    wrong = (value < _HALF) & (1.0 - value > _SURE * sigma)
     if wrong.any():
         names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
         message = (
             f"motor and link readings of {names} are exchanged: the motor readings place the hand "
             f"({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
         )
-        unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~loose | (sigma >= _KNOWN)))
+        unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(_SURE * sigma >= 1.0))
         message += f"; sides of {unclear} differ too little to be judged, check them too" if unclear else ""
         yield Verdict(STAGE, "refused", f"{message}; exchange the columns")
-
-
-def _without_waves(d: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """A difference d (n,) without what an eccentric encoder adds, which depends on the angle q (n,) alone."""
-    X = np.stack([np.ones_like(q), np.cos(q), np.sin(q), np.cos(2.0 * q), np.sin(2.0 * q)], axis=1)
-    return np.asarray(d - X @ np.linalg.lstsq(X, d, rcond=1e-6)[0])
 
 
 def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -> Iterator[Change]:

@@ -1,6 +1,7 @@
 """A wrong campaign calibrated, and what its estimate is worth on the good one."""
 
 import logging
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from calibration import Estimate, calibrate, load
 from calibration.errors import CalibrationError
 from calibration.evaluation.evaluate import evaluate
 from calibration.recording.dataset import Dataset
+from calibration.verdict import Verdict
 from tests.hostile.campaign import Campaign
 from tests.hostile.wrong_data import Mistake
 
@@ -61,17 +63,21 @@ def tried(mistake: Mistake, campaign: Campaign, good: Dataset, reference: tuple[
     try:
         dataset = load(mistake.spoil(campaign).written(at))
         estimate = calibrated(dataset)
-        found = (
-            [*estimate.verdicts, *evaluate(estimate, dataset).verdicts] if estimate.calibrated else estimate.verdicts
-        )
+        said = _said(estimate.verdicts, known)
+        if estimate.calibrated:
+            said += _said(evaluate(estimate, dataset).verdicts, known)
     except CalibrationError as error:
         return Tried(mistake.name, False, (str(error),), np.nan, clean)
     finally:
         logging.disable(logging.NOTSET)
-    said = tuple(v.message for v in found if v.verdict in ("warning", "refused") and v.message[:40] not in known)
-    return Tried(
-        mistake.name, estimate.calibrated, said, error_of(estimate, good) if estimate.calibrated else np.nan, clean
-    )
+    error = error_of(estimate, good) if estimate.calibrated and not said else np.nan
+    return Tried(mistake.name, estimate.calibrated, said, error, clean)
+
+
+def _said(verdicts: Iterable[Verdict], known: frozenset) -> tuple[str, ...]:
+    """Warnings and refusals that are not those of the good campaign."""
+    bad = (v.message for v in verdicts if v.verdict in ("warning", "refused"))
+    return tuple(message for message in bad if message[:40] not in known)
 
 
 def reference_of(good: Dataset) -> tuple[Campaign, tuple[float, frozenset]]:

@@ -75,8 +75,10 @@ TABLE = (
     Mistake("readings 50 ms late from half-way on", late(0.05, 0.5), SLIPPED),
     Mistake("hand markers slip by 10 mm", moved("gripper", [0.0, 0.01, 0.0], 0.5), SLIPPED),
     Mistake("base markers slip by 10 mm", moved("base", [0.01, 0.0, 0.0], 0.5), SLIPPED),
-    Mistake("motor and link exchanged", exchanged_sides(list(range(1, 8))), "arm_2_joint, arm_3_joint, arm_4_joint"),
-    Mistake("motor and link of arm_6 exchanged", exchanged_sides([6]), "are exchanged"),
+    *(
+        Mistake(f"motor and link of arm {few} exchanged", exchanged_sides(few), "are exchanged")
+        for few in ([1, 2, 3, 4, 5, 6, 7], [6], [1, 2, 3, 4], [1, 2, 5], [3, 5])
+    ),
     *(
         Mistake(f"columns of arm_{a} and arm_{b} exchanged", exchanged_columns(a, b), f"arm_{b}_joint are swapped")
         for a, b in combinations(range(1, 5), 2)
@@ -113,6 +115,7 @@ def drawn(rng: np.random.Generator, n: int) -> Iterator[Mistake]:
         body, marker = str(rng.choice(["base", "gripper"])), int(rng.integers(4))
         size, angle = float(10.0 ** rng.uniform(-2.5, -1.0)), float(10.0 ** rng.uniform(-2.5, -1.0))
         sign, at = float(rng.choice([-1.0, 1.0])), f"arm_{joint}"
+        other = int(rng.choice([k for k in range(1, 8) if k != joint]))
         few = sorted({joint, *(int(k) for k in rng.integers(1, 8, rng.integers(0, 4)))})
         kinds = (
             Mistake(f"scale {1 + sign * angle / 2:.4f}", scaled(1.0 + sign * angle / 2), "x"),
@@ -128,6 +131,8 @@ def drawn(rng: np.random.Generator, n: int) -> Iterator[Mistake]:
             Mistake(f"commands of {few}", commands(few), "x"),
             Mistake(f"dwells {10 * angle:.2f} s late", shifted_dwells(10.0 * sign * angle), "x"),
             Mistake(f"{at} lost {100 * size:.1f} s", lost_readings(joint, share, 100.0 * size), "x"),
+            Mistake(f"columns {joint}, {other} exchanged", exchanged_columns(joint, other), "x"),
+            Mistake(f"{body}{marker + 1} gone for {share:.2f}", gone(body, marker, min(share, 0.5)), "x"),
             Mistake(f"{100 * angle:.1f} % hidden", hidden(3.0 * angle, 20.0 * size, int(rng.integers(1000))), "x"),
         )
         yield kinds[int(rng.integers(len(kinds)))]

@@ -1,0 +1,104 @@
+"""Mistakes of a laboratory at random, and clean campaigns, of sampled robots and instruments: counted for the page.
+
+    python -m tests.hostile.random_cases FIRST ROBOTS MISTAKES
+
+Each robot is simulated once (`short --quick`), calibrated with all stages, evaluated, and spoilt so many times; a row
+a campaign goes into docs/results/random_cases.csv, in place of those of the same robot.
+"""
+
+import csv
+import logging
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from calibration import calibrate, load
+from calibration.errors import CalibrationError
+from calibration.evaluation.evaluate import evaluate
+from tests.hostile.spoilt import Tried, reference_of, tried
+from tests.hostile.wrong_data import drawn
+
+TABLE = Path(__file__).parents[2] / "docs/results/random_cases.csv"
+COLUMNS = ("robot", "mistake", "calibrated", "said", "error [mm]", "clean [mm]")
+_LACKS = "not identifiable"  # true of a short campaign
+_SAID = 90  # characters of a verdict in the table
+
+
+def clean(dataset) -> tuple[str, ...]:
+    """What is said, wrongly, of a clean campaign: warnings and refusals of all stages and of its evaluation."""
+    try:
+        estimate = calibrate(dataset)
+        found = [*estimate.verdicts, *(evaluate(estimate, dataset).verdicts if estimate.calibrated else ())]
+    except CalibrationError as error:
+        return (str(error),)
+    said = tuple(v.message for v in found if v.verdict in ("warning", "refused") and _LACKS not in v.message)
+    return said if estimate.calibrated else (*said, "not calibrated")
+
+
+def tried_robot(seed: int, mistakes: int, place: Path) -> Iterator[Tried]:
+    """The clean campaign of a robot (its name empty), then its mistakes."""
+    from scenarios.steps import run_steps
+
+    logging.disable(logging.WARNING)
+    run_steps.simulate(run_steps.load("short", [f"seed={seed}"]).quick(), place / "run")
+    good = load(place / "run/dataset")
+    said = clean(good)
+    logging.disable(logging.NOTSET)
+    yield Tried("", "not calibrated" not in said, said, np.nan, np.nan)
+    if mistakes and not said:
+        campaign, reference = reference_of(good)
+        for mistake in drawn(np.random.default_rng(seed), mistakes):
+            yield tried(mistake, campaign, good, reference, place / "at")
+            shutil.rmtree(place / "at", ignore_errors=True)
+
+
+def rows() -> list[list[str]]:
+    """Of the table."""
+    return list(csv.reader(TABLE.open(encoding="utf-8")))[1:] if TABLE.is_file() else []
+
+
+def counts() -> Sequence[str]:
+    """Sentences for the page."""
+    every = rows()
+    spoilt, good = [r for r in every if r[1]], [r for r in every if not r[1]]
+    silent = [r for r in spoilt if _silent(r)]
+    harmless = sum(r[2] == "True" and not r[3] for r in spoilt) - len(silent)
+    said = [r for r in good if r[3]]
+    return (
+        f"Mistakes at random (kind, size, joint, body, time), of {len({r[0] for r in spoilt})} sampled robots: "
+        f"{len(spoilt)}; named {sum(bool(r[3]) for r in spoilt)}, harmless {harmless}, silently wrong {len(silent)} "
+        "(error on unseen motion twice the clean one and over 1 mm, no verdict).",
+        f"Clean campaigns of sampled robots and instruments: {len(good)}; warned of or refused {len(said)}.",
+        *(f"- robot {r[0]}, {r[1]}: {r[4]} mm, clean {r[5]} mm" for r in silent),
+        *(f"- robot {r[0]}, clean: {r[3]}" for r in said),
+    )
+
+
+def _silent(row: Sequence[str]) -> bool:
+    return Tried(row[1], row[2] == "True", (row[3],) if row[3] else (), float(row[4]), float(row[5])).silently_wrong
+
+
+def _write(found: Sequence[Sequence[object]]) -> None:
+    with TABLE.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *found])
+
+
+def main(first: int, robots: int, mistakes: int) -> None:
+    """Try the robots of these seeds; write the table after each."""
+    for seed in range(first, first + robots):
+        found = [r for r in rows() if r[0] != str(seed)]
+        with tempfile.TemporaryDirectory() as place:
+            for t in tried_robot(seed, mistakes, Path(place)):
+                said = t.said[0][:_SAID].replace("\n", " ") if t.said else ""
+                found.append([str(seed), t.name, str(t.calibrated), said, f"{t.error:.3f}", f"{t.clean:.3f}"])
+                if (_silent(found[-1]) and t.name) or (said and not t.name):
+                    print(*found[-1], flush=True)
+        _write(sorted(found, key=lambda r: int(r[0])))
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:4]))
