@@ -17,7 +17,7 @@ from calibration.formats.csv.read import CsvText, read_text
 from calibration.formats.mapping.channels import Joints, Markers, Means, Recorded
 from calibration.formats.survey.poses_in_columns import PoseColumns, lines_of, poses_in
 from calibration.formats.survey.robot import UrdfRobot
-from calibration.formats.survey.view import FileView, PlateView, flow
+from calibration.formats.survey.view import WHOSE, WRIST, FileView, PlateView, flow
 from calibration.numerics.wrench import LOADED
 
 _TIME = re.compile(r"^(t|time|times|stamp|timestamp|seconds?|time[_ ]?(utc|s|ms|stamp))$", re.IGNORECASE)
@@ -74,8 +74,12 @@ def view_csv(path: Path, robot: UrdfRobot) -> FileView:
     lines += more
     readings, more = _readings(text, joints, robot)
     lines += more
-    plates = tuple(_plates(text, wrenches))
+    parts = _wrenches(wrenches)
+    wrists = [of for prefix, of in parts.items() if WRIST.search(prefix)][:1] if timed and readings else []
+    plates = tuple(_plate(text, prefix or "plate", of) for prefix, of in parts.items() if not WRIST.search(prefix))
+    lines += [_wrist_line(of) for of in wrists]
     used |= {c for t in wrenches.values() for c in t.columns} if plates else set()
+    used |= {c for of in wrists for t in of.values() for c in t.columns}
     recorded = _recorded(path, t, seen, readings) if seen or readings else Recorded(str(path))
     return FileView(path, "csv", recorded, plates, tuple(lines), _left(text, used))
 
@@ -192,16 +196,20 @@ def _readings(text: CsvText, columns: dict[str, dict[str, str]], robot: UrdfRobo
     return joints, [f"joints: {{{pairs}, unit: {unit}}}"]
 
 
-def _plates(text: CsvText, triples: dict[str, Triple]) -> Iterable[PlateView]:
+def _wrenches(triples: dict[str, Triple]) -> dict[str, dict[str, Triple]]:
+    """Forces and moments that belong together, by what is before their names."""
     parts: dict[str, dict[str, Triple]] = {}
     for name, triple in triples.items():
         prefix, what = _WRENCH.findall(name)[0]
         what = what.upper().rstrip("_")
         key = "force" if what.startswith("F") else "cop" if what == "COP" else "moment"
         parts.setdefault(prefix.strip("_.- "), {})[key] = triple
-    for prefix, of in parts.items():
-        if {"force", "moment"} <= of.keys() and "wrist" not in prefix.lower():
-            yield _plate(text, prefix or "plate", of)
+    return {prefix: of for prefix, of in parts.items() if {"force", "moment"} <= of.keys()}
+
+
+def _wrist_line(of: dict[str, Triple]) -> str:
+    columns = {key: list(of[key].columns) for key in ("force", "moment")}
+    return f"wrist: {flow(columns | {'convention': 'action'})}{WHOSE}"
 
 
 def _plate(text: CsvText, name: str, of: dict[str, Triple]) -> PlateView:

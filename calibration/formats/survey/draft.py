@@ -56,6 +56,8 @@ def _setup(session: Session, wheels: str | None) -> Iterator[str]:
     yield f"joints: {flow({k: v for k, v in entries.items() if v})}"
     if wheels is not None:
         yield f"wheels: {flow(wheels)}"
+    if any(line.startswith("wrist:") for v in session.views for line in v.layout):
+        yield f"wrist_link: {flow(robot.wrist(tool))}  {CHOOSE}: the sensor's own frame"
     plates = _plates(session)
     if plates:
         yield "plates:"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from calibration.errors import InputError
 
 _TOOL = re.compile(r"tool|grasp|tcp|flange|end_?effector|(^|_)ee(_|$)", re.IGNORECASE)
+_SENSOR = re.compile(r"(^|_)(ft|force)(_|$)", re.IGNORECASE)
 _MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -72,6 +73,10 @@ class UrdfRobot:
         ]
         named = [link for link in rigid if _TOOL.search(link)]
         return max(named or rigid, key=lambda link: len(self._above(link)), default=self.root)
+
+    def wrist(self, tool: str) -> str:
+        """The link of a force-torque sensor below the tool by its name, the first from the base; else the tool."""
+        return next((j.child for j in reversed(self._above(tool)) if _SENSOR.search(j.child)), tool)
 
     def _joint(self, name: str) -> UrdfJoint:
         return next(j for j in self.joints if j.name == name)

@@ -9,6 +9,9 @@ import numpy as np
 from calibration.formats.mapping.channels import Recorded
 
 CHOOSE = "# CHOOSE"
+WHOSE = f"  {CHOOSE}: whose wrench, `action` of the hand on the sensor or the sensor's `reaction`"
+WRIST = re.compile(r"wrist|(^|[_/])ft($|[_/])", re.IGNORECASE)
+"""Names of a wrist's force-torque sensor."""
 """Mark of lines that state what no file does."""
 _PLAIN = re.compile(r"^[A-Za-z_][\w./-]*$")
 _WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}

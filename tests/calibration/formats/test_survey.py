@@ -60,6 +60,18 @@ def test_a_plate_shows_its_centre_by_its_pressure(tmp_path):
     assert plate.convention == "action" and "moment_unit: N.m" in plate.layout
 
 
+def test_a_wrist_sensor_beside_the_joints_is_drafted_and_asks_whose_wrench_it_is(tmp_path):
+    t, urdf = np.arange(40) * 0.01, mjcf.urdf()
+    joints = {j: np.sin(t + k) for k, j in enumerate(j for j in ROBOT.movable if j.startswith("arm"))}
+    wrench = {f"wrist_{c}": np.cos(t) for c in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")}
+    for name, robot in (("wrist_ft_link", urdf), ("gripper_grasping_frame", urdf.replace("wrist_ft", "adapter"))):
+        path = write_csv(tmp_path / "log.csv", {"t": t} | joints | wrench)
+        session = session_of([path], robot)
+        text = draft(session, "robot.urdf", ["log.csv"])
+        assert "wrist: {force: [wrist_Fx, wrist_Fy, wrist_Fz], moment: [wrist_Mx, wrist_My, wrist_Mz]" in text
+        assert f"wrist_link: {name}" in text and text.count("whose wrench") == 1 and not session.views[0].plates
+
+
 def test_a_log_of_one_file_asks_for_one_line(tmp_path):
     log = ROOT / "tests/data/vicon_forceplate_2023-09-20.csv"
     text = import_export.init_mapping([log], tmp_path / "lab.yaml")
