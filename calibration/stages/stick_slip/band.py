@@ -1,11 +1,12 @@
 """How far the predicted motion of the base can be known: a band that grows with what slips.
 
-    x(t) = mean_e x_e(t),     V_a(t) = s_a^2 + r_a^2 var_e x_e,a(t) + p_a^2 var_o x_o,a(t) + (l_a L_a(t))^2
-    L_a(t) = sum_(t' < t) share |dx_a|
+    x(t) = mean_e x_e(t),     V_a(t) = s_a^2 + r_a^2 var_e x_e,a(t) + p_a^2 g^2 var_o x_o,a(t) + l_a^2 S_a(t)
+    g^2 = 1 + |m - m_usual|^2 / LIKE^2,     S_a(t) = max_(t' < t) (x - x_el)_a^2,     x_el = K_0^-1 F
 
 x_e: predictions by an ensemble of parameters, from their posterior; x_o: by the optimum from wheels that are preloaded
-at the start, about that without preload. L the path that the base went while wheels slid, by the share of them; l_a
-[-]: what slips leave goes mostly one way. An error stays once it is there, so a trial is one observation of it,
+at the start, about that without preload. m (My, -Mx) at the start: a base that begins under another load than most
+trials came there by slips, which preload its wheels. x_el what springs alone would do under the force F: S the largest
+slip so far, of which a share l_a [-] stays. An error stays once it is there, so a trial is one observation of it,
 
     e_k^2 ~ V_k t_nu^2,   (log s, r, p, l) ~ N(PRIOR, WIDTH^2)                 e_k rms of trial k when it was left out
 
@@ -14,13 +15,13 @@ that is left out is predicted by parameters that are less certain: its own shift
 
 Where the band is wider than the slip that is predicted, that prediction is worth nothing:
 
-    x <- x_el + w (x - x_el),   w = max(0, 1 - (V - s^2) / max_(t' < t) (x - x_el)^2),   x_el = K_0^-1 F
+    x <- x_el + w (x - x_el),   w = max(0, 1 - (V - s^2) / S)
 
-x_el what springs alone would do under the force F: then no slip is predicted, and the band is no narrower. An axis that
-the model does not move stays, or is linear, the better the less the base is shaken: V = s^2 + r^2 max_(t' < t) x_el^2.
+Then no slip is predicted, and the band is no narrower. An axis that the model does not move stays, or is linear, the
+better the less the base is shaken: V = s^2 + r^2 max_(t' < t) x_el^2.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numba import njit
@@ -32,12 +33,13 @@ from calibration.stages.stick_slip.measured import blocks
 MEMBERS = 16
 _DRAWS = 32  # from which the members are chosen
 _UNLIKELY = 26.2  # of -2 log of the posterior above its least: chi-square of 12, 99 %
-_LEAST = np.array([5e-6, 5e-6, 2e-5])  # [m, rad]: nothing is known better
+LEAST = np.array([5e-6, 5e-6, 2e-5])  # [m, rad]: nothing is known better
 _DEGREES = 6.0  # nu
 _WIDER = 1.2  # variance of the band over V: what a trial in twenty shows beyond the spread of most
-PRIOR = np.log([[13e-6, 1.0, 0.8, 2e-3], [13e-6, 1.0, 0.24, 2e-3], [60e-6, 1.0, 0.29, 1e-3]])  # x, y, yaw
+PRIOR = np.log([[5e-6, 1.0, 0.45, 3e-2], [5e-6, 1.0, 0.20, 5e-3], [27e-6, 1.0, 0.21, 4e-3]])  # x, y, yaw
 FURTHER = np.log([1.1, 0.9, 2.0, 2.0])  # where no plate corrects the prediction
-WIDTH = np.array([1.0, 0.3, 0.4, 0.7])
+WIDTH = np.array([1.0, 0.3, 0.4, 2.0])  # robots differ most in what large slips leave
+LIKE = 15.0  # [N.m] by which a load at the start is like another
 _PLAIN, _PLAIN_WIDTH = 0.3, np.array([1.5, 1.5])  # r, and what the logarithms of s and r are uncertain by
 
 
@@ -50,16 +52,27 @@ class Band:
         spread: r (3,) [-].
         start: p (3,) [-].
         slip: l (3,) [-].
+        usual: m_usual (2,) [N.m].
     """
 
     floor: np.ndarray
     spread: np.ndarray
     start: np.ndarray
     slip: np.ndarray
+    usual: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
-    def variance(self, ensemble: np.ndarray, preloaded: np.ndarray, path: np.ndarray) -> np.ndarray:
-        """V (n, 3) of the variances by parameters and by preload (n, 3) and the slid path (n, 3)."""
-        return self.floor**2 + self.spread**2 * ensemble + self.start**2 * preloaded + (self.slip * path) ** 2
+    def begun(self, load: np.ndarray) -> "Band":
+        """The band of a trial that begins under a load (3,) (-Fz, My, -Mx): p g in the place of p."""
+        return replace(self, start=self.start * np.sqrt(other_start(load[1:], self.usual)))
+
+    def variance(self, ensemble: np.ndarray, preloaded: np.ndarray, slipped: np.ndarray) -> np.ndarray:
+        """V (n, 3) of the variances by parameters and by preload (n, 3) and the largest square of a slip (n, 3)."""
+        return self.floor**2 + self.spread**2 * ensemble + self.start**2 * preloaded + self.slip**2 * slipped
+
+
+def other_start(load: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """g^2 of loads (..., 2) about the usual one (2,) [N.m]."""
+    return np.asarray(1.0 + ((load - usual) ** 2).sum(axis=-1) / LIKE**2)
 
 
 @dataclass(frozen=True)
@@ -79,9 +92,9 @@ class PlainBand:
         return self.floor**2 + self.growth**2 * reached
 
 
-def reached(elastic: np.ndarray) -> np.ndarray:
-    """max_(t' < t) x_el^2 (n, 3) of x_el (n, 3)."""
-    return np.asarray(np.maximum.accumulate(elastic**2, axis=0))
+def reached(x: np.ndarray) -> np.ndarray:
+    """max_(t' < t) x^2 (n, 3) of x (n, 3)."""
+    return np.asarray(np.maximum.accumulate(x**2, axis=0))
 
 
 def plain_band(square: np.ndarray, reach: np.ndarray, noise: np.ndarray) -> PlainBand:
@@ -89,7 +102,7 @@ def plain_band(square: np.ndarray, reach: np.ndarray, noise: np.ndarray) -> Plai
     ones = np.ones(len(square))
     found = []
     for a in range(3):
-        start = np.log([max(float(noise[a]), _LEAST[a]), _PLAIN])
+        start = np.log([max(float(noise[a]), LEAST[a]), _PLAIN])
         found.append(_fitted(square[:, a], np.stack([ones, reach[:, a]]), start, _PLAIN_WIDTH, float(noise[a] ** 2)))
     scale = np.sqrt(_WIDER)
     return PlainBand(*(scale * np.array(found)).T)
@@ -110,12 +123,6 @@ def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) 
     return np.concatenate([logarithms[None], draws[order[: MEMBERS - 1]]])
 
 
-def slid_path(x: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """L (n, 3) of positions x (n, 3) and shares of wheels that slid (n,)."""
-    steps = np.abs(np.diff(x, axis=0, prepend=x[:1]))
-    return np.asarray(np.cumsum(share[:, None] * steps, axis=0))
-
-
 @dataclass(frozen=True)
 class LeftOut:
     """Means over each trial that was left out, (k, 3).
@@ -124,26 +131,34 @@ class LeftOut:
         square: Of what was measured less what was predicted.
         ensemble: Variance of the members.
         preloaded: Variance by preload.
-        path: Square of what was slid.
+        slipped: Largest square of a slip.
     """
 
     square: np.ndarray
     ensemble: np.ndarray
     preloaded: np.ndarray
-    path: np.ndarray
+    slipped: np.ndarray
 
 
-def fitted_band(rows: LeftOut, noise: np.ndarray, corrected: bool = True) -> Band:
-    """The band by trials that were left out; noise (3,) of a block, and whether a plate corrects the prediction."""
-    prior = PRIOR if corrected else PRIOR + FURTHER
+def fitted_band(rows: LeftOut, noise: np.ndarray, loads: np.ndarray, corrected: bool = True) -> Band:
+    """The band by trials that were left out.
+
+    Args:
+        rows: What they left.
+        noise: (3,) of a block.
+        loads: (k, 3) (-Fz, My, -Mx) under which they begin.
+        corrected: Whether a plate corrects the prediction.
+    """
+    prior, usual = PRIOR if corrected else PRIOR + FURTHER, np.median(loads[:, 1:], axis=0)
+    rows = replace(rows, preloaded=rows.preloaded * other_start(loads[:, 1:], usual)[:, None])
     found = np.array([_axis(rows, a, prior[a], float(noise[a] ** 2)) for a in range(3)]) * np.sqrt(_WIDER)
-    return Band(np.maximum(found[:, 0], _LEAST), *found[:, 1:].T)
+    return Band(np.maximum(found[:, 0], LEAST), found[:, 1], found[:, 2], found[:, 3], usual)
 
 
 def _axis(rows: LeftOut, a: int, prior: np.ndarray, noise: float) -> np.ndarray:
     """s, r, p, l of one axis."""
     known = np.isfinite(rows.square[:, a])
-    parts = np.stack([np.ones(len(rows.square)), *(v[:, a] for v in (rows.ensemble, rows.preloaded, rows.path))])
+    parts = np.stack([np.ones(len(rows.square)), *(v[:, a] for v in (rows.ensemble, rows.preloaded, rows.slipped))])
     return _fitted(rows.square[known, a], parts[:, known], prior, WIDTH, noise)
 
 
@@ -167,28 +182,24 @@ def block_means(trials: Trials, x: np.ndarray) -> np.ndarray:
 def banded(
     ensemble: tuple[np.ndarray, np.ndarray, np.ndarray],
     before: np.ndarray,
-    share: float,
     band: np.ndarray,
     elastic: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Band and believed motion of one sample, see `band`: rows mean, path, largest square of a slip, x, variance, G.
+    """Band and believed motion of one sample: rows S, x, variance, largest square of x_el.
 
     Args:
         ensemble: As of `advance_members`, (3,) each.
-        before: (6, 3) as returned a sample ago.
-        share: That slid.
-        band: (4, 3) s, r, p, l.
+        before: (4, 3) as returned a sample ago.
+        band: (4, 3) s, r, p g, l.
         elastic: (3,) what springs alone do.
-        out: (6, 3), filled.
+        out: (4, 3), filled.
     """
     moved, spread, preloaded = ensemble
     for a in range(3):
-        path = before[1, a] + share * abs(moved[a] - before[0, a])
         slip = moved[a] - elastic[a]
-        excess = band[1, a] ** 2 * spread[a] + band[2, a] ** 2 * preloaded[a] + (band[3, a] * path) ** 2
-        largest = max(before[2, a], slip * slip)
+        largest = max(before[0, a], slip * slip)
+        excess = band[1, a] ** 2 * spread[a] + band[2, a] ** 2 * preloaded[a] + band[3, a] ** 2 * largest
         kept = 1.0 - min(excess / largest, 1.0) if largest > 0.0 else 0.0
-        out[0, a], out[1, a], out[2, a] = moved[a], path, largest
-        out[3, a], out[4, a] = elastic[a] + kept * slip, band[0, a] ** 2 + excess
-        out[5, a] = max(before[5, a], elastic[a] * elastic[a])
+        out[0, a], out[1, a], out[2, a] = largest, elastic[a] + kept * slip, band[0, a] ** 2 + excess
+        out[3, a] = max(before[3, a], elastic[a] * elastic[a])

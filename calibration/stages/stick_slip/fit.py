@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.stages.stick_slip.band import LeftOut, block_means, ensemble_of, fitted_band, slid_path
+from calibration.stages.stick_slip.band import LeftOut, block_means, ensemble_of, fitted_band, reached
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.model import Direction
 from calibration.stages.stick_slip.search import searched, warmed
@@ -65,15 +65,17 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
     found = fitted(trials, start)
     ensemble = ensemble_of(trials, found.logarithms, found.covariance)
     members, _ = trials.simulated(ensemble)
-    x, share = left_out(trials, found.others)
+    x = left_out(trials, found.others)
     preloaded = _preloaded(trials, found.parameters, members[0])
     spread = np.var(members, axis=0)
-    path = np.concatenate([slid_path(x[a:b], share[a:b]) for a, b in trials.spans])
+    slip = x - trials.force(source) @ np.linalg.inv(trials.wheels.stiffness(found.parameters))
+    slipped = np.concatenate([reached(slip[a:b]) for a, b in trials.spans])
     error, seen = trials.measured - block_means(trials, x), np.concatenate([m.valid for m in trials.motions])
     masked = np.where(seen[:, None], error, np.nan)
     less_certain = spread + (members[0] - x) ** 2
-    parts = (_over_trials(trials, block_means(trials, v)) for v in (less_certain, preloaded, path**2))
-    band = fitted_band(LeftOut(_over_trials(trials, masked**2), *parts), trials.noise, trials.corrected)
+    means = (_over_trials(trials, block_means(trials, v)) for v in (less_certain, preloaded, slipped))
+    parts = LeftOut(_over_trials(trials, masked**2), *means)
+    band = fitted_band(parts, trials.noise, trials.loads, trials.corrected)
     held_out = _held_out(trials, masked)
     return Direction(
         source,
@@ -94,16 +96,14 @@ def _over_trials(trials: Trials, x: np.ndarray) -> np.ndarray:
 
 def _preloaded(trials: Trials, p: SlipParameters, x: np.ndarray) -> np.ndarray:
     """Mean square (n, 3) of what preloaded wheels change of positions x (n, 3)."""
-    load = trials.drive[0, 3:6]
-    starts = preloads(trials.wheels, p, load)
+    starts = preloads(trials.wheels, p, trials.loads[0])
     moved, _ = trials.simulated(np.repeat(p.logarithms[None], len(starts), axis=0), starts)
     return np.asarray(np.mean(np.square(moved - x), axis=0))
 
 
-def left_out(trials: Trials, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (n, 3) and shares that slid (n,) of each trial by the parameters (k, 12) of the others."""
-    found = [trials.alone(k).simulated(own[None]) for k, own in enumerate(others)]
-    return np.concatenate([f[0][0] for f in found]), np.concatenate([f[1][0] for f in found])
+def left_out(trials: Trials, others: np.ndarray) -> np.ndarray:
+    """Positions (n, 3) of each trial by the parameters (k, 12) of the others."""
+    return np.concatenate([trials.alone(k).simulated(own[None])[0][0] for k, own in enumerate(others)])
 
 
 def _held_out(trials: Trials, errors: np.ndarray) -> HeldOut:

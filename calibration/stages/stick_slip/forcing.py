@@ -60,8 +60,13 @@ class PlanarForcing:
     @property
     def force(self) -> np.ndarray:
         """(n, 3) change of Fx, Fy, Mz on the floor, by its source."""
-        first = PLATE if self.source == "plate" else 0
-        return np.asarray(self.drive[::STEPS, first : first + 3])
+        return planar_force(self.drive, self.source)
+
+
+def planar_force(drive: np.ndarray, source: Source) -> np.ndarray:
+    """Change of Fx, Fy, Mz (n, 3) on the floor by its source, of drives (STEPS n, 11)."""
+    first = PLATE if source == "plate" else 0
+    return np.asarray(drive[::STEPS, first : first + 3])
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,11 @@ from itertools import pairwise
 import numpy as np
 
 from calibration.numerics.signals import RATE
-from calibration.stages.stick_slip.forcing import STEP, PlanarForcing
+from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_force
 from calibration.stages.stick_slip.kernel import Bases, at_rest, simulated
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, blocks, pooled_noise
 from calibration.stages.stick_slip.wheels import PRIOR, PRIOR_SIGMA, SlipParameters, WheelSet
+from calibration.stages.suspension.model import Source
 
 CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel`
 WINDOW = round(4.0 * RATE / BLOCK)  # blocks
@@ -81,6 +82,15 @@ class Trials:
     def measured(self) -> np.ndarray:
         """(b, 3) of all trials."""
         return np.concatenate([m.x for m in self.motions])
+
+    @property
+    def loads(self) -> np.ndarray:
+        """(k, 3) (-Fz, My, -Mx) under which each trial begins."""
+        return self.drive[STEPS * self.starts[:-1], 3:6]
+
+    def force(self, source: Source) -> np.ndarray:
+        """(n, 3) change of Fx, Fy, Mz on the floor, by its source."""
+        return planar_force(self.drive, source)
 
     def alone(self, k: int) -> "Trials":
         """Trial k alone."""

@@ -59,7 +59,7 @@ def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: P
     if early.sum() < 0.5 * REST * RATE:
         raise NotEnoughData(f"{trial.id}: base markers are missing in most of the first second")
     plane = plane - plane[early].mean(axis=0)
-    noise = plane[early].std(axis=0) / np.sqrt(BLOCK)
+    noise = blocks(plane[early]).std(axis=0, ddof=1)
     b = n // BLOCK
     return PlanarMotion(blocks(plane), seen[: b * BLOCK].reshape(b, BLOCK).all(axis=1), noise)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calibration.errors import NoSuchElement
-from calibration.stages.stick_slip.band import Band, PlainBand, reached, slid_path
+from calibration.stages.stick_slip.band import Band, PlainBand, reached
 from calibration.stages.stick_slip.forcing import HEAVE, PLANE, STEP, PlanarForcing, Tilting
 from calibration.stages.stick_slip.kernel import simulated
 from calibration.stages.stick_slip.likelihood import bases_of
@@ -118,15 +118,16 @@ class StickSlip:
             NoSuchElement: Nothing was fitted from its source.
         """
         found = self.direction(forcing.source)
-        p = found.parameters
-        starts = preloads(self.wheels, p, forcing.drive[0, 3:6])
+        p, load = found.parameters, forcing.drive[0, 3:6]
+        starts = preloads(self.wheels, p, load)
         every, share = self._motions(forcing, found, starts)
         n = len(found.ensemble)
         preloaded = np.mean((every[n:] - every[0]) ** 2, axis=0)
         x = every[:n].mean(axis=0)
-        variance = found.band.variance(every[:n].var(axis=0), preloaded, slid_path(x, share))
         elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
-        kept = believed(x - elastic, variance - found.band.floor**2)
+        slipped = reached(x - elastic)
+        variance = found.band.begun(load).variance(every[:n].var(axis=0), preloaded, slipped)
+        kept = believed(slipped, variance - found.band.floor**2)
         x = elastic + kept * (x - elastic)
         plain = np.where(found.linear, forcing.linear, 0.0)
         variance = np.where(found.slips, variance, found.plain.variance(reached(elastic)))
@@ -153,7 +154,6 @@ class StickSlip:
         return x, variance
 
 
-def believed(slip: np.ndarray, variance: np.ndarray) -> np.ndarray:
-    """w (n, 3): the share of a predicted slip (n, 3) that is believed, by the variance that slips add."""
-    largest = np.maximum.accumulate(slip**2, axis=0)
-    return np.asarray(np.clip(1.0 - variance / np.maximum(largest, np.finfo(float).tiny), 0.0, 1.0))
+def believed(slipped: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """w (n, 3): the share of a predicted slip that is believed, by its largest square and the variance slips add."""
+    return np.asarray(np.clip(1.0 - variance / np.maximum(slipped, np.finfo(float).tiny), 0.0, 1.0))

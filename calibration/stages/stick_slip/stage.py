@@ -161,11 +161,16 @@ def _doubted(directions: Sequence[Direction]) -> Iterator[Verdict]:
 
 
 def _behind(directions: Sequence[Direction]) -> list[str]:
-    """Axes of which the plate says less than inverse dynamics, both on trials left out."""
+    """Axes of which the plate says less than inverse dynamics, both on trials left out that neither finds wild."""
     if len(directions) < len(SOURCES):
         return []
-    plate, dynamics = (np.where(d.linear, 1.0, d.held_out.r2) for d in directions)
+    calm = _calm(directions)
+    plate, dynamics = (np.where(d.linear, 1.0, d.held_out.only(calm).r2) for d in directions)
     return [a for a, p, d in zip(_AXES, plate, dynamics, strict=True) if p < d - _LESS]
+
+
+def _calm(directions: Sequence[Direction]) -> np.ndarray:
+    return ~np.any([d.held_out.wild for d in directions], axis=0)
 
 
 def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
@@ -175,7 +180,7 @@ def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
     not the position.
     """
     tried = fit_direction("plate", replace(campaign, corrected=False), fits[1].logarithms)
-    calm = ~(fits[0].held_out.wild | tried.held_out.wild)
+    calm = _calm((fits[0], tried))
     left = [np.log(d.held_out.only(calm).variance(np.ones(3, dtype=bool))).mean() for d in (fits[0], tried)]
     return tried if left[1] < left[0] + np.log(_HALF) else fits[0]
 

@@ -16,7 +16,7 @@ from numba import njit
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.band import banded
 from calibration.stages.stick_slip.forcing import UNMOVED
-from calibration.stages.stick_slip.kernel import COLUMNS, LANES, PLATE, SLID, STEPS, Bases, advance, at_rest
+from calibration.stages.stick_slip.kernel import COLUMNS, LANES, PLATE, STEPS, Bases, advance, at_rest
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
@@ -53,7 +53,8 @@ class SlipState(NamedTuple):
         n: Samples in that mean.
         before: (11,) the last sample as the kernel takes it.
         bases: The members, then the preloaded optimum.
-        found: (6, 3) see `kernel.banded`.
+        found: (4, 3) see `banded`.
+        band: (4, 3) s, r, p g, l of a trial that begins so.
         x: (3,) x, y, yaw [m, rad, frame 0].
     """
 
@@ -64,11 +65,12 @@ class SlipState(NamedTuple):
     before: np.ndarray
     bases: Bases
     found: np.ndarray
+    band: np.ndarray
     x: np.ndarray
 
     def variance(self, of: Direction) -> np.ndarray:
         """(3,) of x, or of what the compliance makes of it."""
-        return np.where(of.slips, self.found[4], of.plain.variance(self.found[5]))
+        return np.where(of.slips, self.found[2], of.plain.variance(self.found[3]))
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,6 @@ class SlipStream:
         bodies: (e, 4) as the kernel takes them.
         compliance: (3, 3) K_0^-1 of the optimum.
         moves: (3,) axes that are moved; linear ones are the compliance's, see `loaded_base`.
-        band: (4, 3) s, r, p, l.
     """
 
     direction: Direction
@@ -91,7 +92,6 @@ class SlipStream:
     bodies: np.ndarray
     compliance: np.ndarray
     moves: np.ndarray
-    band: np.ndarray
 
     def stepped(self, sample: Sample, before: SlipState | None) -> SlipState:
         """The base one sample on; without a state before, this sample is the first at rest."""
@@ -107,17 +107,18 @@ class SlipStream:
         was = before.bases
         bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes)
         row, found = np.empty(COLUMNS), np.empty_like(before.found)
-        fitted = len(self.direction.ensemble), len(self.bodies), self.compliance, self.band
+        fitted = len(self.direction.ensemble), len(self.bodies), self.compliance, before.band
         readings = sample.wrench, sample.tilt, driving, before.rest, before.before, before.found
         step_members(bases, readings, fitted, (sample.t - before.t) / STEPS, row, found)
-        return SlipState(before.start, sample.t, before.rest, before.n, row, bases, found, found[3] * self.moves)
+        return before._replace(t=sample.t, before=row, bases=bases, found=found, x=found[1] * self.moves)
 
     def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
-        none = np.zeros((6, 3))
-        none[4] = self.band[0] ** 2
+        of, none = self.direction.band.begun(row[3:6]), np.zeros((4, 3))
+        none[2] = of.floor**2
+        band = np.array([of.floor, of.spread, of.start, of.slip])
         e = np.zeros((*self.wheels.shape[:2], 2))
         e[len(self.direction.ensemble) :] = preloads(self.wheel_set, self.direction.parameters, row[3:6])
-        return SlipState(t, t, planar, 1, row * _LOADS, at_rest(self.wheels, self.bodies, e), none, none[3])
+        return SlipState(t, t, planar, 1, row * _LOADS, at_rest(self.wheels, self.bodies, e), none, band, none[1])
 
 
 def slip_stream(model: StickSlip) -> SlipStream:
@@ -139,14 +140,13 @@ def slip_stream(model: StickSlip) -> SlipStream:
         bodies,
         compliance,
         found.slips,
-        np.array([found.band.floor, found.band.spread, found.band.start, found.band.slip]),
     )
 
 
 @njit(cache=True, error_model="numpy")
 def advance_members(
     bases: Bases, drive: np.ndarray, inertia: np.ndarray, h: float, members: int, k: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """`advance` for k bases: the members of an ensemble, then preloaded ones of the first member's parameters.
 
     Args:
@@ -158,7 +158,7 @@ def advance_members(
         k: Of all.
 
     Returns:
-        Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first, share that slid.
+        Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first.
     """
     mean, variance, preloaded = np.zeros(3), np.zeros(3), np.zeros(3)
     for g in range(len(bases.lanes)):
@@ -173,7 +173,7 @@ def advance_members(
         preloaded[a] /= max(k - members, 1)
         for i in range(members):
             variance[a] += (bases.state[i // LANES, a, i % LANES] - mean[a]) ** 2 / members
-    return mean, variance, preloaded, bases.state[0, SLID, 0] / (bases.wheels.shape[1] * len(drive))
+    return mean, variance, preloaded
 
 
 @njit(cache=True, error_model="numpy")
@@ -199,10 +199,10 @@ def step_members(
     Args:
         bases: States and deflections are changed.
         readings: Wrench, tilt, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
-        fitted: Members, bases, K_0^-1 (3, 3), band (4, 3).
+        fitted: Members, bases, K_0^-1 (3, 3), band (4, 3) of `banded`.
         h: [s].
         row: (11,) of this sample, filled.
-        found: (6, 3) of `banded`, filled.
+        found: (4, 3) of `banded`, filled.
     """
     (wrench, tilt, driving, rest, earlier, before), (members, k, compliance, band) = readings, fitted
     drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
@@ -215,5 +215,4 @@ def step_members(
     for i in range(3):
         for c in range(3):
             elastic[i] += compliance[i, c] * row[PLATE + c]
-    mean, spread, preloaded, share = advance_members(bases, drive, inertia, h, members, k)
-    banded((mean, spread, preloaded), before, share, band, elastic, found)
+    banded(advance_members(bases, drive, inertia, h, members, k), before, band, elastic, found)

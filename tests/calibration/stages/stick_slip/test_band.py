@@ -2,14 +2,15 @@ import numpy as np
 import pytest
 
 from calibration.stages.stick_slip.band import (
+    LEAST,
     PRIOR,
     Band,
     LeftOut,
     ensemble_of,
     fitted_band,
+    other_start,
     plain_band,
     reached,
-    slid_path,
 )
 from calibration.stages.stick_slip.model import believed
 from calibration.stages.stick_slip.wheels import NAMES
@@ -20,12 +21,12 @@ NOISE = np.array([1e-6, 1e-6, 1e-6])
 
 
 def rows(rng, n, size=1.0):
-    """Trials whose errors, one each, grow with the path and the members' spread `size` times as robots' do."""
+    """Trials whose errors, one each, grow with the slip and the members' spread `size` times as robots' do."""
     ensemble, preloaded = rng.gamma(1.0, 1e-11, (n, 3)), rng.gamma(1.0, 1e-9, (n, 3))
-    path = rng.gamma(1.0, 1e-6, (n, 3))
+    slipped = rng.gamma(1.0, 1e-6, (n, 3))
     s, r, p, slip = size * np.exp(PRIOR).T
-    V = s**2 + r**2 * ensemble + p**2 * preloaded + slip**2 * path
-    return LeftOut(V * rng.normal(size=(n, 3)) ** 2, ensemble, preloaded, path)
+    V = np.maximum(s, LEAST) ** 2 + r**2 * ensemble + p**2 * preloaded + slip**2 * slipped
+    return LeftOut(V * rng.normal(size=(n, 3)) ** 2, ensemble, preloaded, slipped)
 
 
 @pytest.mark.parametrize(("size", "low", "high"), [(0.5, 0.93, 0.99), (1.0, 0.90, 0.98), (2.0, 0.87, 0.98)])
@@ -33,26 +34,34 @@ def test_the_band_holds_its_share_of_what_it_has_not_seen(size, low, high):
     rng = np.random.default_rng(1)
     share = []
     for _ in range(40):
-        band, new = fitted_band(rows(rng, 13, size), NOISE), rows(rng, 100, size)
-        V = band.variance(new.ensemble, new.preloaded, np.sqrt(new.path))
+        band, new = fitted_band(rows(rng, 13, size), NOISE, np.zeros((13, 3))), rows(rng, 100, size)
+        V = band.variance(new.ensemble, new.preloaded, new.slipped)
         share.append((new.square < 1.96**2 * V).mean(axis=0))
     assert np.all(np.mean(share, axis=0) > low) and np.all(np.mean(share, axis=0) < high)
 
 
-def test_the_band_grows_with_what_slid_and_never_shrinks_below_its_floor():
+def test_the_band_grows_with_the_largest_slip_and_never_shrinks_below_its_floor():
     band = Band(*(np.full(3, v) for v in (2e-5, 1.0, 1.0, 1e-2)))
-    x = np.cumsum(np.full((100, 3), 1e-4), axis=0)
-    share = np.repeat([0.0, 0.5], 50)
-    path = slid_path(x, share)
-    V = band.variance(np.zeros((100, 3)), np.zeros((100, 3)), path)
+    slip = np.repeat([0.0, 2e-3, 1e-3], 50)[:, None] * np.ones(3)
+    V = band.variance(np.zeros((150, 3)), np.zeros((150, 3)), reached(slip))
     np.testing.assert_allclose(V[:50], 4e-10)
-    assert np.all(np.diff(V[50:], axis=0) > 0.0)
-    np.testing.assert_allclose(path[-1], 50 * 0.5 * 1e-4)
+    np.testing.assert_allclose(V[50:], 4e-10 + 4e-10)
+
+
+def test_a_base_that_begins_under_another_load_is_preloaded_the_more():
+    band = Band(*np.ones((4, 3)), np.array([40.0, 5.0]))
+    np.testing.assert_allclose(band.begun(np.array([730.0, 40.0, 5.0])).start, 1.0)
+    np.testing.assert_allclose(band.begun(np.array([700.0, 40.0, 35.0])).start, np.sqrt(5.0))
+    found = fitted_band(
+        rows(np.random.default_rng(2), 5), NOISE, np.array([[0.0, 40.0, 5.0]] * 3 + [[0.0, 9.0, 9.0]] * 2)
+    )
+    np.testing.assert_array_equal(found.usual, [40.0, 5.0])
+    np.testing.assert_allclose(other_start(np.array([[40.0, 5.0], [40.0, 20.0]]), found.usual), [1.0, 2.0])
 
 
 def test_a_slip_is_believed_as_far_as_it_is_larger_than_its_band():
     slip = np.array([[0.0, 1e-3, 1e-3], [1e-3, 1e-3, 1e-4]])
-    kept = believed(slip, np.array([[0.0, 0.0, 1e-6], [2e-6, 5e-7, 2.5e-7]]))
+    kept = believed(reached(slip), np.array([[0.0, 0.0, 1e-6], [2e-6, 5e-7, 2.5e-7]]))
     np.testing.assert_allclose(kept, [[1.0, 1.0, 0.0], [0.0, 0.5, 0.75]])
 
 

@@ -116,8 +116,10 @@ def test_what_is_missing_is_named(recorded, suspension):
 
 
 def test_trials_that_contradict_the_wheels_are_named(recorded, suspension):
-    """The plate misses the base's own inertia: its force, which is wrong, corrects nothing."""
-    model, said = fit([r[0] for r in recorded[:2]], suspension)
+    """Forces along the floor and the moment about the vertical have the wrong sign: they correct nothing."""
+    signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, -1.0])
+    trials = [replace(r[0], plate_wrench=signs * r[0].plate_wrench) for r in recorded[:2]]
+    model, said = fit(trials, suspension)
     assert [d.source for d in model.directions] == ["plate", "dynamics"]
     assert said[0].verdict == "warning" and "plate's axes" in said[0].message
     assert "does not correct it" in said[0].message and not model.directions[0].corrected
