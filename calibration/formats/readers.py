@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from functools import reduce
 from pathlib import Path
 
-from calibration.formats.bag.read import bag_reader
-from calibration.formats.c3d.read import c3d_reader
-from calibration.formats.csv.read import csv_reader
+from calibration.formats.bag.read import read_bag
+from calibration.formats.c3d.read import read_c3d
+from calibration.formats.csv.read import read_csv, table_of
 from calibration.formats.importer import format_of
 from calibration.formats.mapping.channels import Reader, Recorded
 from calibration.formats.mapping.mapping import MappingFile
@@ -34,11 +34,11 @@ def reader_of(kind: str | None, mapping: MappingFile) -> Reader:
 
 
 def _reader_of(kind: str, mapping: MappingFile) -> Reader:
-    content = mapping.content
-    if kind == "csv" and content.csv:
-        return csv_reader(content.csv, content.setup)
-    if kind == "c3d" and content.c3d is not None:
-        return c3d_reader(content.c3d, content.setup)
-    if kind == "bag" and content.bag is not None:
-        return bag_reader(content.bag)
+    csv, c3d, bag, setup = mapping.content.csv, mapping.content.c3d, mapping.content.bag, mapping.content.setup
+    if kind == "csv" and csv:
+        return Reader(lambda paths: read_csv(paths, csv, setup), lambda p: p.name.removesuffix(table_of(p, csv).suffix))
+    if kind == "c3d" and c3d is not None:
+        return Reader(lambda paths: read_c3d(paths, c3d, setup), lambda path: path.stem)
+    if kind == "bag" and bag is not None:  # a ROS 2 bag may be a folder
+        return Reader(lambda paths: read_bag(paths, bag), lambda path: path.name if path.is_dir() else path.stem)
     raise mapping.error(kind, "missing; state the channels of the files")

@@ -15,11 +15,8 @@ import typer
 
 from scenarios.commands import check as command_check
 from scenarios.commands import design as command_design
-from scenarios.commands import import_export, quicklook, video
-from scenarios.commands import predict as command_predict
+from scenarios.commands import import_export, results
 from scenarios.commands import process as command_process
-from scenarios.commands import show as command_show
-from scenarios.commands import view as command_view
 from scenarios.commands.many import benchmark as command_benchmark
 from scenarios.commands.many import dataset as command_dataset
 from scenarios.commands.many import reality as command_reality
@@ -220,18 +217,16 @@ base = app.command(epilog=_example("base log.csv --map log.yaml --fit 28 --out r
 )
 predict = app.command(
     epilog=_example("predict runs/lab/estimate day2/*.csv --map lab.yaml --out runs/day2"), rich_help_panel=_CALIBRATE
-)(command_predict.predict)
-look = app.command(epilog=_example("look runs/short/dataset --out runs/look"), rich_help_panel=_LOOK)(quicklook.look)
+)(command_process.predict)
+look = app.command(epilog=_example("look runs/short/dataset --out runs/look"), rich_help_panel=_LOOK)(results.look)
 picture = app.command(epilog=_example("picture runs/short --still posture.png --magnify 50"), rich_help_panel=_LOOK)(
-    video.picture
+    results.picture
 )
-view = app.command(epilog=_example("view runs/short --trial xyz --magnify 50"), rich_help_panel=_LOOK)(
-    command_view.view
-)
+view = app.command(epilog=_example("view runs/short --trial xyz --magnify 50"), rich_help_panel=_LOOK)(results.view)
 reality = app.command(epilog=_example("reality -n 20 --out runs/reality.json"), rich_help_panel=_MANY)(
     command_reality.reality
 )
-show = app.command(epilog=_example("show humanoids2024 gap"), rich_help_panel=_SIMULATE)(command_show.show)
+show = app.command(epilog=_example("show humanoids2024 gap"), rich_help_panel=_SIMULATE)(results.show)
 benchmark = app.command(epilog=_example("benchmark make --out runs/bench"), rich_help_panel=_TEST)(
     command_benchmark.benchmark
 )

@@ -15,7 +15,7 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.formats.bag.messages import JOINT_STATE, PREFIX, STATISTICS_NAMES, SUFFIXES, typestore
 from calibration.formats.bag.poses import read_poses
-from calibration.formats.mapping.channels import Joints, Reader, Recorded
+from calibration.formats.mapping.channels import Joints, Recorded
 from calibration.formats.mapping.layouts import BagLayout
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.trial import check_times
@@ -45,11 +45,6 @@ def read_bag(files: Sequence[Path], layout: BagLayout) -> Recorded:
         return Recorded(str(path), joints=joints)
     markers, notes = read_poses(path, layout.poses, messages)
     return Recorded(str(path), markers, joints, together=("robot",) if joints is not None else (), notes=notes)
-
-
-def bag_reader(layout: BagLayout) -> Reader:
-    """Bags by the layout of a mapping: `<trial>.bag`, `<trial>.mcap`, or a ROS 2 folder `<trial>`."""
-    return Reader(lambda files: read_bag(files, layout), lambda path: path.name if path.is_dir() else path.stem)
 
 
 def _messages(path: Path, topics: Sequence[str]) -> dict[str, list[Any]]:

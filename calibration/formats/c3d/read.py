@@ -16,7 +16,7 @@ import numpy as np
 from calibration.errors import InputError
 from calibration.formats.c3d.file import CLOCK, C3dFile
 from calibration.formats.c3d.plate import C3dPlate, lab_wrench, negated_origin
-from calibration.formats.mapping.channels import Markers, Plates, Reader, Recorded
+from calibration.formats.mapping.channels import Markers, Plates, Recorded
 from calibration.formats.mapping.layouts import LENGTHS, MOMENT_NAMES, MOMENTS, C3dLayout, C3dPlateMap
 from calibration.numerics.wrench import moved_to
 from calibration.recording.schema import Plate, Setup
@@ -206,8 +206,3 @@ def _dwells(file: C3dFile, layout: C3dLayout, start: float) -> np.ndarray | None
         raise InputError(file.path, f"EVENT: {len(pairs[0])} events {layout.dwell_events[0]!r} and {len(pairs[1])} "
                          f"{layout.dwell_events[1]!r}; mark both ends of each posture")  # fmt: skip
     return np.stack(pairs, axis=1)
-
-
-def c3d_reader(layout: C3dLayout, setup: Setup) -> Reader:
-    """C3D files by the layout of a mapping."""
-    return Reader(lambda files: read_c3d(files, layout, setup), lambda path: path.stem)

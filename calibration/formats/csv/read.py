@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration.errors import InputError
-from calibration.formats.mapping.channels import Joints, Markers, Means, Plates, Reader, Recorded
+from calibration.formats.mapping.channels import Joints, Markers, Means, Plates, Recorded
 from calibration.formats.mapping.layouts import ANGLES, LENGTHS, MOMENTS, CsvTable, PlateChannels, PoseChannels
 from calibration.formats.mapping.plate_convention import checked_against_cop, to_action
 from calibration.formats.mapping.poses import AXES, marker_names, marker_sigma, markers_at
@@ -64,14 +64,6 @@ def _read(path: Path, table: CsvTable, setup: Setup) -> Recorded:
     others = {"robot": joints, "plate": plates}
     together = tuple(name for name, group in others.items() if markers is not None and group is not None)
     return Recorded(str(path), markers, joints, plates, together=together, notes=(*notes, *_unused(text, table)))
-
-
-def csv_reader(tables: Sequence[CsvTable], setup: Setup) -> Reader:
-    """CSV files by the tables of a mapping."""
-    return Reader(
-        lambda files: read_csv(files, tables, setup),
-        lambda path: path.name.removesuffix(table_of(path, tables).suffix),
-    )
 
 
 @dataclass(frozen=True)

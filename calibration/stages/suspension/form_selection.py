@@ -11,8 +11,16 @@ from calibration.stages.suspension.compliance_fit import fit_compliance
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.modal_response import modes_of
 from calibration.stages.suspension.model import AXES
-from calibration.stages.suspension.printed_fit import bound, matrices, normal_of, solve
-from calibration.stages.suspension.wheels import WheelModel, frame_sigma, jackknife, wheel_model
+from calibration.stages.suspension.wheels import (
+    WheelModel,
+    bound,
+    frame_sigma,
+    jackknife,
+    matrices,
+    normal_of,
+    solve,
+    wheel_model,
+)
 
 _SETTLES = 1.0  # [s] a base takes less; a slower mode integrates the plate's noise into drift
 _STIFF = 1e-5  # smallest eigenvalue of K over the largest, angles times the lever [-]

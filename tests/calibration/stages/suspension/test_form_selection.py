@@ -7,8 +7,15 @@ from calibration.stages.suspension.compliance_fit import fit_compliance
 from calibration.stages.suspension.cross_validation import HeldOut, held_out
 from calibration.stages.suspension.form_selection import Springs, not_positive, printed_springs, refusal
 from calibration.stages.suspension.modal_response import modes_of, predicted
-from calibration.stages.suspension.printed_fit import matrices, normal_of, solve
-from calibration.stages.suspension.wheels import element_parameters, frame_sigma, wheel_model, wheel_parameters
+from calibration.stages.suspension.wheels import (
+    element_parameters,
+    frame_sigma,
+    matrices,
+    normal_of,
+    solve,
+    wheel_model,
+    wheel_parameters,
+)
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import WHEELS, response, smooth, values
 

@@ -12,10 +12,9 @@ from calibration.recording.clock import Clock
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.modal_response import modes_of
-from calibration.stages.suspension.printed_fit import matrices
 from calibration.stages.suspension.rest_frame import rest_of, upright
 from calibration.stages.suspension.stage import fit_suspension
-from calibration.stages.suspension.wheels import wheel_model
+from calibration.stages.suspension.wheels import matrices, wheel_model
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved, values
 
