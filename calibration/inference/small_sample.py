@@ -25,9 +25,9 @@ def small_sample_covariance(fit: Fit) -> np.ndarray:
     A = [K[:, :, group == g] @ np.swapaxes(K[:, :, group == g], 1, 2) for g in free]
     moved = np.array([(a @ J).reshape(n * d, p) for a in A])
     P, Q = -J.reshape(n * d, p).T @ moved, np.swapaxes(moved, 1, 2)[:, None] @ moved
-    seen, known = Phi @ P, Phi @ Q
+    seen = Phi @ P
     own = np.array([[(a * b).sum() for b in A] for a in A])
-    taken = np.trace(known, axis1=2, axis2=3) - 0.5 * np.einsum("gij,hji->gh", seen, seen)
+    taken = (Phi * Q).sum(axis=(2, 3)) - 0.5 * np.tensordot(seen, seen, axes=((1, 2), (2, 1)))
     W = np.linalg.pinv(0.5 * own - taken, hermitian=True)
-    L = np.einsum("gh,ghij->ij", W, Q) - np.einsum("gh,gij,hjk->ik", W, P, seen)
+    L = np.tensordot(W, Q, axes=2) - (P @ np.tensordot(W, seen, axes=1)).sum(axis=0)
     return np.asarray(Phi + Phi @ (L + L.T) @ Phi)
