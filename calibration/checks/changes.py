@@ -137,7 +137,7 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
     """Joints whose motor reading is where the link is: r = x J_j (motor - link) + J_j w(q_j), x = 1 as they are named.
 
     w are waves of one and two periods a turn, fitted as well: an eccentric encoder of the link adds them to its
-    readings alone and moves no hand. A joint is judged where its sigma tells x = 0 from 1.
+    readings alone and moves no hand. A joint is judged where its sigma separates x = 0 from 1.
     """
     joints, columns = left.hand.nominal.joints, left.hand.nominal.columns
     d = (left.x.q - left.x.link)[:, columns]

@@ -3,7 +3,7 @@
     theta = nominal + T (V x + rest),      T = diag(tolerance),   x ~ N(0, I) beforehand
     x | postures ~ N(., C),    C = (I + sum_i B_i' B_i)^-1,    B_i = W_i J_i T V
 
-W_i whitens the posture's noise: markers, and each joint's play along its lever arms. V spans what the candidates
+W_i whitens the posture's noise: markers, and each joint's backlash along its lever arms. V spans what the candidates
 identify at all (singular values above a cliff); `rest`, the gauge, no posture identifies, and it does not move the
 hand. The hand's position at posture e then has the standard deviation sqrt(trace(P_e C P_e')), P_e = J_e T V: what
 calibration leaves, the joints' own random errors apart. With nuisances z (`departures`) it is the root of

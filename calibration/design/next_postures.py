@@ -13,9 +13,10 @@ How large the readings' random errors are believed to be where a fit must not be
     s = lambda s_datasheet of all joints,        ln lambda uniform between ln _LEAST and 0
     believed s^2 = s_datasheet^2 sum_l lambda_l^2 p(data | lambda_l) / sum_l p(data | lambda_l)
 
-A datasheet says what play is tolerated, not what there is. p(data | lambda) is the evidence, parameters integrated out
-at their tolerances (`evidence`): few postures identify little and leave a third of the datasheet's play (the root mean
-square of a log-uniform factor), more of them identify it, and data that fit no robot need all of it.
+A datasheet states what backlash is tolerated, not what there is. p(data | lambda) is the evidence, parameters
+integrated out at their tolerances (`evidence`): few postures identify little and leave a third of the datasheet's
+backlash (the root mean square of a log-uniform factor), more of them identify it, and data that fit no robot need all
+of it.
 """
 
 from dataclasses import dataclass, replace

@@ -1,8 +1,8 @@
 """From which side each joint is to come to rest, so that flanks do not pass for geometry.
 
-A joint with friction and a total play 2 h stops on the flank it came from, its reading off by s h, s = -1 or 1 the sign
-of its last motion (a joint whose load holds it on one flank takes that one from either side). Least squares turns the
-flanks of all postures into the error
+A joint with friction and a total backlash 2 h stops on the flank it came from, its reading off by s h, s = -1 or 1 the
+sign of its last motion (a joint whose load holds it on one flank takes that one from either side). Least squares turns
+the flanks of all postures into the error
 
     x = C sum_i B_i' J_i diag(h) s_i,     x' C^-1 x = | sum_ij s_ij g_ij |^2,     g_ij = L' B_i' J_ij h_j,   C = L L'
 
@@ -32,7 +32,7 @@ class Sides:
     """Approach directions of chosen postures.
 
     Attributes:
-        approach: (n, k) -1, 1, or 0 where play does not matter, of the joints of the chain.
+        approach: (n, k) -1, 1, or 0 where backlash does not matter, of the joints of the chain.
         bias: (e,) how far the flanks then move the predicted hand [m].
         one_sided: (e,) the same if every joint always came from below [m].
     """
@@ -43,7 +43,7 @@ class Sides:
 
 
 def sides(prospect: Prospect, chosen: np.ndarray, half_play: np.ndarray, rng: np.random.Generator) -> Sides:
-    """Approach directions for the chosen candidates (n,) of joints with half a play h (k,) [rad, m]."""
+    """Approach directions for the chosen candidates (n,) of joints with half a backlash h (k,) [rad, m]."""
     C = prospect.after(chosen)
     moves = prospect.J_joint[chosen] * half_play
     matters = np.sqrt((moves**2).sum(axis=1).mean(axis=0)) > _WORTH

@@ -4,7 +4,7 @@
     minimise  sum_i w_i r_i' C_i^-1 r_i  +  sum_j ((theta_j - nominal_j) / tolerance_j)^2 / f_h(j)
     C_i = S_i + Jq_i diag(s^2) Jq_i' (+ position and rotation of the hand)
 
-S_i is the measured pose's covariance, s_j the random error of joint j's reading (play, friction: what no constant
+S_i is the measured pose's covariance, s_j the random error of joint j's reading (backlash, friction: what no constant
 describes), carried to the hand by that posture's own lever arms. s and f maximise the marginal likelihood of the
 data linearised at theta, theta integrated out (`marginal_likelihood`), on a spread subset where postures are many;
 Gauss-Newton steps on all of them in between.

@@ -9,7 +9,8 @@ one group more or fewer, in the order the curvature of the evidence promises,
     by adding     1/2 slope^2 / F_gg        by dropping     -1/2 x_g^2 / (F^-1)_gg,      x = v - least v
 
 F its expected curvature by the variances v. It begins with the better of two sets, the hand's own errors and what is
-left of all: a marker's noise taken for play of two wrist joints is a maximum of its own, and no single group leads out.
+left of all: a marker's noise taken for backlash of two wrist joints is a maximum of its own, and no single group leads
+out.
 References: Schwarz, Annals of Statistics 1978; Bogdan, Ghosh, Doerge, Genetics 2004 (ln G).
 """
 

@@ -3,7 +3,7 @@
     w = (nu + d) / (nu + distance^2)        Student's t, iteratively weighted, scale from the evidence
 
 finds where most postures agree; a posture farther from what all others predict than `limit` is left out, the rest
-fitted by least squares, and every posture judged again until the set stands. Those left out have then decided where the
+fitted by least squares, and every posture judged again until the set stays. Those left out have then decided where the
 search ended: it starts again with the postures kept, so that the fit is the one there would be without the others, and
 a wrong posture that hid behind another is found. Weights alone would discard the real, configuration-dependent errors
 of a robot; leaving out is for what no robot does.

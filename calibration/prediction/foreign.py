@@ -111,7 +111,7 @@ def registered(estimate: Estimate, dataset: Dataset) -> Estimate:
 def _fitted_frames(
     hand: HandModel, chain: Chain, description: Description, postures: Postures
 ) -> tuple[Parameter, ...]:
-    """Both frames, all else of the hand fixed; readings err by the datasheet's play, as far as the data agree."""
+    """Both frames, all else of the hand fixed; readings err by the datasheet's backlash, as far as the data agree."""
     frames, floor = registration_parameters(chain, description), reading_floor(chain, description)
     identified = np.arange(len(frames)) < 6 + postures.components  # a point does not show how the hand is turned
     frames = replace(frames, tolerance=np.where(identified, np.inf, description.tolerances.body_rotation))

@@ -160,7 +160,7 @@ class BacklashPreload(ReadingError):
     averaged: ClassVar[bool] = True
 
     def tolerance(self, known: Known) -> np.ndarray:
-        """Half of it as wide as the datasheet's play."""
+        """Half of it as wide as the datasheet's backlash."""
         return 2.0 * known.tolerances.joint_play * self.lengths
 
     def shape(self, q: np.ndarray, tau: np.ndarray) -> np.ndarray:

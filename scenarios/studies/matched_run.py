@@ -1,8 +1,8 @@
 """A run of a matched study: a robot that is what the geometric model says it is, without physics, judged by its truth.
 
-Frames, joint placements and zeros are sampled from the datasheet's tolerances, readings err by its play, marker bodies'
-means by the markers' noise; Pinocchio says where the hand is. What the fit promises must then hold: where it does not,
-the fit is wrong, and not the model.
+Frames, joint placements and zeros are sampled from the datasheet's tolerances, readings err by its backlash, marker
+bodies' means by the markers' noise; Pinocchio says where the hand is. What the fit promises must then hold: where it
+does not, the fit is wrong, and not the model.
 """
 
 from collections.abc import Callable

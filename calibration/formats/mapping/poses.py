@@ -105,7 +105,7 @@ def other_convention(A: np.ndarray, B: np.ndarray, order: str) -> str | None:
 
     Args:
         A: (n, 4, 4) nominal poses of the hand's link in the base's.
-        B: (n, 4, 4) measured poses of the hand in the frame that stands still, as declared.
+        B: (n, 4, 4) measured poses of the hand in the frame at rest, as declared.
         order: Declared.
     """
     good = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(B).all(axis=(1, 2))

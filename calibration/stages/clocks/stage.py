@@ -4,7 +4,7 @@ Robot, first: angular velocity of the hand in the base, turned onto the tool's a
 
     R w_mocap(t)  =  g w(q, dq)(t - lag) + b + sum a_jk J_j d(play_k(q_j) - q_j)/dt + sum c_j w_before_j x J_j
 
-w from the nominal chain at the motor-side readings, J_j the axis of joint j. The play terms keep a gear's backlash,
+w from the nominal chain at the motor-side readings, J_j the axis of joint j. The play operators keep a gear's backlash,
 which lags the link behind the motor by 4 gap / (pi amplitude omega), from passing as a clock error; the last ones
 are the zeros of the readings, to first order.
 Then from whole poses, where static postures allow: see `clock_refinement`.

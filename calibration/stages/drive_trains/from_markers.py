@@ -183,7 +183,7 @@ def seen_joint(
 
 
 def _unknown(trains: DriveTrains, chain: Chain, joint: str) -> np.ndarray:
-    """Standard deviations (k,) [rad] of the chain's other joints: the play, or what their drive trains leave."""
+    """Standard deviations (k,) [rad] of the chain's other joints: the backlash, or what their drive trains leave."""
     known = {train.joint: train.residual for train in trains.trains}
     play = dict(zip(chain.joints, reading_sigma(chain, trains.description), strict=True))
     sliding = {name for name in chain.joints if chain.is_prismatic(name)} | {joint}

@@ -104,7 +104,7 @@ def cross_validated(
         description: Of the dataset.
         postures: Of the calibration.
         models: Of the estimate.
-        main: The row that stands for the estimate.
+        main: The row of the estimate that is judged.
     """
     row = main if main in _FITS else "model_2"
     fitted = {m.name: m for m in models if m.name in _FITS}

@@ -111,7 +111,7 @@ def fit_geometry(
         joints: Names of the columns of q.
         tool: Frame that carries the markers.
         q: (n, n_joints) readings at rest [rad, m].
-        positions: (n, m, 3) markers in a frame that stands still with the base [m]; NaN where not seen.
+        positions: (n, m, 3) markers in a frame at rest with the base [m]; NaN where not seen.
         base: Frame the chain starts from.
         widths: To begin with.
 

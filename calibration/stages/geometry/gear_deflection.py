@@ -5,7 +5,7 @@
 The hand has random errors of its own besides those of the readings, widths of priors follow the data, and which gears
 are compliant and have backlash is averaged over. Backlash is fitted unless the postures are strong evidence against it.
 On real postures this, by cross-validation, is what reaches furthest; a URDF holds its placements and not its gears. No
-motion is asked: where sweeps are recorded it stands beside the rows with joint models.
+motion is needed: where sweeps are recorded it is a row beside those with joint models.
 
 A fit averaged over which gears are compliant: most of a robot's are not, and estimating all of them costs accuracy.
 """
@@ -107,7 +107,7 @@ def _evidence_for_backlash(found: RobustFit, hand: HandModel, more: ParameterSet
 
 
 def _findings(model: Model, hand: HandModel) -> Iterator[Verdict]:
-    """What of the gears stands out."""
+    """What was found of the gears."""
     for kind, what, unit in (
         (Compliance, "gears compliant under gravity", "mrad/(N.m)"),
         (BacklashPreload, "backlash preloaded by gravity", "mrad"),

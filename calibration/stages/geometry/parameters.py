@@ -56,12 +56,12 @@ def reading_names(chain: Chain) -> tuple[str, ...]:
 
 
 def reading_sigma(chain: Chain, description: Description) -> np.ndarray:
-    """Datasheet play of each joint of the chain, (k,) [rad, m]."""
+    """Datasheet backlash of each joint of the chain, (k,) [rad, m]."""
     return description.tolerances.joint_play * joint_lengths(chain)
 
 
 def reading_floor(chain: Chain, description: Description) -> np.ndarray:
-    """Smallest random reading error of each joint, (k,) [rad, m]: its encoder's noise, 1/500 of the datasheet play."""
+    """Smallest random reading error of each joint, (k,) [rad, m]: its encoder's noise, 1/500 of the datasheet's."""
     return np.maximum(description.sigmas.encoder, 2e-3 * reading_sigma(chain, description))
 
 

@@ -114,7 +114,7 @@ class JointModel:
     def variance(self, theta: np.ndarray, tau: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Of the predicted discrepancy (n,) [rad2]: of the side the gear is on, and of what left-out trials kept.
 
-        S is the chance of the right flank, so the side adds S (1 - S) (C_r - C_l)^2: half the play at rest.
+        S is the chance of the right flank, so the side adds S (1 - S) (C_r - C_l)^2: half the backlash at rest.
         """
         M = monomials(*self.inside(theta, tau), self.powers)
         S = expit(self.rho * velocity)
