@@ -170,7 +170,8 @@ def _fitted(square: np.ndarray, parts: np.ndarray, prior: np.ndarray, width: np.
         tail = (_DEGREES + 1.0) * np.log1p(square / V / _DEGREES)
         return float((np.log(V) + tail).sum() + (((p - prior) / width) ** 2).sum())
 
-    return np.exp(minimize(cost, prior, method="BFGS").x)
+    bounds = np.stack([prior - 4.0 * width, prior + 4.0 * width], axis=1)
+    return np.exp(minimize(cost, prior, method="L-BFGS-B", bounds=bounds).x)
 
 
 def block_means(trials: Trials, x: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 import mjcf
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses
-from calibration.stages.stick_slip.stage import _misplaced
+from calibration.stages.stick_slip.stage import _linear, _misplaced
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -92,6 +92,15 @@ def test_axes_that_the_compliance_predicts_better_are_linear(recorded, suspensio
     better = (("plate", HeldOut(1e-14 * sums, 1e-6 * sums, 0.0 * sums, np.ones(3))),)
     model, said = fit([r[0] for r in recorded[:3]], replace(suspension, held_out=better), robot=None)
     assert model.directions[0].linear.all() and "linear" in said[0].message
+
+
+def test_where_slip_does_not_explain_yaw_the_compliance_need_not_be_better(recorded, suspension):
+    (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    sums = np.ones((8, 6))
+    as_good = replace(suspension, held_out=(("plate", HeldOut(0.4e-6 * sums, 1e-6 * sums, 0.0 * sums, np.ones(8))),))
+    for error, linear in ((0.4e-6, True), (0.1e-6, False)):
+        own = HeldOut(error * sums[:, :3], 1e-6 * sums[:, :3], 0.0 * sums[:, :3], np.ones(8))
+        assert np.all(_linear(replace(direction, held_out=own), as_good).linear == linear)
 
 
 def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
