@@ -21,21 +21,6 @@ from calibration.robot.kinematics import Path, path_of
 
 
 @dataclass(frozen=True)
-class ChainPoses:
-    """Poses of the tool frame and their derivatives, for n configurations of k joints.
-
-    Attributes:
-        T: (n, 4, 4) T_base_tool.
-        J_placement: (n, 6, 6 k), by finite placement twists, joint by joint.
-        J_joint: (n, 6, k), by joint position.
-    """
-
-    T: np.ndarray
-    J_placement: np.ndarray
-    J_joint: np.ndarray
-
-
-@dataclass(frozen=True)
 class Chain:
     """The measured joints between two frames of a robot.
 
@@ -111,13 +96,6 @@ class Chain:
             self._ways[frame] = path, [self.measured.index(name) for name in names]
         path, columns = self._ways[frame]
         return path.poses(q[:, columns])
-
-    def poses_and_derivatives(self, q: np.ndarray) -> ChainPoses:
-        """Poses of the tool frame with d(pose)/d(xi) and d(pose)/dq, at q (n, n_measured) [rad, m]."""
-        self._check(q)
-        placed = self.path.placed(q[:, self.columns])
-        J = placed.end_twists(self.twists)[:, :, 1:]
-        return ChainPoses(placed.T, J[..., :6].reshape(len(q), 6, 6 * len(self.joints)), J[..., 6])
 
     def joint_jacobians(self, q: np.ndarray) -> np.ndarray:
         """Derivatives of the tool's pose by joint position (n, 6, k), local twists, at q (n, n_measured)."""

@@ -29,9 +29,7 @@ from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Driv
 from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, inertials
 from calibration.stages.suspension.floor_wrench import root_in_base
 
-_SURE = 0.5  # share of the half gap
 _RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
-_WOUND = 3e-4  # [rad] an interval as narrow as this is of one side, however small the gap
 
 
 class LinkAngles(NamedTuple):
@@ -41,14 +39,12 @@ class LinkAngles(NamedTuple):
         q: Motor readings less eccentricity and delta [rad, m].
         low: Least of them, where the side of the mesh is not known.
         high: Largest.
-        determined: Whether the side is known; true of joints without a drive train.
         variance: Of q [rad2].
     """
 
     q: np.ndarray
     low: np.ndarray
     high: np.ndarray
-    determined: np.ndarray
     variance: np.ndarray
 
 
@@ -141,7 +137,7 @@ class DriveTrains:
     def of_loads(self, loads: LinkLoads, start: np.ndarray | None = None) -> LinkAngles:
         """Link angles of a trial whose loads are known, with regressors."""
         q = loads.q.astype(float).copy()
-        low, high, sure, variance = q.copy(), q.copy(), np.ones(q.shape, dtype=bool), np.zeros(q.shape)
+        low, high, variance = q.copy(), q.copy(), np.zeros(q.shape)
         for train in self.trains:
             j = self.joints.index(train.joint)
             inertials = train.inertials if len(train.inertials) else None
@@ -149,14 +145,8 @@ class DriveTrains:
             delta = train.backlash(drive_motion([loads], j, inertials), known)
             bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
             q[:, j], low[:, j], high[:, j] = bare - delta.value, bare - delta.high, bare - delta.low
-            sure[:, j] = delta.high - delta.low < one_side(train)
             variance[:, j] = (delta.high - delta.low) ** 2 / 12.0 + train.residual**2
-        return LinkAngles(q, low, high, sure, variance)
-
-
-def one_side(train: DriveTrain) -> float:
-    """Width of an interval [rad] below which the side of the mesh is known."""
-    return max(_SURE * float(train.values[0]), _WOUND)
+        return LinkAngles(q, low, high, variance)
 
 
 def zeros_of(trains: DriveTrains, deltas: Sequence[np.ndarray]) -> np.ndarray:
@@ -217,7 +207,7 @@ class Stream:
                 starts += train.at_rest(float(torque + off))
             states[i, :, 0] = states[i, :, 2] = starts
         link_motion.link_angles(states, state.moving[0], drives, angles)
-        return state, _link_angles(angles)
+        return state, LinkAngles(*angles)
 
     def step(
         self, before: StreamState, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None = None
@@ -231,22 +221,18 @@ class Stream:
             robot.tree, drives, root, self.work, found, state.moving, before.samples, state.states, t - before.t,
             LONGEST, state.samples, angles,
         )  # fmt: skip
-        return state, _link_angles(angles)
+        return state, LinkAngles(*angles)
 
     def _room(
         self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray
     ) -> tuple[StreamState, TreeDynamics, np.ndarray]:
         """A state, dynamics and link angles (5, 1, k) to be filled."""
         m, moving, scratch = len(self.prepared.columns), np.array([q, v, a], dtype=float), self.found
-        torque, moment, angles = np.empty((1, len(q))), np.empty((1, 2)), np.empty((5, 1, len(q)))
+        torque, moment, angles = np.empty((1, len(q))), np.empty((1, 2)), np.empty((4, 1, len(q)))
         found = TreeDynamics(
             torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.regressor
         )
         return StreamState(t, moving, np.empty((4, m)), np.zeros((m, _RUNS, 3)), torque, moment), found, angles
-
-
-def _link_angles(angles: np.ndarray) -> LinkAngles:
-    return LinkAngles(angles[0], angles[1], angles[2], angles[4] > 0.0, angles[3])
 
 
 def stream_of(trains: DriveTrains) -> Stream:
@@ -264,7 +250,6 @@ def stream_of(trains: DriveTrains) -> Stream:
         offs * np.array([t.values[COMPLIANCE] for t in of])[:, None],
         np.array([t.motor for t in of]).reshape(-1, 4),
         np.array([not t.dynamic and t.form == "dead_zone" for t in of], dtype=bool),
-        np.array([one_side(t) for t in of], dtype=float),
         np.array([t.residual**2 for t in of], dtype=float),
         np.array(robot.offset, dtype=float),
     )

@@ -170,7 +170,6 @@ class Drives(NamedTuple):
         shifts: (m, c) that it winds a mesh up by [rad].
         motor: (m, 4) eccentricities [rad].
         plays: (m,) which are play operators.
-        one_side: (m,) width of an interval below which the side is known [rad].
         residual: (m,) variance that trials left out kept [rad2].
         offset: (k,) zeros of all readings [rad, m].
     """
@@ -184,7 +183,6 @@ class Drives(NamedTuple):
     shifts: np.ndarray
     motor: np.ndarray
     plays: np.ndarray
-    one_side: np.ndarray
     residual: np.ndarray
     offset: np.ndarray
 
@@ -238,10 +236,10 @@ def streamed(
 
 @njit(cache=True, error_model="numpy")
 def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarray) -> None:
-    """Angles (5, 1, k) behind readings q (k,): likely, least, largest, variance, 1 where the side is known."""
+    """Angles (4, 1, k) behind readings q (k,): likely, least, largest; variance."""
     for j in range(len(q)):
         out[0, 0, j] = out[1, 0, j] = out[2, 0, j] = q[j]
-        out[3, 0, j], out[4, 0, j] = 0.0, 1.0
+        out[3, 0, j] = 0.0
     for i in range(len(drives.columns)):
         c, e = drives.columns[i], drives.motor[i]
         top, bottom, theta = -np.inf, np.inf, q[c] - drives.offset[c]
@@ -249,11 +247,9 @@ def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarr
             delta = states[i, j, 0] - drives.shifts[i, j]
             top, bottom = max(top, delta), min(bottom, delta)
         bare = q[c] - e[0] * np.cos(theta) - e[1] * np.sin(theta) - e[2] * np.cos(2 * theta) - e[3] * np.sin(2 * theta)
-        width = top - bottom
         out[0, 0, c] = bare - (states[i, 0, 0] - drives.shifts[i, 0])
         out[1, 0, c], out[2, 0, c] = bare - top, bare - bottom
-        out[3, 0, c] = width**2 / 12.0 + drives.residual[i]
-        out[4, 0, c] = 1.0 if width < drives.one_side[i] else 0.0
+        out[3, 0, c] = (top - bottom) ** 2 / 12.0 + drives.residual[i]
 
 
 @njit(cache=True, error_model="numpy")

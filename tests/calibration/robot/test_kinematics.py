@@ -10,7 +10,7 @@ from calibration.numerics.lie import exp6, jexp6, jlog6, log3, log6
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of, chain_of_frames
 from calibration.robot.laboratory import floating_model
-from tests.calibration.robot.test_chain import OTHER_ROBOT, other_chain
+from tests.calibration.robot.test_chain import OTHER_ROBOT, derivatives, other_chain
 from tests.doubles import rigid_robot
 
 ANGLES = (0.0, 1e-9, 1e-4, 0.3, 0.499, 0.501, 1.0, 2.9, 3.1)
@@ -71,7 +71,7 @@ def test_poses_and_derivatives_of_all_configurations_are_pinocchio_s(chain, robo
     rng = np.random.default_rng(2)
     c = c.with_placements(0.05 * rng.normal(size=c.xi.shape))
     q = rng.uniform(-1.0, 1.0, size=(40, len(c.measured)))
-    found, model, data = c.poses_and_derivatives(q), c.model, c.model.createData()
+    (by_placement, by_joint), model, data = derivatives(c, q), c.model, c.model.createData()
     tool, ids = model.getFrameId(c.tool_frame), [model.getJointId(name) for name in c.joints]
     velocities = [model.joints[i].idx_v for i in ids]
     for k, row in enumerate(c.configurations(q)):
@@ -80,10 +80,10 @@ def test_poses_and_derivatives_of_all_configurations_are_pinocchio_s(chain, robo
         regressor = pin.computeFrameKinematicRegressor(model, data, tool, pin.LOCAL)
         right = [pin.Jexp6(pin.Motion(xi)) for xi in c.xi]
         J = np.hstack([regressor[:, 6 * (i - 1) : 6 * i] @ e for i, e in zip(ids, right, strict=True)])
-        np.testing.assert_allclose(found.T[k], T, atol=1e-12)
-        np.testing.assert_allclose(found.J_placement[k], J, atol=1e-12)
+        np.testing.assert_allclose(c.poses(q)[k], T, atol=1e-12)
+        np.testing.assert_allclose(by_placement[k], J, atol=1e-12)
         jacobian = pin.computeFrameJacobian(model, data, row, tool, pin.LOCAL)
-        np.testing.assert_allclose(found.J_joint[k], jacobian[:, velocities], atol=1e-12)
+        np.testing.assert_allclose(by_joint[k], jacobian[:, velocities], atol=1e-12)
 
 
 def test_a_frame_on_the_way_is_where_pinocchio_has_it(chain):
