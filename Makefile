@@ -1,6 +1,9 @@
 # Every target does all it needs on a machine with Python 3.11-3.14 and make: the exact pinned
 # versions go into .venv once, and again when requirements.txt or pyproject.toml changes.
 
+# Tests start processes: their byte code is kept, whatever the shell says.
+export PYTHONDONTWRITEBYTECODE :=
+
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready

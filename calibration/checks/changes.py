@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.checks.unexplained import Passed, Unexplained
 from calibration.inference.parameters import Model
@@ -100,7 +100,7 @@ def _best(left: Unexplained, possible: Iterable[Change]) -> Iterator[tuple[str, 
         value, S, gain = left.fitted(change.columns, len(change.limit))
         square = float(value @ np.linalg.solve(S, value))
         over = float(np.abs(value / change.limit).max())
-        if square > _CLEAR * chi2.isf(_CHANCE, len(value)) and over > 1.0 and gain > best:
+        if square > _CLEAR * chdtri(len(value), _CHANCE) and over > 1.0 and gain > best:
             text = f"{change.text} by {change.size(value)} (+- {100.0 / np.sqrt(square):.0f} %)"
             best, found = gain, (text, over, change.moved(value))
     if best > 0.0:

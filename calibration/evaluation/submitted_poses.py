@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import correlate, correlation_lags
+import scipy
 from scipy.spatial.transform import Rotation
 
 from calibration.errors import InputError
@@ -96,8 +96,8 @@ def _lag(t: np.ndarray, T: np.ndarray, true: np.ndarray) -> int:
     if len(t) < _FRAMES or np.median(np.diff(t)) > _APART:
         return 0
     p, q = (x[:, :3, 3] - x[:, :3, 3].mean(axis=0) for x in (T, true))
-    alike = sum(correlate(p[:, i], q[:, i], method="fft") for i in range(3))
-    near = int(correlation_lags(len(p), len(q))[np.argmax(alike)]) + np.arange(-_NEAR, _NEAR + 1)
+    alike = sum(scipy.signal.correlate(p[:, i], q[:, i], method="fft") for i in range(3))
+    near = int(scipy.signal.correlation_lags(len(p), len(q))[np.argmax(alike)]) + np.arange(-_NEAR, _NEAR + 1)
     return int(min(near[np.abs(near) < len(p) // 2], key=lambda k: _square(_apart(p, q, k)), default=0))
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.inference.map_estimate import Fit, Problem, distances, solve, spread
 from calibration.inference.residual import Linearised
@@ -44,7 +44,7 @@ class RobustFit:
 
 def robust_fit(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.ndarray) -> RobustFit:
     """Fit from theta (p,); `problem` makes that of some of the n postures of d components, given as a mask."""
-    limit, asked = float(chi2.isf(_RARE, d)), np.ones(n, dtype=bool)
+    limit, asked = float(chdtri(d, _RARE)), np.ones(n, dtype=bool)
     for _ in range(_ROUNDS):
         rows = np.flatnonzero(asked)
         found = _agreed(partial(_of_these, problem, n, rows), len(rows), d, theta, limit)

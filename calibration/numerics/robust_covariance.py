@@ -29,9 +29,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import correlate, correlation_lags
-from scipy.stats import norm
-from scipy.stats import t as student
+import scipy
+from scipy.special import ndtri, stdtrit
 
 from calibration.errors import NotEnoughData, ShapeError
 
@@ -143,7 +142,7 @@ def _inverse_root(J: Sequence[np.ndarray], prior: np.ndarray) -> np.ndarray:
 def widening(v: np.ndarray) -> np.ndarray:
     """Factors (p,) on standard deviations of which 1.96 are to hold 95 %, as Student's do; v (n_blocks, p)."""
     nu = v.sum(axis=0) ** 2 / np.maximum((v**2).sum(axis=0), np.finfo(float).tiny)
-    return np.asarray(student.ppf(_QUANTILE, nu) / norm.ppf(_QUANTILE))
+    return np.asarray(stdtrit(nu, _QUANTILE) / ndtri(_QUANTILE))
 
 
 def long_run_variance(psi: np.ndarray, rate: float) -> float:
@@ -154,6 +153,6 @@ def long_run_variance(psi: np.ndarray, rate: float) -> float:
 def long_run_covariance(psi: np.ndarray, rate: float) -> np.ndarray:
     """The same of the sums of psi (n, c): covariance (c, c)."""
     n, c = psi.shape
-    weight = np.clip(1.0 - np.abs(correlation_lags(n, n)) / (MEMORY * rate), 0.0, None)
-    both = [[weight @ correlate(a, b, mode="full", method="fft") for b in psi.T] for a in psi.T]
+    weight = np.clip(1.0 - np.abs(scipy.signal.correlation_lags(n, n)) / (MEMORY * rate), 0.0, None)
+    both = [[weight @ scipy.signal.correlate(a, b, mode="full", method="fft") for b in psi.T] for a in psi.T]
     return np.array(both).reshape(c, c)

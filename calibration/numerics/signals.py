@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numba import njit
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.lie import rotation_vector
@@ -61,12 +61,12 @@ def even(t: np.ndarray, x: np.ndarray) -> Signal:
 def low_passed(signal: Signal, cutoff: float) -> Signal:
     """The signal without what is faster than `cutoff` [Hz]; zero phase."""
     pad = min(len(signal.t) - 1, int(2.0 * RATE))
-    return Signal(signal.t, sosfiltfilt(_sections(cutoff), signal.x, axis=0, padlen=pad), signal.valid)
+    return Signal(signal.t, scipy.signal.sosfiltfilt(_sections(cutoff), signal.x, axis=0, padlen=pad), signal.valid)
 
 
 @lru_cache
 def _sections(cutoff: float) -> np.ndarray:
-    return np.asarray(butter(_ORDER, cutoff, fs=RATE, output="sos"))
+    return np.asarray(scipy.signal.butter(_ORDER, cutoff, fs=RATE, output="sos"))
 
 
 def interpolate_columns(at: np.ndarray, t: np.ndarray, x: np.ndarray, outside: float | None = None) -> np.ndarray:

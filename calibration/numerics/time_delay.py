@@ -12,8 +12,8 @@ Reference: Newey, West, Econometrica 1987.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from scipy.interpolate import CubicSpline
-from scipy.signal import correlate, correlation_lags
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.robust_covariance import long_run_variance
@@ -64,8 +64,11 @@ def coarse_lag(y: Signal, x: Signal) -> float:
 
     At the true lag two records of the same finite motion reach sum x^2, which no other lag can (Cauchy-Schwarz).
     """
-    c = sum(correlate(a - a.mean(), b - b.mean(), mode="full", method="fft") for a, b in zip(y.x.T, x.x.T, strict=True))
-    shift = correlation_lags(len(y.t), len(x.t))[int(np.argmax(c))]
+    c = sum(
+        scipy.signal.correlate(a - a.mean(), b - b.mean(), mode="full", method="fft")
+        for a, b in zip(y.x.T, x.x.T, strict=True)
+    )
+    shift = scipy.signal.correlation_lags(len(y.t), len(x.t))[int(np.argmax(c))]
     return float(shift / RATE + y.t[0] - x.t[0])
 
 

@@ -13,7 +13,7 @@ Reference: Satterthwaite, Biometrics Bulletin 1946.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import gamma
+from scipy.special import gammaincinv
 
 from calibration.numerics.lie import adjoint, inverse, skew
 from calibration.robot.hand import HandModel
@@ -89,7 +89,7 @@ def radius_95(covariance: np.ndarray) -> np.ndarray:
     """(...) distance from a prediction within which 95 % are [m], by covariances (..., 3, 3)."""
     mean = np.trace(covariance, axis1=-2, axis2=-1)
     half = (covariance**2).sum(axis=(-2, -1))
-    return np.asarray(np.sqrt(gamma.ppf(0.95, 0.5 * mean**2 / half, scale=2.0 * half / mean)))
+    return np.asarray(np.sqrt(gammaincinv(0.5 * mean**2 / half, 0.95) * (2.0 * half / mean)))
 
 
 def predicted_points(

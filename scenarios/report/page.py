@@ -3,6 +3,7 @@
 import base64
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -94,6 +95,7 @@ def render(view: RunView, sections: Iterable[Section], drawings: Mapping[str, Dr
     return templates.get_template("page.html").render(**shared, parts=parts, style=style)
 
 
+@cache
 def environment() -> Environment:
     """The templates of the report with our formats of numbers."""
     found = Environment(

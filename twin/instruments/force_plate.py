@@ -11,8 +11,8 @@ sqrt(2) / (2 pi cutoff) at low frequency, which no time stamp knows.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 from pydantic.dataclasses import dataclass as validated
-from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from twin.defects.defect import Defect
 from twin.fields.values import STRICT, FixedNonNegative, NonNegative
@@ -127,8 +127,8 @@ def measured(
     seen = _turned(wrench, at.R_lab_plate.T)
     seen = seen if (defect.gain == np.eye(6)).all() else seen @ defect.gain.T
     if defect.cutoff:
-        sos = butter(2, defect.cutoff, fs=1.0 / (grid[1] - grid[0]), output="sos")
-        seen = sosfilt(sos, seen, axis=0, zi=sosfilt_zi(sos)[:, :, None] * seen[0])[0]
+        sos = scipy.signal.butter(2, defect.cutoff, fs=1.0 / (grid[1] - grid[0]), output="sos")
+        seen = scipy.signal.sosfilt(sos, seen, axis=0, zi=scipy.signal.sosfilt_zi(sos)[:, :, None] * seen[0])[0]
     samples = averaged(at.t, grid, seen, 1.0 / at.rate)
     samples = samples + at.sigma * rng.normal(size=samples.shape)
     if defect.drift.any():

@@ -6,8 +6,8 @@ Stamps jitter about the ticks of the robot's clock, messages are lost, velocity 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from pydantic.dataclasses import dataclass as validated
-from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from twin.fields.values import STRICT, FixedNonNegative, FixedPositive, NonNegative
 from twin.instruments.clock import Clock, latency
@@ -127,9 +127,9 @@ def _low_passed(states: States, cutoff: float) -> np.ndarray:
     """Motor velocity (n, 8) through dv/dt = 2 pi cutoff (v_motor - v)."""
     if not cutoff:
         return states.motor_velocity
-    sos = butter(1, cutoff, fs=1.0 / (states.t[1] - states.t[0]), output="sos")
-    first = sosfilt_zi(sos)[:, :, None] * states.motor_velocity[0]
-    return np.asarray(sosfilt(sos, states.motor_velocity, axis=0, zi=first)[0])
+    sos = scipy.signal.butter(1, cutoff, fs=1.0 / (states.t[1] - states.t[0]), output="sos")
+    first = scipy.signal.sosfilt_zi(sos)[:, :, None] * states.motor_velocity[0]
+    return np.asarray(scipy.signal.sosfilt(sos, states.motor_velocity, axis=0, zi=first)[0])
 
 
 def _read(q: np.ndarray, encoders: tuple[Encoder, ...], side: str) -> np.ndarray:

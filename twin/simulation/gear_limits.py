@@ -15,13 +15,13 @@ from collections.abc import Mapping
 
 import mujoco
 import numpy as np
-from scipy.stats.qmc import Halton
 
 from twin.defects.gear import Gear, mesh_tendon, rotor_joint
 from twin.errors import TwinError
 
 _BOUNCES, _STABLE = 2.0, 4.0
 _POSTURES = 64
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
 
 
 class GearTooStiff(TwinError):
@@ -66,7 +66,7 @@ def least_masses(model: mujoco.MjModel, names: tuple[str, ...]) -> np.ndarray:
     together = np.abs(J) @ np.abs(J).T > 0.0
     low, high = np.array([model.joint(name).range for name in names]).T
     solved, least = np.empty_like(J), np.full(len(names), np.inf)
-    for share in Halton(len(names), scramble=False).random(_POSTURES):
+    for share in halton(_POSTURES, len(names)):
         for name, q in zip(names, low + share * (high - low), strict=True):
             data.joint(name).qpos = data.joint(rotor_joint(name)).qpos = q
         mujoco.mj_fwdPosition(model, data)
@@ -74,6 +74,17 @@ def least_masses(model: mujoco.MjModel, names: tuple[str, ...]) -> np.ndarray:
         least = np.minimum(least, 1.0 / (np.abs(J @ solved.T) * together).sum(axis=1))
     impedance = model.tendon_solimp_lim[tendons, 0]
     return np.asarray(least + impedance / _scale(model, tendons))
+
+
+def halton(n: int, d: int) -> np.ndarray:
+    """First n points (n, d) of Halton's sequence: the digits of 0, 1, 2, ... in the first d primes, mirrored."""
+    found = np.zeros((n, d))
+    for column, prime in zip(found.T, _PRIMES[:d], strict=True):
+        k, share = np.arange(n), 1.0 / prime
+        while k.any():
+            column += k % prime * share
+            k, share = k // prime, share / prime
+    return found
 
 
 def _scale(model: mujoco.MjModel, tendon: int | list[int]) -> np.ndarray:

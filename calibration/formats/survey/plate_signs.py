@@ -7,7 +7,7 @@ is drafted as `reversed` where both forces follow the hand and exactly one has t
 """
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy
 
 from calibration.formats.mapping.channels import Markers, Recorded
 from calibration.formats.mapping.rests import rests_of_markers
@@ -34,8 +34,8 @@ def reversed_force(plate: PlateView, markers: Markers | None, hand: FoundBody) -
         seen = np.isfinite(centre[:, k])
         x = np.interp(t, markers.t[seen], centre[seen, k])
         f = np.interp(t, markers.t, plate.wrench[:, k])
-        a = savgol_filter(x, window, 3, deriv=2, delta=t[1] - t[0])
-        both.append(float(np.corrcoef(a, savgol_filter(f, window, 3))[0, 1]))
+        a = scipy.signal.savgol_filter(x, window, 3, deriv=2, delta=t[1] - t[0])
+        both.append(float(np.corrcoef(a, scipy.signal.savgol_filter(f, window, 3))[0, 1]))
     wanted = -1.0 if plate.convention == "action" else 1.0
     wrong = [k for k in range(2) if both[k] * wanted < 0.0]
     if len(wrong) != 1 or min(map(abs, both)) < _FOLLOWS:

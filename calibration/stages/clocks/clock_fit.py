@@ -33,7 +33,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import theilslopes
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.time_delay import Lag
@@ -107,7 +106,9 @@ def _inliers(s: np.ndarray, lag: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Trials near the Theil-Sen line; all of them when there are fewer than four."""
     if len(s) < 4:
         return np.ones(len(s), dtype=bool)
-    slope = float(np.clip(theilslopes(lag, s)[0], -5.0 * _DRIFT, 5.0 * _DRIFT))
+    later, earlier = np.nonzero(s[:, None] > s)
+    slope = np.median((lag[later] - lag[earlier]) / (s[later] - s[earlier])) if len(later) else 0.0
+    slope = float(np.clip(slope, -5.0 * _DRIFT, 5.0 * _DRIFT))
     r = lag - slope * s
     r = r - np.median(r)
     spread = 1.4826 * np.median(np.abs(r))

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.inference.parameters import Model
 from calibration.mocap.postures import Postures
@@ -58,7 +58,7 @@ def remounted(hand: HandModel, model: Model, postures: Postures, description: De
     if not found:
         return
     x, square, body, k = max(found, key=lambda one: one[1])
-    if square < chi2.isf(_CHANCE, 6):
+    if square < chdtri(6, _CHANCE):
         return
     tol, frames = description.tolerances, hand.block(Frames).names
     refused = float(np.abs(x / np.repeat([tol.body_translation, tol.body_rotation], 3)).max()) > _WRONG
@@ -80,6 +80,6 @@ def _whitened(hand: HandModel, model: Model, postures: Postures) -> tuple[_White
     at = residual.linearise(np.array([model.parameters[k].value for k in known]))
     W = residual.noise.roots(at.B, np.append(sigma, 1.0))
     r = (W @ at.r[..., None])[..., 0]
-    kept = (r**2).sum(axis=1) < chi2.isf(_ODD, 6)
+    kept = (r**2).sum(axis=1) < chdtri(6, _ODD)
     S = model.random_covariance[np.ix_(known, known)]
     return _White(r[kept], (W @ at.J)[kept], S, W[kept]), postures.rows(kept)

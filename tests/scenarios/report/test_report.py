@@ -209,7 +209,7 @@ def test_what_is_missing_is_left_out(run, plain, missing, gone):
     assert "Held-out error of the hand, dynamic trials" in text
 
 
-def test_without_samples_there_are_tables_alone(run):
+def test_without_samples_there_are_tables_alone(run, undrawn):
     (run / "evaluation.nc").unlink()
     write(run)
     text = Page(run / "report.html").text
@@ -218,7 +218,7 @@ def test_without_samples_there_are_tables_alone(run):
     assert not (run / "figures/errors.svg").exists()
 
 
-def test_real_data_are_not_called_a_twin(run):
+def test_real_data_are_not_called_a_twin(run, undrawn):
     (run / "score.json").unlink()
     write(run)
     text = Page(run / "report.html").text
@@ -329,7 +329,7 @@ def test_a_refused_run_has_a_report_that_says_why(run):
     assert "xyz validation swing 2.0" in text
 
 
-def test_nothing_is_written_through_a_link(run, tmp_path):
+def test_nothing_is_written_through_a_link(run, plain, tmp_path):
     (tmp_path / "mine").write_text("mine")
     (run / "report.html.part").symlink_to(tmp_path / "mine")
     write(run)
@@ -337,7 +337,7 @@ def test_nothing_is_written_through_a_link(run, tmp_path):
     assert not [path for path in run.iterdir() if path.name.startswith(".")]
 
 
-def test_rows_with_the_base_measured_are_shown_where_nothing_is_predictive(tmp_path):
+def test_rows_with_the_base_measured_are_shown_where_nothing_is_predictive(tmp_path, undrawn):
     write_evaluation(tmp_path, bases=("measured",))
     write(tmp_path)
     page = (tmp_path / "report.html").read_text()

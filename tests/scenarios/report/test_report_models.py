@@ -133,7 +133,7 @@ def whole(tmp_path_factory, recording):
 
 
 @pytest.fixture
-def run(whole, tmp_path):
+def run(whole, tmp_path, undrawn):
     return shutil.copytree(whole, tmp_path / "run")
 
 

@@ -46,7 +46,7 @@ def test_postures_have_no_correlation_time():
     assert (found.time, found.independent) == (None, 30)
 
 
-def test_absorption_is_a_section_with_what_is_hidden_first(tmp_path):
+def test_absorption_is_a_section_with_what_is_hidden_first(tmp_path, undrawn):
     write_evaluation(tmp_path)
     write_estimate(tmp_path / "estimate", Verdict("clocks", "ok", "fine"))
     whole = load_estimate(tmp_path / "estimate")
@@ -62,7 +62,7 @@ def test_absorption_is_a_section_with_what_is_hidden_first(tmp_path):
     assert "#absorption" in Page(tmp_path / "report.html").links
 
 
-def test_without_absorption_there_is_no_section(tmp_path):
+def test_without_absorption_there_is_no_section(tmp_path, undrawn):
     write_evaluation(tmp_path)
     write_estimate(tmp_path / "estimate", Verdict("clocks", "ok", "fine"))
     write(tmp_path)
