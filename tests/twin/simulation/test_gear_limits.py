@@ -5,12 +5,13 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from scipy.stats.qmc import Halton
 
 import mjcf
 from tests.doubles.gear_bench import LINK_INERTIA, OUTPUT_INERTIA, bench, gear
 from twin.campaign import laboratory, sample
 from twin.simulation import build
-from twin.simulation.gear_limits import GearTooStiff
+from twin.simulation.gear_limits import GearTooStiff, halton
 
 STEP = 1e-3
 MASS = 1.0 / (1.0 / (LINK_INERTIA + OUTPUT_INERTIA) + 1.0 / 50.0)
@@ -82,3 +83,7 @@ def test_too_much_damping_is_told_as_such(config):
         laboratory(
             replace(config, arm=config.arm | {"arm_7_joint": replace(config.arm["arm_7_joint"], damping=30.0)}), 0
         )
+
+
+def test_postures_are_spread_by_haltons_sequence():
+    np.testing.assert_array_equal(halton(100, 7), Halton(7, scramble=False).random(100))
