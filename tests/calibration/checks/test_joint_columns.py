@@ -106,7 +106,7 @@ CHAIN = chain_of_frames(mjcf.urdf(), D.joint_names, D.base_frame, D.tool_frame)
 @pytest.mark.parametrize("reading", list(readings(CHAIN))[::7], ids=lambda r: r.meaning)
 def test_every_reading_is_recognised(reading):
     wrong = [(n, replace(t, q_motor=reading.of(t.q_motor))) for n, _, _, t in trials()]
-    with pytest.raises(InputError, match=f"^swing and 1 more: {reading.said}: .* correct the mapping file"):
+    with pytest.raises(InputError, match=f"^swing and 1 more: {reading.meaning}: .* correct the mapping file"):
         check_columns(D, CHAIN, wrong)
 
 
