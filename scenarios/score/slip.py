@@ -17,10 +17,9 @@ from calibration.evaluation import trial_errors
 from calibration.numerics.lie import inverse, mean
 from calibration.prediction import PredictedTrial, Prediction
 from calibration.stages.stick_slip import BasePrediction
-from calibration.stages.suspension import Source
+from calibration.stages.suspension import REST, Source
 from twin.truth import TruthTrial
 
-_REFERENCE = 1.0  # [s] of rest at the start of every trial
 _TWO_SIDED = 1.96
 _SLIDES = 0.999  # of a wheel's friction
 _SLIPS = (0, 10, 100)  # since the reference, lower ends of the groups
@@ -91,7 +90,7 @@ def slip_scores(trials: Iterable[tuple[PredictedTrial, TruthTrial]]) -> Iterator
 
 
 def _score(trial: PredictedTrial, true: TruthTrial, source: Source, found: BasePrediction) -> SlipScore:
-    early = trial.t <= trial.t[0] + _REFERENCE
+    early = trial.t <= trial.t[0] + REST
     at_rest = mean(true.base_pose[early])
     base = _moved(found.T_lab_B, early, at_rest)
     hand_in_base, hand = inverse(true.base_pose) @ true.hand_pose, true.hand_pose[:, :3, 3]

@@ -11,7 +11,7 @@ import numpy as np
 from scenarios import load, run
 
 SAMPLED = ("twin.widths.spread=0.5",)
-"""Every gap, friction, stiffness, offset and wheel sampled, not the default robot's."""
+"""Gaps of gears and offsets of readings sampled; friction, stiffness and wheels are the default robot's."""
 SEEDS, MORE = range(1000, 1010), range(2000, 2020)
 """Robots that no method was developed on."""
 

@@ -1,6 +1,7 @@
 """Motion of the base on its wheels under the wrench of the moving arm."""
 
 from calibration.checks.plates import STAGE
+from calibration.recording.trial import REST
 from calibration.stages.suspension.base_response import base_response_of, laboratory
 from calibration.stages.suspension.floor_wrench import plate_load
 from calibration.stages.suspension.model import Source, Suspension
@@ -10,6 +11,7 @@ from calibration.stages.suspension.wheels import Point, wheel_model
 
 __all__ = [
     "Point",
+    "REST",
     "Rest",
     "STAGE",
     "Source",

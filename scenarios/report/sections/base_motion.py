@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from calibration import prediction
 from calibration.numerics.signals import CUTOFF, even, low_passed
-from calibration.stages.suspension import Suspension
+from calibration.stages.suspension import REST, Suspension
 from scenarios.plots.style import ESTIMATE, OTHER, drawing, figure
 from scenarios.plots.trace import Line, measured_beside
 from scenarios.report.results import suspension
@@ -25,7 +25,6 @@ from scenarios.report.results.section import Drawn, RunView
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 UNITS = ("mm", "mm", "mm", "mrad", "mrad", "mrad")
-_REFERENCE = 1.0  # [s] of rest at the start of every trial
 _UNIT = 1e3  # mm in a metre, mrad in a radian
 _LINES = {"plate": (ESTIMATE, 1.7), "dynamics": (OTHER, 0.7)}
 _HEIGHT = 5.2  # [inch] of the figure
@@ -70,7 +69,7 @@ class TrialMotion:
     @property
     def scored(self) -> np.ndarray:
         """(n,) what counts."""
-        return np.asarray((self.t > _REFERENCE) & np.isfinite(self.measured).all(axis=1))
+        return np.asarray((self.t > REST) & np.isfinite(self.measured).all(axis=1))
 
     @property
     def middle(self) -> np.ndarray:
@@ -85,12 +84,12 @@ class TrialMotion:
     @property
     def shifted(self) -> np.ndarray:
         """Displacement of the base in the last second (6,) [mm, mrad]; it began at zero."""
-        return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - _REFERENCE], axis=0))
+        return np.asarray(np.nanmean(self.measured[self.t > self.t[-1] - REST], axis=0))
 
     @property
     def noise(self) -> np.ndarray:
         """Rms (6,) [mm, mrad] of the markers' noise, by the first second at rest."""
-        return np.asarray(np.nanstd(self.measured[self.t <= _REFERENCE], axis=0))
+        return np.asarray(np.nanstd(self.measured[self.t <= REST], axis=0))
 
     def left(self, predicted: Predicted) -> np.ndarray:
         """Rms (6,) [mm, mrad] that a prediction leaves."""

@@ -12,13 +12,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from calibration.stages.stick_slip import SlippingMotion
+from calibration.stages.suspension import REST
 from scenarios.plots.slipping_base import Banded, banded, friction_use, loop
 from scenarios.plots.style import drawing, figure
 from scenarios.report.results.section import Drawn, RunView
 
 _AXES = (("x", "mm", 0), ("y", "mm", 1), ("yaw", "mrad", 5))
 _UNIT = 1e3  # mm in a metre, mrad in a radian
-_REFERENCE = 1.0  # [s] of rest at the start of every trial
 _TWO_SIDED = 1.96
 _SLIDES = 0.999  # of the friction
 _HEIGHT = 5.0  # [inch] of the figure
@@ -97,7 +97,7 @@ class Slip:
 
 def line(one: Slipped) -> SlipLine:
     """Share of a trial inside the band."""
-    rows = one.t > _REFERENCE
+    rows = one.t > REST
     seen, axes = rows & np.isfinite(one.measured[:, 0]), [one.axis(k) for _, _, k in _AXES]
     measured = np.stack([a.measured[seen] for a in axes], axis=1)
     error = measured - np.stack([a.predicted[seen] for a in axes], axis=1)
