@@ -68,10 +68,8 @@ class BundledRobot:
     @classmethod
     def of(cls, hand: HandModel, parts: BundleParts, urdf: str, description: Description) -> "BundledRobot":
         """The robot from what was saved of it."""
-        zero = np.zeros(len(parts.offset))
-        loads = dynamics(urdf, description, parts.offset)
-        trains = DriveTrains(loads, parts.trains, zero, urdf, description)
-        at_rest = trains.by_joint(parts.at_rest) if len(parts.at_rest) else zero
+        trains = DriveTrains(dynamics(urdf, description, parts.offset), parts.trains, urdf, description)
+        at_rest = trains.by_joint(parts.at_rest) if len(parts.at_rest) else np.zeros(len(parts.offset))
         return cls(hand, trains, parts.bending, parts.stick_slip, at_rest)
 
     def hand_in_base(self, trial: Trial, robot: Clock) -> np.ndarray:

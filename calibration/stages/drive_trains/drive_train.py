@@ -96,12 +96,9 @@ class DriveTrain:
         """Total backlash [rad]."""
         return 2.0 * float(self.values[HALF_GAP])
 
-    def backlash(self, drive: "DriveMotion", starts: np.ndarray | None = None) -> "Deflection":
-        """delta in trials; `starts` (m,) are delta at their first samples [rad], where they are known."""
+    def backlash(self, drive: "DriveMotion") -> "Deflection":
+        """delta in trials."""
         torque = drive.torque + self.link_inertia * drive.a
-        if starts is not None:
-            found = self.deltas(drive, torque, starts)
-            return Deflection(found, found, found)
         low, high = self.ends(torque[drive.begins[:-1]])
         likely = self.deltas(drive, torque, low + self.start[0] * (high - low))
         others = [likely]

@@ -2,8 +2,7 @@
 
     q_link = q_motor - offset - e_m - delta           what the geometry is asked with:  q_motor - e_m - delta
 
-The geometry keeps the zeros of the readings. One that was fitted to bare readings holds the mean delta of its postures
-in them: `zero` is to be added for it, and not for one that was fitted to corrected readings (`geometry_refit`).
+The geometry keeps the zeros of the readings; it is the one fitted to corrected readings (`geometry_refit`).
 
 Drive trains sample by sample: the state is passed from one to the next, nothing after a sample is read.
 
@@ -13,13 +12,12 @@ Velocities and accelerations are the caller's; with those that `torques.derivati
 those of the recording in one go.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from calibration.errors import NoSuchElement, ShapeError
+from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
@@ -55,14 +53,12 @@ class DriveTrains:
     Attributes:
         dynamics: From motion to torque, with the declared payload.
         trains: In the order of the measured joints; some joints have none.
-        zero: (k,) mean delta over the static calibration postures [rad, m]; 0 without a drive train.
         urdf: Text the dynamics were built from.
         description: Of the dataset.
     """
 
     dynamics: Dynamics
     trains: tuple[DriveTrain, ...]
-    zero: np.ndarray
     urdf: str
     description: Description
 
@@ -116,42 +112,18 @@ class DriveTrains:
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
         return base_acceleration(self.dynamics.gravity, t, T_lab_root, at)
 
-    def link_angles(
-        self, t: np.ndarray, q_motor: np.ndarray, base: np.ndarray | None = None, start: np.ndarray | None = None
-    ) -> LinkAngles:
-        """Link angles at readings q_motor (n, k) [rad, m] taken at t (n,) [s], any clock, without NaN.
-
-        Args:
-            t: Times, increasing; a second of them at least.
-            q_motor: Readings.
-            base: (n, 6) proper acceleration of the base, see `base_acceleration`; level and at rest if not given.
-            start: (k,) delta at the first reading [rad], where it is known.
-
-        Raises:
-            NotEnoughData: Less than a second of readings.
-        """
-        if q_motor.shape != (len(t), len(self.joints)):
-            raise ShapeError("q_motor", q_motor.shape, (len(t), len(self.joints)))
-        return self.of_loads(self.dynamics.loads("", t, q_motor, base), start)
-
-    def of_loads(self, loads: LinkLoads, start: np.ndarray | None = None) -> LinkAngles:
-        """Link angles of a trial whose loads are known, with regressors."""
+    def of_loads(self, loads: LinkLoads) -> LinkAngles:
+        """Link angles of a trial whose loads are known."""
         q = loads.q.astype(float).copy()
         low, high, variance = q.copy(), q.copy(), np.zeros(q.shape)
         for train in self.trains:
             j = self.joints.index(train.joint)
             inertials = train.inertials if len(train.inertials) else None
-            known = None if start is None else start[[j]]
-            delta = train.backlash(drive_motion([loads], j, inertials), known)
+            delta = train.backlash(drive_motion([loads], j, inertials))
             bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
             q[:, j], low[:, j], high[:, j] = bare - delta.value, bare - delta.high, bare - delta.low
             variance[:, j] = (delta.high - delta.low) ** 2 / 12.0 + train.residual**2
         return LinkAngles(q, low, high, variance)
-
-
-def zeros_of(trains: DriveTrains, deltas: Sequence[np.ndarray]) -> np.ndarray:
-    """Mean (k,) of delta over dwells, each (k,)."""
-    return np.mean(deltas, axis=0) if len(deltas) else np.zeros(len(trains.joints))
 
 
 class StreamState(NamedTuple):

@@ -12,14 +12,13 @@ import numpy as np
 from calibration.checks.joint_readings import wrong_links
 from calibration.errors import NotEnoughData
 from calibration.mocap.cluster_pose import poses_of
-from calibration.mocap.postures import dwell_windows
 from calibration.numerics.lie import from_vector, inverse
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.drive_train import DriveTrain
-from calibration.stages.drive_trains.drive_trains import DriveTrains, zeros_of
+from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, joint_data
 from calibration.stages.drive_trains.steady_contact import Slip, slipped_encoder
@@ -49,9 +48,7 @@ def fit_drive_trains(
         robot: The robot's clock.
         hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
     """
-    bare = DriveTrains(
-        _dynamics(urdf, description, hand), (), np.zeros(len(hand.chain.measured)), urdf, description
-    )  # fmt: skip
+    bare = DriveTrains(_dynamics(urdf, description, hand), (), urdf, description)
     try:
         zero = link_zeros(trials, robot)
     except NotEnoughData as error:
@@ -65,9 +62,7 @@ def fit_drive_trains(
     tried = dict(_identified(bare, loads, differences, hand))
     trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))
     slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
-    found = DriveTrains(bare.dynamics, trains, bare.zero, urdf, description)
-    deltas = [row for trial, load in zip(used, loads, strict=True) for row in _dwell_deltas(found, trial, robot, load)]
-    found = DriveTrains(bare.dynamics, trains, zeros_of(found, deltas), urdf, description)
+    found = DriveTrains(bare.dynamics, trains, urdf, description)
     return found, (*slips, *_verdicts(found, hand))
 
 
@@ -130,18 +125,6 @@ def _slipped(joint: str, slip: Slip) -> Verdict:
         "not used: fasten it and record again, or leave out the trials on one side"
     )
     return Verdict(STAGE, "warning", message)
-
-
-def _dwell_deltas(trains: DriveTrains, trial: Trial, robot: Clock, loads: LinkLoads) -> Iterator[np.ndarray]:
-    """Mean delta (k,) of each dwell of a trial."""
-    windows = dwell_windows(trial)
-    if not len(windows):
-        return
-    t, delta = robot.to_mocap(loads.t), loads.q - trains.of_loads(loads).q
-    for start, stop in windows:
-        rows = (t >= start) & (t <= stop)
-        if rows.any():
-            yield delta[rows].mean(axis=0)
 
 
 def _verdicts(found: DriveTrains, hand: HandModel) -> Iterator[Verdict]:

@@ -30,7 +30,7 @@ def hand() -> HandModel:
 @pytest.fixture(scope="module")
 def trains() -> DriveTrains:
     described = rigid_robot.described()
-    return DriveTrains(dynamics(mjcf.urdf(), described, np.zeros(8)), (), np.zeros(8), mjcf.urdf(), described)
+    return DriveTrains(dynamics(mjcf.urdf(), described, np.zeros(8)), (), mjcf.urdf(), described)
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def test_offset_and_eccentricity_are_removed_where_a_link_encoder_reads():
     assert described.joint_names[COLUMN] == JOINT
     zero = 0.05 * rng.normal(size=8)
     train = DriveTrain(JOINT, "dead_zone", np.array([1e-3, 1e-4, 0.1, 0.1, 0.0, 0.0, 0.0]), link=ERRORS)
-    trains = DriveTrains(dynamics(mjcf.urdf(), described, zero), (train,), np.zeros(8), mjcf.urdf(), described)
+    trains = DriveTrains(dynamics(mjcf.urdf(), described, zero), (train,), mjcf.urdf(), described)
     theta = rigid_robot.random_angles(rng, 50)
     behind = theta + zero + 5e-4 * rng.normal(size=theta.shape)  # link angles by the drive trains, none exact
     read = np.full(theta.shape, np.nan)
@@ -42,7 +42,7 @@ def test_offset_and_eccentricity_are_removed_where_a_link_encoder_reads():
 
 def test_what_a_zero_is_off_by_turns_the_phase_of_a_link_encoder_s_eccentricity():
     described, off, angle = rigid_robot.described(), 1e-3, np.linspace(-1.0, 1.0, 9)
-    trains = DriveTrains(dynamics(mjcf.urdf(), described, np.zeros(8)), (), np.zeros(8), mjcf.urdf(), described)
+    trains = DriveTrains(dynamics(mjcf.urdf(), described, np.zeros(8)), (), mjcf.urdf(), described)
     names = [f"encoder.{JOINT}.link.{what}" for what in ("offset", *HARMONICS)]
     own = tuple(Quantity(n, "rad", float(x), 0.0, "estimated") for n, x in zip(names, ERRORS, strict=True))
     train = DriveTrain(JOINT, "dead_zone", np.zeros(7), link=ERRORS, parameters=own)

@@ -52,7 +52,7 @@ def trains() -> DriveTrains:
         DriveTrain("first", "dead_zone", values, dynamic=False, motor=np.array([1e-3, 0.0, 2e-4, 0.0])),
         DriveTrain("second", "dead_zone", values, inertials=np.full(len(inertials(robot)), 1e-3), parameters=shown),
     )
-    return DriveTrains(robot, of, np.zeros(2), "", None)  # type: ignore[arg-type]
+    return DriveTrains(robot, of, "", None)  # type: ignore[arg-type]
 
 
 def test_gravity_and_inertia_of_a_pendulum() -> None:
@@ -110,7 +110,7 @@ def test_a_step_leaves_the_state_before_it_as_it_was() -> None:
 
 def test_link_angles_lag_behind_their_motors_by_half_the_gap_at_least() -> None:
     of = trains()
-    found = of.link_angles(T, Q)
+    found = of.of_loads(of.dynamics.loads("", T, Q))
     delta = Q - found.q
     assert 3e-3 < np.abs(delta[:, 1]).max() < 3e-3 + 8e-4 * 20.0
     assert (found.low <= found.q + 1e-12).all() and (found.q <= found.high + 1e-12).all()
@@ -120,7 +120,8 @@ def test_drive_trains_come_back_from_json() -> None:
     of = trains()
     read = restored(tuple[DriveTrain, ...], json.loads(json.dumps(plain(of.trains))))
     again = replace(of, trains=read)
-    assert (again.link_angles(T, Q).q == of.link_angles(T, Q).q).all()
+    loads = of.dynamics.loads("", T, Q)
+    assert (again.of_loads(loads).q == of.of_loads(loads).q).all()
 
 
 def test_a_base_that_tilts_and_turns_loads_the_joints_by_its_proper_acceleration() -> None:

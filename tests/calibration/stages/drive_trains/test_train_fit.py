@@ -131,11 +131,6 @@ def test_the_interval_of_an_unknown_start_closes_once_the_gap_was_crossed() -> N
     assert (found.low <= found.value + 1e-12).all() and (found.value <= found.high + 1e-12).all()
 
 
-def test_a_known_start_has_no_interval() -> None:
-    found = TRUTH.backlash(data().motion, np.array([1e-3, 0.0, -1e-3]))
-    assert (found.low == found.high).all()
-
-
 def test_a_load_that_keeps_its_sign_shows_no_gap() -> None:
     load = 5.0 + np.sin(np.linspace(0.0, 60.0, 1000))
     assert not reverses(load, 0.5)
