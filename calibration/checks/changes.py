@@ -34,7 +34,8 @@ _SURE = 5.0  # standard deviations
 _FAR_OFF = 4.0  # tolerances of a body of markers the hand may be off throughout
 _MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
 _LATE, _SLOW = 3e-3, 0.02  # [s]; [rad/s, m/s] below which backlash is not on one side
-_HALF = 0.4  # of a difference between sides that moves the hand [-]
+_NEAR, _UNCLEAR = 3.0, 0.25  # sigma from exchanged; a sigma that leaves sides open [-]
+_OTHERS = 0.06  # of what a gear explains: errors of a hand that follow the difference of a joint's sides
 _WRONG = 3.0  # times what is explained beyond which the effect is not bounded
 
 
@@ -137,7 +138,8 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
     """Joints whose motor reading is where the link is: r = x J_j (motor - link) + J_j w(q_j), x = 1 as they are named.
 
     w are waves of one and two periods a turn, fitted as well: an eccentric encoder of the link adds them to its
-    readings alone and moves no hand. A joint is judged where its sigma separates x = 0 from 1.
+    readings alone and moves no hand. The sigma of x includes what else follows the difference, over its size less
+    waves. Joints nearer to x = 0 than to 1 are named where they are many sigma from 1 together.
     """
     joints, columns = left.hand.nominal.joints, left.hand.nominal.columns
     d = (left.x.q - left.x.link)[:, columns]
@@ -145,20 +147,32 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
     if not len(known):
         return
     q, J = left.x.q[:, columns][:, known], left.J[:, :, known]
-    waves = [J * f(n * q)[:, None] for n in (1, 2) for f in (np.cos, np.sin)]
     d = d[:, known] - np.median(d[:, known], axis=0)
-    value, S, _ = left.fitted(np.concatenate([J * d[:, None], *waves], axis=2), len(known))
-    sigma = np.sqrt(np.diag(S))
-    wrong = (value < _HALF) & (1.0 - value > _SURE * sigma)
-    if wrong.any():
+    waves = _waves(q)
+    others = [_OTHERS * _play(left, description, int(j))[0] for j in known]
+    value, S, _ = left.fitted(np.concatenate([J * x[:, None] for x in (d, *waves)], axis=2), len(known))
+    sigma = np.hypot(np.sqrt(np.diag(S)), others / np.maximum(_less_waves(d, waves).std(axis=0), 1e-9))
+    wrong = (value < 0.5) & (np.abs(value) < _NEAR * sigma)
+    if np.linalg.norm((1.0 - value)[wrong] / sigma[wrong]) > _SURE:
         names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
         message = (
             f"motor and link readings of {names} are exchanged: the motor readings place the hand "
             f"({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
         )
-        unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(_SURE * sigma >= 1.0))
+        unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~wrong & (sigma > _UNCLEAR)))
         message += f"; sides of {unclear} differ too little to be judged, check them too" if unclear else ""
         yield Verdict(STAGE, "refused", f"{message}; exchange the columns")
+
+
+def _waves(q: np.ndarray) -> np.ndarray:
+    """What an eccentric encoder adds at angles q (n, k), by unit size (4, n, k)."""
+    return np.stack([f(n * q) for n in (1, 2) for f in (np.cos, np.sin)])
+
+
+def _less_waves(d: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    """Differences d (n, k) without their means and waves (4, n, k)."""
+    X = np.moveaxis(np.concatenate([np.ones_like(waves[:1]), waves]), (0, 1, 2), (2, 1, 0))
+    return np.asarray(d - (X @ (np.linalg.pinv(X, rcond=1e-6) @ d.T[..., None]))[..., 0].T)
 
 
 def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -> Iterator[Change]:

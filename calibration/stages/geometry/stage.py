@@ -77,7 +77,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     departed, tests = with_departures(hand, parameters, found, used), shown_by(hand, parameters, found, used)
     verdicts += [Verdict(STAGE, "ok", message) for message in departed.shown]
     model = model_of("model_2", chain, parameters, departed.fit)
-    return replace(model, random=found.covariance, absorption=departed.absorbed, tests=tests), tuple(verdicts)
+    return replace(model, random=robust.fit.covariance, absorption=departed.absorbed, tests=tests), tuple(verdicts)
 
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:
