@@ -28,5 +28,5 @@ def find(name_or_path: str | Path) -> Path:
     hint = f"did you mean {' or '.join(close)}? " if close else ""
     raise ScenarioError(
         f"{name_or_path}: no such scenario and no such file; {hint}"
-        f"the scenarios are {', '.join(names()) or '(none)'} (tiago-twin list); a file of your own is given by its path"
+        f"the scenarios are {', '.join(names()) or '(none)'} (tiago-twin list); name a file of your own by its path"
     )
