@@ -55,12 +55,12 @@ def ladder(run: Path) -> str:
 
 
 def screenshot(page: Path, out: Path, browser: str) -> None:
-    """The first screen of a page, 1280 pixels wide, in 128 colours."""
+    """The first screen of a page, 1280 pixels wide."""
     with tempfile.TemporaryDirectory() as folder:
         shot = Path(folder) / "shot.png"
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1280,820"]
         subprocess.run([browser, *options, f"--screenshot={shot}", page.resolve().as_uri()], check=True, timeout=300)
-        Image.open(shot).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(out, optimize=True)
+        Image.open(shot).convert("RGB").save(out, optimize=True)
 
 
 def recorded(folder: Path) -> Path:

@@ -81,3 +81,13 @@ def test_every_line_of_a_page_runs(page, folder):
     options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": 1800}
     done = subprocess.run([sys.executable, "-c", DRIVER], input=json.dumps(list(blocks(page))), **options)
     assert done.returncode == 0, f"{done.stdout[-500:]}\n{done.stderr[-3000:]}"
+
+
+@pytest.mark.slow
+def test_a_scenarios_robot_opens_in_the_viewer_of_mujoco(monkeypatch):
+    viewer = pytest.importorskip("mujoco.viewer", exc_type=ImportError)
+    opened = []
+    monkeypatch.setattr(viewer, "launch", opened.append)
+    (line,) = re.findall(r'`python -c "(import mujoco.viewer, .*)"`', (ROOT / "docs/commands.md").read_text())
+    exec(line, {})
+    assert opened[0].nbody > 20
