@@ -11,6 +11,14 @@ import pytest  # noqa: E402
 from tests.acceptance.claims import keep  # noqa: E402
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures of pages are made but not rendered, which takes half of a page's time."""
+    from scenarios.report import page
+
+    monkeypatch.setattr(page, "svg", lambda figure, name: f'<svg id="{name}"></svg>\n')
+
+
 @pytest.fixture(scope="session")
 def base_r2():
     """R2 (2,) of the base's predicted roll and pitch against the truth, over the validation swings of a run."""

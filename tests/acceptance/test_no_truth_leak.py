@@ -27,14 +27,16 @@ def overwrite_with_noise(path, rng):
                 variable[:] = rng.normal(size=variable.shape)
 
 
-def test_a_dataset_alone_with_noise_for_validation_trials_gives_the_same_estimate(quick_run, tmp_path):
+def test_a_dataset_alone_with_noise_or_garbage_for_validation_trials_gives_the_same_estimate(quick_run, tmp_path):
     dataset = copied(quick_run, tmp_path)
     path, rng = dataset / "dataset.json", np.random.default_rng(0)
     declared = json.loads(path.read_text())
     replaced = [trial for trial in declared["trials"] if trial["role"] != "calibration"]
     assert len(replaced) >= 2
-    for trial in replaced:
+    (dataset / replaced[0]["file"]).write_bytes(b"not a recording")
+    for trial in replaced[1:]:
         overwrite_with_noise(dataset / trial["file"], rng)
+    for trial in replaced:
         trial["sha256"] = sha256(dataset / trial["file"])
     path.write_text(json.dumps(declared))
     steps.calibrate(dataset, tmp_path / "estimate")

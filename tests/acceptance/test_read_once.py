@@ -26,7 +26,7 @@ def counted(monkeypatch, counts, module, name, key):
     monkeypatch.setattr(module, name, count)
 
 
-def test_a_held_out_trial_is_read_once_and_its_wrench_computed_once(folder, tmp_path, monkeypatch):
+def test_a_held_out_trial_is_read_once_and_its_wrench_computed_once(folder, tmp_path, monkeypatch, undrawn):
     copy = shutil.copytree(folder, tmp_path / "copy")
     counts = Counter()
     counted(monkeypatch, counts, datasets, "read_trial", lambda path, *_: path.stem)

@@ -9,7 +9,7 @@ import pytest
 from calibration import calibrate, load, save_estimate
 from calibration.context import Context
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
-from calibration.pipeline import STAGES, _concluded
+from calibration.pipeline import _concluded
 from calibration.recording.trial import sha256
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.geometry.model_of_fit import hand_of
@@ -21,28 +21,12 @@ from tests.doubles.edited_dataset import rewritten
 CALIBRATION = ("postures", "sweep1", "sweep2", "sweep4", "swing")
 
 
-def saved(folder: Path, out: Path) -> dict[str, bytes]:
-    save_estimate(calibrate(load(folder), [s for s in STAGES if s not in ("base_frame", "arm_tool", "bundle")]), out)
-    return {p.name: p.read_bytes() for p in sorted(out.iterdir())}
-
-
 def refused(folder: Path, out: Path | None = None) -> str:
     estimate = calibrate(load(folder), ["geometry"])
     if out is not None:
         save_estimate(estimate, out)
     assert estimate.status == "not_calibrated"
     return " | ".join(v.message for v in estimate.verdicts if v.verdict == "refused")
-
-
-def test_the_estimate_is_a_function_of_the_dataset_folder_s_bytes_alone(folder, estimate, tmp_path):
-    """Copied alone, its held-out trials turned to garbage: the same bytes."""
-    alone = tmp_path / "elsewhere" / "dataset"
-    shutil.copytree(folder, alone)
-    for name in ("xyz", "others"):
-        (alone / "trials" / f"{name}.nc").write_bytes(b"not a recording")
-    save_estimate(estimate, tmp_path / "one")
-    here = {p.name: p.read_bytes() for p in sorted((tmp_path / "one").iterdir())}
-    assert saved(alone, tmp_path / "two") == here
 
 
 def test_intervals_include_what_a_warning_s_cause_may_have_moved(estimate, dataset):

@@ -32,7 +32,7 @@ def insert(path: Path, before: str, text: str) -> None:
 
 def run_script(tree: Path, script: str, *arguments: str) -> None:
     """Run a script in a folder with its copies of packages, everything else from here."""
-    environment = {"PYTHONPATH": f"{tree}:{ROOT}", "MPLBACKEND": "agg"}
+    environment = {"PYTHONPATH": f"{tree}:{ROOT}", "MPLBACKEND": "agg", "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-c", script, *arguments]
     done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

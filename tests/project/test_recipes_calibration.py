@@ -66,16 +66,12 @@ def stage(tmp_path) -> Path:
     return copied(tmp_path, "calibration") / "calibration/stages/geometry"
 
 
-def test_a_parameter_block_is_a_file_and_its_name(stage):
+def test_a_parameter_block_is_a_file_and_its_name_a_residual_a_file_and_an_instance(stage):
     (stage / "eccentricity.py").write_text(recipe("block"), encoding="utf-8")
     listed, mine = stage / "parameters.py", "from calibration.stages.geometry.eccentricity import Eccentricity\n"
     text = listed.read_text(encoding="utf-8")
     assert text.count("FULL: tuple[type[ParameterBlock], ...] = AT_REST") == 1
     named = text.replace("...] = AT_REST", "...] = (*AT_REST, Eccentricity)")
     listed.write_text(named.replace("\nFULL:", f"\n{mine}\nFULL:"), encoding="utf-8")
-    run_script(stage.parents[2], BLOCK)
-
-
-def test_a_residual_is_a_file_and_an_instance(stage):
     (stage / "hand_height.py").write_text(recipe("residual"), encoding="utf-8")
-    run_script(stage.parents[2], RESIDUAL)
+    run_script(stage.parents[2], BLOCK + RESIDUAL)

@@ -15,7 +15,11 @@ from twin.motions import JOINTS, RATE, schedule, trajectory
 from twin.motions.csv_trajectory import InvalidTrajectory, read_trajectory
 
 POSE = [0.12, 1.5, 0.1, -1.55, 0.6, 0.1, 0.1, 0.1]
-SHORT = ["twin.campaign.only=[xyz]", "twin.campaign.validation_swing=2.0", "twin.campaign.rest=1.0"]
+SHORT = ["twin.campaign.only=[xyz, figure_eight]", "twin.campaign.validation_swing=2.0", "twin.campaign.rest=1.0"]
+ADDED = [
+    "twin.defects=[{kind: added_mass, link: arm_5_link, mass: {uniform: [0.2, 0.3]}}]",
+    "twin.instruments.further=[{kind: gyroscope, bias: 1.0e-3, noise: 1.0e-5}]",
+]
 RECORD = """
 import sys
 from pathlib import Path
@@ -25,20 +29,25 @@ record(load("humanoids2024", sys.argv[2:]).twin, 0, Path(sys.argv[1]))
 """
 
 
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory):
+    """A copy of the packages with a defect, an instrument and a motion added, and a short campaign of all three."""
+    tree = copied(tmp_path_factory.mktemp("tree"), "calibration", "mjcf", "scenarios", "twin")
+    add_defect(tree)
+    add_instrument(tree)
+    with (tree / "twin/motions/swings.py").open("a", encoding="utf-8") as file:
+        file.write(recipe("motion"))
+    run_script(tree, RECORD, str(tree / "out"), *SHORT, *ADDED)
+    return tree
+
+
 @pytest.fixture
-def tree(tmp_path):
-    """A copy of the packages."""
-    return copied(tmp_path, "calibration", "mjcf", "scenarios", "twin")
-
-
-def recorded(tree: Path, *overrides: str) -> dict[str, float]:
-    """Parameters of the truth of a short campaign with the packages of a copy."""
-    run_script(tree, RECORD, str(tree / "out"), *SHORT, *overrides)
+def true(tree) -> dict[str, float]:
     truth = json.loads((tree / "out/truth/truth.json").read_text(encoding="utf-8"))
     return {p["name"]: p["value"] for p in truth["parameters"]}
 
 
-def test_a_defect_is_a_file_and_a_line(tree):
+def add_defect(tree: Path) -> None:
     (tree / "twin/defects/added_mass.py").write_text(recipe("defect"), encoding="utf-8")
     face = tree / "twin/defects/__init__.py"
     listed = face.read_text(encoding="utf-8").replace(
@@ -49,11 +58,13 @@ def test_a_defect_is_a_file_and_a_line(tree):
             "from twin.defects.bending", "from twin.defects.added_mass import AddedMass\nfrom twin.defects.bending"
         )
     )
-    true = recorded(tree, "twin.defects=[{kind: added_mass, link: arm_5_link, mass: {uniform: [0.2, 0.3]}}]")
+
+
+def test_a_defect_is_a_file_and_a_line(true):
     assert 0.2 < true["added_mass.arm_5_link.mass"] < 0.3 and true["added_mass.arm_5_link.x"] == 0.0
 
 
-def test_an_instrument_is_a_file_a_line_and_its_channels(tree):
+def add_instrument(tree: Path) -> None:
     (tree / "twin/instruments/gyroscope.py").write_text(recipe("instrument"), encoding="utf-8")
     face = tree / "twin/instruments/__init__.py"
     text = face.read_text(encoding="utf-8")
@@ -67,7 +78,9 @@ def test_an_instrument_is_a_file_a_line_and_its_channels(tree):
     text = layout.read_text(encoding="utf-8").replace("_LABELS = ", f"{recipe('channel')}_LABELS = ", 1)
     last = "    wrist_wrench: np.ndarray = field(default_factory=lambda: _empty(0, 6))\n"
     layout.write_text(text.replace(last, last + recipe("channel-fields")), encoding="utf-8")
-    true = recorded(tree, "twin.instruments.further=[{kind: gyroscope, bias: 1.0e-3, noise: 1.0e-5}]")
+
+
+def test_an_instrument_is_a_file_a_line_and_its_channels(tree, true):
     with netCDF4.Dataset(tree / "out/dataset/trials/xyz.nc") as file:
         seen, t = (np.array(file[name][:]) for name in ("base_angular_velocity", "t_gyroscope"))
         assert (file["base_angular_velocity"].units, file["t_gyroscope"].clock) == ("rad/s", "mocap")
@@ -77,16 +90,13 @@ def test_an_instrument_is_a_file_a_line_and_its_channels(tree):
 
 
 def test_a_motion_is_an_entry(tree):
-    with (tree / "twin/motions/swings.py").open("a", encoding="utf-8") as file:
-        file.write(recipe("motion"))
-    recorded(tree, "twin.campaign.only=[figure_eight]")
-    (trial,) = json.loads((tree / "out/dataset/dataset.json").read_text(encoding="utf-8"))["trials"]
+    _, trial = json.loads((tree / "out/dataset/dataset.json").read_text(encoding="utf-8"))["trials"]
     assert (trial["id"], trial["role"]) == ("figure_eight", "validation")
 
 
-def test_ten_lines_of_python_change_a_defect_simulate_and_plot(tree):
+def test_ten_lines_of_python_change_a_defect_simulate_and_plot(tmp_path):
     run_script(
-        tree,
+        tmp_path,
         recipe("python")
         + "one, other = (line.get_ydata() for line in plt.gca().lines)\nassert 1e-4 < abs(one - other).max() < 0.1\n",
     )

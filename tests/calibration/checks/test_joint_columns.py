@@ -1,6 +1,7 @@
 """Columns of joints swapped, reversed or in degrees, beside the hand's markers: told by name, nothing written."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from tests.doubles import geared_robot, rigid_robot
 A, B = (rigid_robot.JOINTS.index(f"arm_{i}_joint") for i in (5, 6))
 
 
+@cache
 def trials() -> list[tuple[str, str, str, Trial]]:
     """A swing and a sweep of a robot with a real one's zeros (0.1 rad at arm_5), seconds off the markers' clock."""
     rng, truth, found, start = np.random.default_rng(3), rigid_robot.defects(3), [], 20.0
@@ -112,6 +114,11 @@ def test_every_reading_is_recognised(reading):
 
 def two_swings(change) -> list[tuple[str, Trial]]:
     """Two swings of one robot and a sweep; the readings of the second swing are changed."""
+    return [(n, replace(t, q_motor=change(t.q_motor)) if n == "two" else t) for n, t in right_swings()]
+
+
+@cache
+def right_swings() -> list[tuple[str, Trial]]:
     rng, truth = np.random.default_rng(5), rigid_robot.defects(3)
     drives, found = geared_robot.gears(rng), []
     for name, motor in (
@@ -120,7 +127,7 @@ def two_swings(change) -> list[tuple[str, Trial]]:
         ("sweep", geared_robot.sweep(4, 6.0)),
     ):
         trial = geared_robot.record(truth, drives, motor, 20.0, rng, 1e-3)
-        found.append((name, replace(trial, q_motor=change(trial.q_motor)) if name == "two" else trial))
+        found.append((name, trial))
     return found
 
 

@@ -47,7 +47,7 @@ def predicted(days, day, *options):
     return {r["model"]: r["position_rmse_norm_mm"] for r in found}.get("full"), exit.value.code, out
 
 
-def test_a_later_day_is_predicted_from_the_estimate_alone(days):
+def test_a_later_day_is_predicted_from_the_estimate_alone(days, undrawn):
     error, _, out = predicted(days, "same")
     assert error < 0.25 and (out / "report.html").is_file()
     with (out / "predicted.csv").open() as file:
@@ -65,7 +65,7 @@ def test_a_fit_without_a_trial_kept_aside_has_a_report(days):
     assert exit.value.code in (0, None) and (days / "lab/estimate/report.html").is_file()
 
 
-def test_markers_put_on_anew_are_registered_with_a_few_postures(days):
+def test_markers_put_on_anew_are_registered_with_a_few_postures(days, undrawn):
     assert predicted(days, "remounted")[0] > 2.0
     error, _, out = predicted(days, "remounted", "--register", "6")
     assert error < 0.4

@@ -73,6 +73,7 @@ def test_derivatives_are_those_of_the_ties():
         np.testing.assert_allclose(difference, ties(data, planar).C.reshape(-1, planar.size)[:, k], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_rigid_spin_is_estimated_at_the_cramer_rao_bound():
     errors, _ = sampled(300, 0.0)
     bound = np.sqrt(np.diag(fitted(stations(*path())).covariance))[:6]
