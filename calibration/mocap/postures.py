@@ -165,21 +165,26 @@ def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray)
 
 def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray | str, ...]]:
     t_robot = robot.to_mocap(trial.t_robot)
-    bodies = (description.base_body, description.hand_body)
+    dwells = []
     for k, (start, stop) in enumerate(dwell_windows(trial)):
         rows = (t_robot >= start) & (t_robot <= stop)
         seen = np.flatnonzero((trial.t_mocap >= start) & (trial.t_mocap <= stop))
         if not rows.any() or len(seen) < BLOCKS:
             _log.info("%s: dwell %d has no samples", trial.id, k)
             continue
-        whole, blocks = [seen], np.array_split(seen, BLOCKS)
-        base, hand = (mean_poses(body, trial, whole + blocks) for body in bodies)
-        T = inverse(base.T) @ hand.T
+        dwells.append((k, rows, seen))
+    if not dwells:
+        return
+    groups = [part for _, _, seen in dwells for part in (seen, *np.array_split(seen, BLOCKS))]
+    base, hand = (mean_poses(body, trial, groups) for body in (description.base_body, description.hand_body))
+    found = inverse(base.T) @ hand.T
+    for i, (k, rows, seen) in zip(range(0, len(groups), BLOCKS + 1), dwells, strict=True):
+        T = found[i : i + BLOCKS + 1]
         if not np.isfinite(T[0]).all():
             _log.info("%s: base or hand not seen in dwell %d", trial.id, k)
             continue
-        covariance = hand_covariance(T[:1], base.covariance[:1], hand.covariance[:1])[0] / len(seen)
-        misfit = np.sqrt(np.nanmean(np.concatenate([base.residual[0], hand.residual[0]]) ** 2) * 3.0)
+        covariance = hand_covariance(T[:1], base.covariance[i : i + 1], hand.covariance[i : i + 1])[0] / len(seen)
+        misfit = np.sqrt(np.nanmean(np.concatenate([base.residual[i], hand.residual[i]]) ** 2) * 3.0)
         yield (
             trial.q_motor[rows].mean(axis=0),
             T[0],

@@ -121,15 +121,19 @@ def _seen(
 ) -> Iterator[np.ndarray]:
     """Rotation about the column's x and y, and moments, (4,) of each dwell that shows both bodies."""
     t_robot = robot.to_mocap(loads.t)
-    for start, stop in dwell_windows(trial):
-        rows = (t_robot >= start) & (t_robot <= stop)
-        seen = np.flatnonzero((trial.t_mocap >= start) & (trial.t_mocap <= stop))
-        if not rows.any() or not len(seen):
-            continue
-        try:
-            base, other = (mean_poses(b, trial, [seen]).T[0] for b in (description.base_body, body))
-        except NotEnoughData:
-            continue
+    dwells = [
+        ((t_robot >= start) & (t_robot <= stop), np.flatnonzero((trial.t_mocap >= start) & (trial.t_mocap <= stop)))
+        for start, stop in dwell_windows(trial)
+    ]
+    dwells = [(rows, seen) for rows, seen in dwells if rows.any() and len(seen)]
+    if not dwells:
+        return
+    try:
+        both = (mean_poses(b, trial, [seen for _, seen in dwells]).T for b in (description.base_body, body))
+        poses = list(zip(*both, strict=True))
+    except NotEnoughData:
+        return
+    for (rows, _), (base, other) in zip(dwells, poses, strict=True):
         R_base_S = _base(hand)[:3, :3] @ base[:3, :3].T @ other[:3, :3]
         R_base_column = hand.chain.poses(loads.q[rows][:1], hand.chain.joints[0])[0, :3, :3]
         turn = rotation_vector((R_base_column.T @ R_base_S @ _nominal(description, body, hand).T)[None])[0]
