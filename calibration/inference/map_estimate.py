@@ -41,7 +41,7 @@ class Problem:
     Attributes:
         residuals: Each depends on some of the parameters, found by name; random errors of one name are one group.
         parameters: Priors.
-        stated: The random errors are stated beforehand, by a datasheet: none is dropped.
+        stated: The random errors are stated beforehand, by a datasheet: none is dropped, none is zero.
         start: Hyperparameters to begin with; those of `noise` and prior factors of 1 where not given.
     """
 
@@ -153,7 +153,7 @@ def solve(
         settled = change < same
         old = widths
         if not settled and (coarse or problem.stated):
-            widths, _ = maximised(at.rows(some), noise, problem.prior, widths, same)
+            widths, _ = maximised(at.rows(some), noise, problem.prior, widths, same, present=problem.stated)
         elif not settled:
             free, widths = selected(at.rows(some), noise, problem.prior, widths, free, same)
         W = noise.whitener(at, widths.noise)

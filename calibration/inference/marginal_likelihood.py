@@ -104,14 +104,20 @@ def times_upper(A: np.ndarray, R: np.ndarray) -> np.ndarray:
     return blas.dtrmm(1.0, R, A.T, trans_a=1).T
 
 
-def maximised(
-    at: Linearised, noise: Noise, prior: Prior, widths: Hyperparameters, same: float, free: np.ndarray | None = None
+def maximised(  # noqa: PLR0913  the parts of one problem
+    at: Linearised,
+    noise: Noise,
+    prior: Prior,
+    widths: Hyperparameters,
+    same: float,
+    free: np.ndarray | None = None,
+    present: bool = False,
 ) -> tuple[Hyperparameters, LogMarginal]:
     """Hyperparameters of highest evidence for the linearised problem, to a change of their logarithms below `same`.
 
     Only the groups `free` (g,) of those that are, if given, are changed; the evidence, too, is to that accuracy.
     """
-    damping, now = _UNDAMPED, log_marginal(at, noise, prior, widths)
+    damping, now = _UNDAMPED, log_marginal(at, noise, prior, widths, present)
     free = noise.free if free is None else free
     for _ in range(_STEPS):
         f = _prior_factors(prior, now, widths.prior)
@@ -119,7 +125,7 @@ def maximised(
         moved = max(moved_by(widths.noise, v, _NEGLIGIBLE * noise.floor), moved_by(widths.prior, f, 1e-12) / 2.0)
         if moved < same and damping <= _UNDAMPED:
             return Hyperparameters(v, f), now
-        trial = log_marginal(at, noise, prior, Hyperparameters(v, f))
+        trial = log_marginal(at, noise, prior, Hyperparameters(v, f), present)
         if trial.value > now.value + 1e-9 * abs(now.value) and damping < 1e6:
             damping = max(10.0 * damping, 1e-2)
             continue
@@ -130,7 +136,9 @@ def maximised(
     return widths, now
 
 
-def log_marginal(at: Linearised, noise: Noise, prior: Prior, widths: Hyperparameters) -> LogMarginal:
+def log_marginal(
+    at: Linearised, noise: Noise, prior: Prior, widths: Hyperparameters, present: bool = False
+) -> LogMarginal:
     """Evaluate; the slope is by variance, the information that of the postures taken one by one.
 
     Both are zero for groups that are not free.
@@ -153,6 +161,7 @@ def log_marginal(at: Linearised, noise: Noise, prior: Prior, widths: Hyperparame
     groups = np.eye(len(noise.floor))[noise.group[free]]
     value = log_det - 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
     value += float((rest**2).sum() + (precision * off**2).sum()) + prior.held(widths.prior, _HELD)
-    return LogMarginal(
-        0.5 * value, groups.T @ slope, groups.T @ together @ groups, off * scale, (spread**2).sum(axis=1) * scale**2
-    )
+    v = np.where(noise.free & present, widths.noise, np.inf) ** 2
+    value -= float(np.log(v[np.isfinite(v)]).sum())
+    by_v, fisher = groups.T @ slope - 0.5 / v, groups.T @ together @ groups + np.diag(0.5 / v**2)
+    return LogMarginal(0.5 * value, by_v, fisher, off * scale, (spread**2).sum(axis=1) * scale**2)
