@@ -50,7 +50,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     start, floor = reading_sigma(chain, description), reading_floor(chain, description)
     errors = NoiseModel(np.maximum(start, floor), floor, np.zeros(0), stated=True)
     robust = fit_robustly(hand, parameters, postures, errors)
-    found = replace(robust.fit, covariance=small_sample_covariance(robust.fit))
+    found = robust.fit
     known = identifiability(found.J_white, parameters)
     oriented = postures.components == 6
     frames = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
@@ -74,10 +74,11 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
         message = "a point of the hand was seen: hand orientation is not observable and fixed at nominal"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
     used = postures.rows(robust.kept)
-    departed, tests = with_departures(hand, parameters, found, used), shown_by(hand, parameters, found, used)
+    wider = replace(found, covariance=small_sample_covariance(found))
+    departed, tests = with_departures(hand, parameters, wider, used), shown_by(hand, parameters, found, used)
     verdicts += [Verdict(STAGE, "ok", message) for message in departed.shown]
     model = model_of("model_2", chain, parameters, departed.fit)
-    return replace(model, random=robust.fit.covariance, absorption=departed.absorbed, tests=tests), tuple(verdicts)
+    return replace(model, random=found.covariance, absorption=departed.absorbed, tests=tests), tuple(verdicts)
 
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:
