@@ -74,11 +74,14 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
         message = "a point of the hand was seen: hand orientation is not observable and fixed at nominal"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
     used = postures.rows(robust.kept)
-    wider = replace(found, covariance=small_sample_covariance(found))
-    departed, tests = with_departures(hand, parameters, wider, used), shown_by(hand, parameters, found, used)
+    departed = with_departures(hand, parameters, replace(found, covariance=small_sample_covariance(found)), used)
     verdicts += [Verdict(STAGE, "ok", message) for message in departed.shown]
-    model = model_of("model_2", chain, parameters, departed.fit)
-    return replace(model, random=found.covariance, absorption=departed.absorbed, tests=tests), tuple(verdicts)
+    return replace(
+        model_of("model_2", chain, parameters, departed.fit),
+        random=found.covariance,
+        absorption=departed.absorbed,
+        tests=shown_by(hand, parameters, found, used),
+    ), tuple(verdicts)
 
 
 def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel) -> RobustFit:
