@@ -14,6 +14,7 @@ A fit without a trial is one Gauss-Newton step from the fit of all. c windows ha
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from calibration.stages.drive_trains.train_fit import (
     FLOORS,
     Problem,
     TrainFit,
+    cost,
     derivatives,
     evaluated,
     fit_train,
@@ -48,6 +50,7 @@ _TRIED = 3
 _SLIPS, _LIKELY = (0.1, 0.4, 2.0), 2  # [N.m]; starts
 _HINT = 6.0  # cost that friction in the mesh must save in one trial
 _BETTER = 10.0  # score by which a richer form must win
+_PATTERN, _WORTH = (1.0, 0.5, 0.25), 0.5  # steps of a search [standard deviations], and the cost worth one
 _DAMPED = 0.02  # share of the information that damps a step without a trial
 
 
@@ -163,9 +166,34 @@ def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
     elif problem.believes(steady.information, COULOMB):
         found = [_continued(steady, of) for of in (moving, still)]
     else:
-        fits = [evaluated(of, steady.theta, steady.gamma) for of in (moving, still)]
-        found = [_predicting(fit, steady.without(fit.problem), steady.covariance) for fit in fits]
+        theta = _loaded(steady, moving)
+        fits = [evaluated(of, theta, steady.gamma) for of in (moving, still)]
+        off = np.append(theta - steady.theta, np.zeros_like(steady.gamma))
+        found = [_predicting(fit, steady.without(fit.problem) + off, steady.covariance) for fit in fits]
     return found[1] if found[1].score < found[0].score - _BETTER else found[0]
+
+
+def _loaded(steady: SteadyContact, problem: Problem) -> np.ndarray:
+    """Theta (p,) with the modes of the load that the other windows show; steady contact hardly tells a stiff joint's.
+
+    Pattern search, no derivatives: a change of side is a kink. All else is as steady contact has it.
+    """
+    whole, found, gamma = steady.continued(problem), steady.theta, steady.gamma
+    step, least = np.diag(np.sqrt(np.diag(steady.covariance))[: len(found)]), _unexplained(whole, found, gamma)
+    modes = step[len(found) - problem.data.modes.shape[1] :]
+    for share, mode, sign in product(_PATTERN, modes, (1.0, -1.0)):
+        while (left := _unexplained(whole, found + sign * share * mode, gamma)) < least - _WORTH:
+            found, least = found + sign * share * mode, left
+    return found
+
+
+def _unexplained(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> float:
+    """What the modes minimise: cost and sizes of what is left [-]."""
+    difference = problem.data.y - problem.deltas(theta, gamma)
+    scales = sizes(problem, difference - problem.data.terms @ gamma, FLOORS[1])
+    count = np.bincount(problem.data.group[problem.data.known], minlength=len(scales))
+    total = cost(problem, theta, difference, gamma, scales)
+    return total + float((count * np.log(scales)).sum()) / problem.correlated
 
 
 def _continued(steady: SteadyContact, problem: Problem) -> Candidate:
