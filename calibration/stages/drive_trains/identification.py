@@ -7,9 +7,10 @@ hundredths of a newton metre: as `torque_sigma` it decides where the side of a m
 
 The form that holds is the one that predicts trials left out best:
 
-    score = 1 / c sum_t n_t log s_t        s_t  size of what a fit without trial t leaves of trial t
+    score = 1 / c sum_t n_t log s_t        s_t  size of what a fit without trial t leaves of trial t in motion
 
-A fit without a trial is one Gauss-Newton step from the fit of all. c windows hang together.
+A fit without a trial is one Gauss-Newton step from the fit of all. c windows hang together. Where a link rests is left
+out: a stop or a jolt before decides it, whatever the form.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from itertools import product
 import numpy as np
 
 from calibration.stages.drive_trains.drive_train import DriveTrain
-from calibration.stages.drive_trains.joint_data import JointData
+from calibration.stages.drive_trains.joint_data import REST, JointData
 from calibration.stages.drive_trains.link_motion import COULOMB
 from calibration.stages.drive_trains.quantities import covariance_of, reported
 from calibration.stages.drive_trains.steady_contact import SteadyContact, steady_contact
@@ -229,8 +230,8 @@ def _predicting(fit: TrainFit, without: np.ndarray, covariance: np.ndarray) -> C
     for i, x in enumerate(without):
         left[data.trial == i] = replace(problem, data=data.only(i)).left(x[:n], x[n:])
     size = sizes(problem, left, FLOORS[-1])
-    count = np.bincount(data.group[data.known], minlength=len(size))
-    score = float((count * np.log(size)).sum()) / problem.correlated
+    moves = data.group[data.known & (data.regime != REST)]
+    score = float((np.bincount(moves, minlength=len(size)) * np.log(size)).sum()) / problem.correlated
     return Candidate(fit, score, float(np.sqrt(np.nanmean(left**2))), covariance)
 
 

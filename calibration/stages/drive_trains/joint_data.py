@@ -17,7 +17,7 @@ from calibration.stages.drive_trains.torques import LinkLoads
 WINDOW, COARSE = 0.1, 0.5  # [s]
 CORRELATED = 1.5  # [s] readings' errors hang together
 _START = 0.3  # [s] of a trial's rest that show where delta starts
-REGIMES = 3
+REGIMES, REST = 3, 2
 _FEW = 20  # windows
 _SLIDES, _RESTS = 0.05, 0.01  # [rad/s] a motor that moves all through a window, or does not
 _STEADY = 1.5  # [rad/s2]
@@ -155,4 +155,4 @@ def _regimes(motion: DriveMotion, first: np.ndarray) -> np.ndarray:
     v, a = np.abs(motion.v), np.abs(motion.a)
     slides = (np.minimum.reduceat(v, first) > _SLIDES) & (np.maximum.reduceat(a, first) < _STEADY)
     rests = np.maximum.reduceat(v, first) < _RESTS
-    return np.where(slides, 0, np.where(rests, 2, 1))
+    return np.where(slides, 0, np.where(rests, REST, 1))
