@@ -167,14 +167,14 @@ def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
     elif problem.believes(steady.information, COULOMB):
         found = [_continued(steady, of) for of in (moving, still)]
     else:
-        theta = _loaded(steady, moving)
+        theta = loaded_theta(steady, moving)
         fits = [evaluated(of, theta, steady.gamma) for of in (moving, still)]
         off = np.append(theta - steady.theta, np.zeros_like(steady.gamma))
         found = [_predicting(fit, steady.without(fit.problem) + off, steady.covariance) for fit in fits]
     return found[1] if found[1].score < found[0].score - _BETTER else found[0]
 
 
-def _loaded(steady: SteadyContact, problem: Problem) -> np.ndarray:
+def loaded_theta(steady: SteadyContact, problem: Problem) -> np.ndarray:
     """Theta (p,) with the modes of the load that the other windows show; steady contact hardly tells a stiff joint's.
 
     Pattern search, no derivatives: a change of side is a kink. All else is as steady contact has it.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
+from calibration.stages.drive_trains.identification import loaded_theta
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.quantities import covariance_of, reported, reverses
 from calibration.stages.drive_trains.steady_contact import slipped_encoder, steady_contact
@@ -153,3 +154,17 @@ def test_a_link_encoder_that_slips_is_found_with_its_trial(size: float) -> None:
         assert found is not None and found.trial_id == "b"
         assert found.t == pytest.approx(0.6 * SECONDS, abs=1.0)
         assert found.size == pytest.approx(size, rel=0.05)
+
+
+def test_a_stiff_joint_s_load_is_what_its_changes_of_side_show() -> None:
+    """0.25 N.m that the nominal masses leave out wind its mesh up by 25 urad, and move when it changes sides."""
+    stiff = replace(TRUTH, values=np.array([3e-3, 1e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]))
+    of_data = data(stiff)
+    unknown, motion = np.full((len(of_data.motion.q), 1), 0.25), of_data.motion
+    of_data = replace(of_data, modes=unknown, motion=replace(motion, torque=motion.torque - 0.25))
+    of = problem(of_data)
+    theta = np.append(stiff.values[:4], [0.0, 0.0])
+    steady = steady_contact(of, theta, ECCENTRICITY)
+    assert steady is not None and np.sqrt(steady.covariance[5, 5]) > 0.3
+    found = loaded_theta(replace(steady, theta=theta, gamma=ECCENTRICITY), of)
+    assert found[-1] == pytest.approx(1.0, abs=0.15) and (found[:-1] == theta[:-1]).all()
