@@ -167,29 +167,35 @@ def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
     elif problem.believes(steady.information, COULOMB):
         found = [_continued(steady, of) for of in (moving, still)]
     else:
-        theta = loaded_theta(steady, moving)
-        fits = [evaluated(of, theta, steady.gamma) for of in (moving, still)]
-        off = np.append(theta - steady.theta, np.zeros_like(steady.gamma))
-        found = [_predicting(fit, steady.without(fit.problem) + off, steady.covariance) for fit in fits]
+        steady = loaded(steady, moving)
+        fits = [evaluated(of, steady.theta, steady.gamma) for of in (moving, still)]
+        found = [_predicting(fit, steady.without(fit.problem), steady.covariance) for fit in fits]
     return found[1] if found[1].score < found[0].score - _BETTER else found[0]
 
 
-def loaded_theta(steady: SteadyContact, problem: Problem) -> np.ndarray:
-    """Theta (p,) with the modes of the load that the other windows show; steady contact hardly tells a stiff joint's.
+def loaded(steady: SteadyContact, problem: Problem) -> SteadyContact:
+    """The same with the modes of the load that the other windows show; steady contact hardly shows a stiff joint's.
 
-    Pattern search, no derivatives: a change of side is a kink. All else is as steady contact has it.
+    Pattern search, no derivatives: a change of side is a kink. What hangs together with a mode moves with it.
     """
-    whole, found, gamma = steady.continued(problem), steady.theta, steady.gamma
-    step, least = np.diag(np.sqrt(np.diag(steady.covariance))[: len(found)]), _unexplained(whole, found, gamma)
-    modes = step[len(found) - problem.data.modes.shape[1] :]
+    whole, C, p = steady.continued(problem), steady.covariance, len(steady.theta)
+    modes = (C / np.sqrt(np.diag(C))).T[p - problem.data.modes.shape[1] : p]
+    found, least = steady, _unexplained(whole, steady)
     for share, mode, sign in product(_PATTERN, modes, (1.0, -1.0)):
-        while (left := _unexplained(whole, found + sign * share * mode, gamma)) < least - _WORTH:
-            found, least = found + sign * share * mode, left
+        step = sign * share * mode
+        while True:
+            theta = np.maximum(found.theta + step[:p], problem.prior.least)
+            moved = replace(found, theta=theta, gamma=found.gamma + step[p:])
+            left = _unexplained(whole, moved)
+            if left >= least - _WORTH:
+                break
+            found, least = moved, left
     return found
 
 
-def _unexplained(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> float:
+def _unexplained(problem: Problem, at: SteadyContact) -> float:
     """What the modes minimise: cost and sizes of what is left [-]."""
+    theta, gamma = at.theta, at.gamma
     difference = problem.data.y - problem.deltas(theta, gamma)
     scales = sizes(problem, difference - problem.data.terms @ gamma, FLOORS[1])
     count = np.bincount(problem.data.group[problem.data.known], minlength=len(scales))
