@@ -185,12 +185,56 @@ def to_vector(T: np.ndarray) -> np.ndarray:
 
 def rotation_vector(R: np.ndarray) -> np.ndarray:
     """log3 of rotations (..., 3, 3), (..., 3) [rad]; NaN where R is NaN."""
-    flat = R.reshape(-1, 3, 3)
-    finite = np.isfinite(flat).all(axis=(1, 2))
+    flat = np.ascontiguousarray(R, dtype=float).reshape(-1, 3, 3)
     out = np.full((len(flat), 3), np.nan)
-    if finite.any():
+    if not _vectors(flat, out):  # some are no rotations: their nearest ones, or an error
+        finite = np.isfinite(flat).all(axis=(1, 2))
         out[finite] = Rotation.from_matrix(flat[finite]).as_rotvec()
     return out.reshape(*R.shape[:-2], 3)
+
+
+@njit(cache=True, error_model="numpy")
+def _is_rotation(A: np.ndarray) -> bool:
+    """Whether the rows of A (3, 3) are orthonormal and right-handed."""
+    for i in range(3):
+        for j in range(i, 3):
+            dot = A[i, 0] * A[j, 0] + A[i, 1] * A[j, 1] + A[i, 2] * A[j, 2]
+            if abs(dot - (i == j)) > (1e-5 if i == j else 1e-12):
+                return False
+    x = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
+    y = A[1, 2] * A[2, 0] - A[1, 0] * A[2, 2]
+    z = A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0]
+    return A[0, 0] * x + A[0, 1] * y + A[0, 2] * z > 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _vectors(R: np.ndarray, out: np.ndarray) -> bool:
+    """`rotation_vector` of finite R (n, 3, 3) into `out` (n, 3), by quaternions; False where one is no rotation."""
+    q = np.empty(4)
+    for n in range(len(R)):
+        A = R[n]
+        if not np.isfinite(A.sum()):
+            continue
+        if not _is_rotation(A):
+            return False
+        trace, i = A[0, 0] + A[1, 1] + A[2, 2], 0
+        for j in range(1, 3):
+            i = j if A[j, j] > A[i, i] else i
+        i = 3 if trace > A[i, i] else i
+        j, k = (i + 1) % 3, (i + 2) % 3
+        if i == 3:
+            q[0], q[1], q[2], q[3] = A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1], 1.0 + trace
+        else:
+            q[i], q[j], q[k] = 1.0 - trace + 2.0 * A[i, i], A[j, i] + A[i, j], A[k, i] + A[i, k]
+            q[3] = A[k, j] - A[j, k]
+        q /= np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2) * (-1.0 if q[3] < 0.0 else 1.0)
+        angle = 2.0 * np.arctan2(np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2), q[3])
+        if angle > 1e-3:
+            scale = angle / np.sin(0.5 * angle)
+        else:
+            scale = 2.0 + angle**2 / 12.0 + 7.0 * angle**4 / 2880.0
+        out[n, 0], out[n, 1], out[n, 2] = scale * q[0], scale * q[1], scale * q[2]
+    return True
 
 
 def skew(v: np.ndarray) -> np.ndarray:
