@@ -30,7 +30,7 @@ def test_a_held_out_trial_is_read_once_and_its_wrench_computed_once(folder, tmp_
     copy = shutil.copytree(folder, tmp_path / "copy")
     counts = Counter()
     counted(monkeypatch, counts, datasets, "read_trial", lambda path, *_: path.stem)
-    counted(monkeypatch, counts, base_response, "dynamics_load", lambda lab, trial, *_: trial.id)
+    counted(monkeypatch, counts, base_response.WrenchSources, "dynamics_load", lambda lab, trial, *_: trial.id)
     monkeypatch.setattr(separable_fit, "project", None)  # evaluate fits nothing
     steps.evaluate(copy / "estimate", copy / "dataset", copy, copy / "truth")
     steps.report(copy)
