@@ -76,13 +76,13 @@ class Prospect:
 
     def sigma(self, C: np.ndarray) -> np.ndarray:
         """(p,) standard deviations of the parameters at covariance C of x [m, rad]."""
-        expected = np.einsum("pr,rs,ps->p", self.V, C, self.V)
+        expected = ((self.V @ C) * self.V).sum(axis=1)
         outside = 1.0 - (self.V**2).sum(axis=1)
         return np.asarray(self.scale * np.sqrt(np.maximum(expected + outside, 0.0)))
 
     def hand(self, C: np.ndarray, m: np.ndarray | None = None) -> np.ndarray:
         """(e,) root mean square error of the hand's position at covariance C of x, nuisances pulling by m [m]."""
-        noise = np.einsum("eij,jk,eik->e", self.P, C, self.P)
+        noise = ((self.P @ C) * self.P).sum(axis=(1, 2))
         if m is None:
             return np.asarray(np.sqrt(noise))
         return np.asarray(np.sqrt(noise + ((self.P @ (C @ m) - self.Z) ** 2).sum(axis=(1, 2))))

@@ -122,7 +122,8 @@ TORSION = {
 
 
 @pytest.mark.parametrize(
-    ("axes", "ground"), [pytest.param("z", "contact", marks=pytest.mark.slow), ("xyz", "contact"), ("xyz", "anchored")]
+    ("axes", "ground"),
+    [*(pytest.param(axes, "contact", marks=pytest.mark.slow) for axes in TORSION), ("xyz", "anchored")],
 )
 def test_torsion_is_carried_to_the_floor(nominal, axes, ground):
     twin, wheels = standing(nominal, *TORSION[axes], f"twin.base.wheels={ground}")
