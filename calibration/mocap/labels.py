@@ -167,7 +167,7 @@ def _clearest(found: np.ndarray) -> np.ndarray:
 
 
 def _apart(p: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """rms distance (n,) [m] of markers p (n, m, 3) from their places; infinite where no place is known."""
+    """rms distance (n,) [m] of markers p (n, m, 3) from their places; infinite where fewer than three are known."""
     d = ((p - places) ** 2).sum(axis=2)
     known = np.isfinite(d).sum(axis=1)
     return np.where(known >= 3, np.sqrt(np.nansum(d, axis=1) / np.maximum(known, 1)), np.inf)
@@ -198,7 +198,7 @@ def without_jumps(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
         return p
     whole = _completed(xyz, p[rows])
     before, after = whole[:-1], whole[1:]
-    jumped = np.flatnonzero(_distance(after, before) > _JUMP * shortest_edge(xyz))
+    jumped = np.flatnonzero(_apart(after, before) > _JUMP * shortest_edge(xyz))
     exchanged = _exchanges(xyz, np.diff(t[rows])[jumped], before[jumped], after[jumped])
     if (exchanged == np.arange(len(xyz))).all():
         return p
@@ -233,15 +233,8 @@ def _exchanges(xyz: np.ndarray, dt: np.ndarray, before: np.ndarray, after: np.nd
     """For each jump (k,) from `before` to `after` (k, m, 3) the order P (k, m) that explains it, or the identity."""
     orders = np.array(list(permutations(range(len(xyz)))))
     turns = np.linalg.norm(rotation_vector(body_poses(xyz, xyz[orders]).T[:, :3, :3]), axis=1)
-    d = np.array([_distance(after, before[:, order]) for order in orders])
+    d = np.array([_apart(after, before[:, order]) for order in orders])
     d[1:][turns[1:, None] <= _FASTEST * dt] = np.inf
     best = np.argmin(d, axis=0)
     clear = d[best, np.arange(len(dt))] * _CLEAR_JUMP < d[0]
     return np.asarray(orders[np.where(clear, best, 0)])
-
-
-def _distance(p: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """rms distance (n,) [m] of markers (n, m, 3) seen in both; infinite for fewer than three."""
-    d = ((p - other) ** 2).sum(axis=2)
-    seen = np.isfinite(d).sum(axis=1)
-    return np.where(seen >= 3, np.sqrt(np.nansum(d, axis=1) / np.maximum(seen, 1)), np.inf)
