@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from tests.hostile import random_cases
 from tests.hostile.case import Case, Judged, judged
 from tests.hostile.child import MEMORY, SECONDS
 from tests.hostile.laboratory import copied, make
@@ -23,6 +24,7 @@ Bounds of every row: {MEMORY / 2**30:.0f} GB beyond the start of the process, {S
 nothing written outside `--out`, nothing left half-written.
 
 """
+_RANDOM = "## Mistakes at random, and clean campaigns"
 _COLUMNS = (
     "kind", "cases", "refused by name", "done", "tracebacks or crashes", "written outside", "other faults",
     "most memory [MB]", "longest [s]",
@@ -53,6 +55,12 @@ def _line(cells: Sequence[object]) -> str:
     return f"| {' | '.join(map(str, cells))} |"
 
 
+def write(table: str | None = None) -> None:
+    """The page: the table, that of the page where None, then what came of the mistakes at random."""
+    table = PAGE.read_text(encoding="utf-8").removeprefix(_HEAD).partition(_RANDOM)[0] if table is None else table
+    PAGE.write_text(f"{_HEAD}{table.strip()}\n\n{_RANDOM}\n\n{random_cases.counts()}", encoding="utf-8")
+
+
 def main() -> None:
     """Try every row; write the page."""
     lines, every = [], []
@@ -69,7 +77,7 @@ def main() -> None:
             lines.append(row(group, found))
             every += found
     table = [_line(_COLUMNS), "|---" * len(_COLUMNS) + "|", *lines, row("all", every)]
-    PAGE.write_text(_HEAD + "\n".join(table) + "\n", encoding="utf-8")
+    write("\n".join(table))
     sys.exit(any(one.wrong for one in every))
 
 

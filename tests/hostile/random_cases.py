@@ -61,24 +61,28 @@ def rows() -> list[list[str]]:
     return list(csv.reader(TABLE.open(encoding="utf-8")))[1:] if TABLE.is_file() else []
 
 
-def counts() -> Sequence[str]:
-    """Sentences for the page."""
+def counts() -> str:
+    """What came of them, for docs/reliability.md."""
     every = rows()
     spoilt, good = [r for r in every if r[1]], [r for r in every if not r[1]]
-    silent = [r for r in spoilt if _silent(r)]
-    harmless = sum(r[2] == "True" and not r[3] for r in spoilt) - len(silent)
-    said = [r for r in good if r[3]]
-    return (
-        f"Mistakes at random (kind, size, joint, body, time), of {len({r[0] for r in spoilt})} sampled robots: "
-        f"{len(spoilt)}; named {sum(bool(r[3]) for r in spoilt)}, harmless {harmless}, silently wrong {len(silent)} "
-        "(error on unseen motion twice the clean one and over 1 mm, no verdict).",
-        f"Clean campaigns of sampled robots and instruments: {len(good)}; warned of or refused {len(said)}.",
-        *(f"- robot {r[0]}, {r[1]}: {r[4]} mm, clean {r[5]} mm" for r in silent),
-        *(f"- robot {r[0]}, clean: {r[3]}" for r in said),
-    )
+    silent, said = [r for r in spoilt if silent(r)], [r for r in good if r[3]]
+    named = sum(bool(r[3]) for r in spoilt)
+    lines = [
+        "Kind, size, joint, body and time at random, on campaigns of a minute of sampled robots (`short --quick`);",
+        "`python -m tests.hostile.random_cases FIRST ROBOTS MISTAKES` adds to `results/random_cases.csv`, a row each.",
+        "",
+        f"- {len(spoilt)} mistakes on {len({r[0] for r in spoilt})} robots: {named} named, "
+        f"{len(spoilt) - named - len(silent)} harmless, {len(silent)} silently wrong",
+        "  (no verdict, the error on unseen motion over 1 mm and twice the clean one)",
+        *(f"    - robot {r[0]}, {r[1]}: {r[4]} mm, clean {r[5]} mm" for r in silent),
+        f"- {len(good)} clean campaigns: {len(said)} warned of or refused",
+        *(f"    - robot {r[0]}: {r[3]}" for r in said),
+    ]
+    return "\n".join(lines) + "\n"
 
 
-def _silent(row: Sequence[str]) -> bool:
+def silent(row: Sequence[str]) -> bool:
+    """Whether a row is of a mistake that no verdict names and that matters."""
     return Tried(row[1], row[2] == "True", (row[3],) if row[3] else (), float(row[4]), float(row[5])).silently_wrong
 
 
@@ -95,10 +99,13 @@ def main(first: int, robots: int, mistakes: int) -> None:
             for t in tried_robot(seed, mistakes, Path(place)):
                 said = t.said[0][:_SAID].replace("\n", " ") if t.said else ""
                 found.append([str(seed), t.name, str(t.calibrated), said, f"{t.error:.3f}", f"{t.clean:.3f}"])
-                if (_silent(found[-1]) and t.name) or (said and not t.name):
+                if (silent(found[-1]) and t.name) or (said and not t.name):
                     print(*found[-1], flush=True)
         _write(sorted(found, key=lambda r: int(r[0])))
 
 
 if __name__ == "__main__":
+    from tests.hostile.page import write
+
     main(*map(int, sys.argv[1:4]))
+    write()

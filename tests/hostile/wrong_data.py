@@ -67,7 +67,7 @@ FAST = (
 )
 TABLE = (
     *FAST,
-    Mistake("hand drawn 50 mm off", drawn_off("gripper", [0.05, 0.0, 0.0]), "from where they are drawn"),
+    Mistake("hand drawn 50 mm off", drawn_off("gripper", [0.05, 0.0, 0.0]), "from their nominal place"),
     Mistake("arm_4 gain 3 %", gain(4, 0.03), "arm_4_joint are off in scale"),
     Mistake("arm_2 gain -2 %", gain(2, -0.02), "arm_2_joint are off in scale"),
     Mistake("arm_3 slips by 1 deg", slip(3, 0.0175, 0.5), SLIPPED),

@@ -56,7 +56,7 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     frames = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
     refused = [*unusable_data(chain, postures.q, frames, postures.components)]
     unclear, scarce = list(too_little(known, CONDITION[postures.components])), few(chain, postures)
-    refused = refused or [*([] if scarce else unclear), *implausible(parameters, found, start, hand)]
+    refused = refused or [*([] if scarce else unclear), *implausible(parameters, robust.fit, start, hand)]
     verdicts = [Verdict(STAGE, "refused", message) for message in refused]
     if scarce and not refused:
         message = f"fewer than the {recommended(chain, postures.components)} distinct postures recommended"
