@@ -65,16 +65,16 @@ def counts() -> str:
     """What came of them, for docs/reliability.md."""
     every = rows()
     spoilt, good = [r for r in every if r[1]], [r for r in every if not r[1]]
-    silent, said = [r for r in spoilt if silent(r)], [r for r in good if r[3]]
+    wrong, said = [r for r in spoilt if silent(r)], [r for r in good if r[3]]
     named = sum(bool(r[3]) for r in spoilt)
     lines = [
         "Kind, size, joint, body and time at random, on campaigns of a minute of sampled robots (`short --quick`);",
         "`python -m tests.hostile.random_cases FIRST ROBOTS MISTAKES` adds to `results/random_cases.csv`, a row each.",
         "",
         f"- {len(spoilt)} mistakes on {len({r[0] for r in spoilt})} robots: {named} named, "
-        f"{len(spoilt) - named - len(silent)} harmless, {len(silent)} silently wrong",
+        f"{len(spoilt) - named - len(wrong)} harmless, {len(wrong)} silently wrong",
         "  (no verdict, the error on unseen motion over 1 mm and twice the clean one)",
-        *(f"    - robot {r[0]}, {r[1]}: {r[4]} mm, clean {r[5]} mm" for r in silent),
+        *(f"    - robot {r[0]}, {r[1]}: {r[4]} mm, clean {r[5]} mm" for r in wrong),
         f"- {len(good)} clean campaigns: {len(said)} warned of or refused",
         *(f"    - robot {r[0]}: {r[3]}" for r in said),
     ]
