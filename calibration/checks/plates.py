@@ -29,6 +29,7 @@ _OUTSIDE = 0.03  # [m] the centre of pressure may be outside the wheels
 _WEIGHT = 1.4  # believable ratio of measured to nominal weight, or its inverse [-]
 _NEAR = 0.07  # [m] between a wheel and the centre of pressure of what a plate misses
 _SURE = 2.5  # standard deviations of the nominal weight
+_BORNE = 0.1  # share of the weight that a wheel may bear [-]
 _TURNED, _WRONG = np.radians(4.0), np.radians(20.0)  # plate to lab: doubtful, not usable [rad]
 _MIRRORED = -0.5  # correlation [-]
 _ALIKE = 0.7  # share of common motion of two pairs of moments between which an angle means something [-]
@@ -97,13 +98,14 @@ def _against_dynamics(
         yield Verdict(STAGE, "refused", message)
         return
     spread = weight_spread(lab)
-    if abs(-rest[2] / weight - 1.0) > _SURE * spread:
+    missing = rest - np.median([f.rest for f in dynamics], axis=0)
+    off = _off_plate(lab.description, missing)
+    if abs(-rest[2] / weight - 1.0) > (min(_BORNE, _SURE * spread) if off else _SURE * spread):
         message = (
             f"plate scale: it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} +- "
             f"{weight * spread:.0f} N: springs would be off by as much; see its gain, or a load nobody declared"
         )
-        missing = rest - np.median([f.rest for f in dynamics], axis=0)
-        if off := _off_plate(lab.description, missing):
+        if off:
             message += f"; what is missing is as if {off} stood off the plate"
         yield Verdict(STAGE, "warning", message)
     pairs = _slow(plate, dynamics)
