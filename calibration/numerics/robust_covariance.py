@@ -59,11 +59,6 @@ class BlockCovariance:
     length: int
     correlation: float
 
-    @property
-    def enough(self) -> bool:
-        """Whether the blocks are as many as intervals from them should have."""
-        return self.blocks >= ENOUGH
-
 
 def block_covariance(
     J: Sequence[np.ndarray], r: Sequence[np.ndarray], prior: np.ndarray | None = None

@@ -30,12 +30,10 @@ class Lag:
     Attributes:
         value: t = s + value [s], s the time on the other clock.
         sigma: Standard deviation [s].
-        explained: Share of y's variance explained [-].
     """
 
     value: float
     sigma: float
-    explained: float
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ def fit_lag(pair: Pair, start: float, drift: float = 0.0) -> Lag:
             f"the records do not show the same motion (explained {explained:.2f}, lag moved {lag - start:+.3f} s)"
         )
     psi = (slope * r / (slope @ slope)).reshape(-1, y.x.shape[1]).sum(axis=1)
-    return Lag(lag, float(np.sqrt(long_run_variance(psi, RATE))), explained)
+    return Lag(lag, float(np.sqrt(long_run_variance(psi, RATE))))
 
 
 def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

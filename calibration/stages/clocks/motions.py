@@ -19,7 +19,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
-from calibration.stages.clocks.plate_moments import Carrier, JointMotion, model_moments, plate_moments
+from calibration.stages.clocks.plate_moments import Carrier, JointMotion, length, model_moments, plate_moments
 from calibration.stages.clocks.pose_refinement import Provisional, link_angles
 
 _CUTOFF = 6.0  # robot [Hz]
@@ -49,17 +49,13 @@ def robot_motions(description: Description, chain: Chain, trials: Sequence[Trial
         yield Motion(trial.id, Pair(_aligned(y, x), x, nuisance, np.zeros((len(y.t), 0, 3))))
 
 
-def _speed(signal: Signal) -> Signal:
-    return replace(signal, x=np.linalg.norm(signal.x, axis=1, keepdims=True))
-
-
 def _aligned(y: Signal, x: Signal) -> Signal:
     """Vectors y (n, 3) turned by the one rotation that brings it closest to x (n, 3), each on its own clock.
 
     The speeds alone, which need no rotation, give the lag for it. They are not compared further: noise only ever
     adds to a speed near zero, which is where backlash shows.
     """
-    s = y.t - coarse_lag(_speed(y), _speed(x))
+    s = y.t - coarse_lag(length(y), length(x))
     at = interpolate_columns(s, x.t, x.x, 0.0)
     U, _, Vt = np.linalg.svd(y.x.T @ at)
     return replace(y, x=y.x @ U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)

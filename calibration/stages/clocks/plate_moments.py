@@ -173,7 +173,7 @@ def plate_axes(pairs: Sequence[Pair]) -> np.ndarray:
     C = np.zeros((2, 2))
     for pair in pairs:
         y, x = _centred(pair.y), _centred(pair.x)
-        s = y.t - coarse_lag(_length(y), _length(x))
+        s = y.t - coarse_lag(length(y), length(x))
         at = interpolate_columns(s, x.t, x.x, 0.0)
         C += y.x.T @ at
     U, _, Vt = np.linalg.svd(C)
@@ -186,5 +186,6 @@ def _centred(signal: Signal) -> Signal:
     return replace(signal, x=signal.x - signal.x.mean(axis=0))
 
 
-def _length(signal: Signal) -> Signal:
+def length(signal: Signal) -> Signal:
+    """Norm (n, 1) of each sample."""
     return replace(signal, x=np.linalg.norm(signal.x, axis=1, keepdims=True))

@@ -169,7 +169,7 @@ def _estimated(  # noqa: PLR0913  the parts of one line
     at = middle + shift
     s = float(clock.from_mocap(np.array([at]))[0])
     sigma = float(np.sqrt(C[0, 0] + 2 * shift * C[0, 1] + shift**2 * C[1, 1]))
-    lag = Lag(at - s + float(change[0] + shift * change[1]), sigma, 1.0)
+    lag = Lag(at - s + float(change[0] + shift * change[1]), sigma)
     return TrialLag(trial_id, s, lag, clock.drift + float(change[1]), float(np.sqrt(C[1, 1])), float(t[-1] - t[0]))
 
 

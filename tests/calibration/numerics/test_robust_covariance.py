@@ -47,13 +47,13 @@ def test_intervals_cover_whatever_the_autocorrelation(a, n, trials, p):
     by_block, naive, found = covered(a, n, trials, p, 150)
     assert 0.925 < by_block < 0.975  # 95 % within two and a half standard deviations of 150 draws with 3 of p apart
     assert naive < 0.8 or a == 0.0
-    assert found.enough and ENOUGH <= found.blocks <= MANY and found.length >= LONG * found.correlation
+    assert ENOUGH <= found.blocks <= MANY and found.length >= LONG * found.correlation
     assert p > 3 or found.correlation == pytest.approx((1.0 + a) / (1.0 - a), rel=0.25)
 
 
 def test_few_blocks_are_told_and_their_intervals_are_student_s():
     by_block, _, found = covered(0.95, 150, 8, 1, 300)
-    assert found.blocks == 8 and not found.enough
+    assert found.blocks == 8 < ENOUGH
     assert 0.92 < by_block < 0.98
 
 

@@ -136,7 +136,7 @@ def test_records_of_different_motions_have_no_lag():
 
 def test_the_clock_is_that_of_the_weighted_line_and_goes_both_ways():
     s = np.array([100.0, 300.0, 500.0, 900.0])
-    trials = [TrialLag(str(k), x, Lag(3.9 + 40e-6 * x, 1e-6, 1.0)) for k, x in enumerate(s)]
+    trials = [TrialLag(str(k), x, Lag(3.9 + 40e-6 * x, 1e-6)) for k, x in enumerate(s)]
     clock, outliers = fit_clock("robot", trials)
     assert outliers == ()
     assert clock.offset == pytest.approx(3.9, abs=1e-6)
@@ -147,7 +147,7 @@ def test_the_clock_is_that_of_the_weighted_line_and_goes_both_ways():
 
 
 def test_one_trial_gives_an_offset_and_no_drift():
-    clock, _ = fit_clock("robot", [TrialLag("one", 400.0, Lag(2.0, 1e-4, 1.0))])
+    clock, _ = fit_clock("robot", [TrialLag("one", 400.0, Lag(2.0, 1e-4))])
     assert clock.drift == 0.0
     assert clock.to_mocap(np.array([400.0]))[0] == pytest.approx(402.0, abs=1e-9)
     assert np.sqrt(clock.covariance[1, 1]) == pytest.approx(1e-4)
@@ -155,7 +155,7 @@ def test_one_trial_gives_an_offset_and_no_drift():
 
 def test_scatter_between_trials_counts_in_the_clock_s_sigma():
     rng = np.random.default_rng(1)
-    trials = [TrialLag(str(k), 50.0 * k, Lag(2.0 + 1e-3 * rng.normal(), 1e-5, 1.0)) for k in range(20)]
+    trials = [TrialLag(str(k), 50.0 * k, Lag(2.0 + 1e-3 * rng.normal(), 1e-5)) for k in range(20)]
     scatter = np.std([t.lag.value for t in trials]) / np.sqrt(20.0)
     assert fit_clock("robot", trials)[0].sigma == pytest.approx(scatter, rel=0.1)
     assert fit_clock("robot", trials, 5e-4)[0].sigma == pytest.approx(np.hypot(scatter, 5e-4), rel=0.1)

@@ -18,7 +18,7 @@ CLOCK = Clock("robot", 3.9, 40e-6, np.zeros((2, 2)), 20.0, 1e-4)
 
 
 def lag(wound: float, sigma: float = 1e-4, unseen: float = 0.0) -> TrialLag:
-    return TrialLag("swing", 10.0, Lag(3.9, sigma, 1.0), wound=wound, unseen=unseen)
+    return TrialLag("swing", 10.0, Lag(3.9, sigma), wound=wound, unseen=unseen)
 
 
 @pytest.mark.parametrize(("wound", "unseen"), [(0.0, 0.0), (4e-4, 0.0), (2e-4, 1e-4)])
@@ -49,7 +49,7 @@ def test_what_was_laid_to_winding_in_the_later_trials_is_not_taken_for_drift():
         wound = 5e-7 * s - 1e-4 + 1e-4 * rng.normal(size=9)  # sweeps come first, swings that fold last
         noise = 7e-5 * rng.normal(size=9)
         lags = [
-            TrialLag("swing", at, Lag(3.9 + 12e-6 * at + mislaid * w + e, 5e-5, 1.0), wound=w)
+            TrialLag("swing", at, Lag(3.9 + 12e-6 * at + mislaid * w + e, 5e-5), wound=w)
             for at, w, e in zip(s, wound, noise, strict=True)
         ]
         clock, _ = fit_clock("robot", lags)
