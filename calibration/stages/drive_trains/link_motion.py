@@ -60,49 +60,74 @@ def deflection(torque: float, half_gap: float, compliance: float) -> float:
     return 0.0
 
 
+class Contact(NamedTuple):
+    """`values` as a step needs them: g, 1 / c, T / c, f_c, f_v, k, t, t / k."""
+
+    half_gap: float
+    stiffness: float
+    damping: float
+    coulomb: float
+    viscous: float
+    spring: float
+    slip: float
+    reach: float
+
+
 @njit(cache=True, error_model="numpy")
-def mesh(x: float, rate: float, slider: float, h: float, values: np.ndarray) -> tuple[float, float]:
+def contact(values: np.ndarray) -> Contact:
+    """The contact of `values` (7,)."""
+    k = 1.0 / values[1]
+    return Contact(
+        values[0], k, k * values[4], values[2], values[3], values[5], values[6], values[6] / values[5]
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def mesh(x: float, rate: float, slider: float, h: float, c: Contact) -> tuple[float, float]:
     """m [N.m] at delta x and its rate, and how it falls with the link's velocity over a step h [N.m.s/rad]."""
-    g, k, t = values[0], 1.0 / values[1], values[6]
-    d, force, slope = k * values[4], 0.0, 0.0
-    if x > g:
-        force, slope = k * (x - g) + d * rate, k * h + d
-    elif x < -g:
-        force, slope = k * (x + g) + d * rate, k * h + d
-    if t > 0.0:
-        j = values[5] * (x - slider)
-        force += min(max(j, -t), t)
-        if abs(j) <= t:
-            slope += values[5] * h
+    force, slope = 0.0, 0.0
+    if x > c.half_gap:
+        force, slope = c.stiffness * (x - c.half_gap) + c.damping * rate, c.stiffness * h + c.damping
+    elif x < -c.half_gap:
+        force, slope = c.stiffness * (x + c.half_gap) + c.damping * rate, c.stiffness * h + c.damping
+    if c.slip > 0.0:
+        j = c.spring * (x - slider)
+        force += min(max(j, -c.slip), c.slip)
+        if abs(j) <= c.slip:
+            slope += c.spring * h
     return force, slope
 
 
 @njit(cache=True, error_model="numpy")
-def stepped(state: np.ndarray, dq: float, torque: float, inertia: float, h: float, values: np.ndarray) -> None:
-    """Move `state` (3,), delta [rad], its rate [rad/s] and s [rad], by h [s] in which the motor moves by dq [rad]."""
-    push, v, s = inertia / h, dq / h, state[2]
-    load, at = torque - push * (v - state[1]), state[0] + dq
-    damping = push + values[3]
+def stepped(
+    x: float, rate: float, s: float, dq: float, torque: float, inertia: float, h: float, c: Contact
+) -> tuple[float, float, float]:
+    """Delta [rad], its rate [rad/s] and s [rad] after h [s] in which the motor moves by dq [rad]."""
+    push, v = inertia / h, dq / h
+    load, at = torque - push * (v - rate), x + dq
+    damping = push + c.viscous
     u, before = 0.0, -1.0
-    force, slope = mesh(at, v, s, h, values)
-    if abs(force - load) > values[2]:
-        load += values[2] if force > load else -values[2]
+    force, slope = mesh(at, v, s, h, c)
+    if abs(force - load) > c.coulomb:
+        load += c.coulomb if force > load else -c.coulomb
         for _ in range(_NEWTON):
             change = (force - load - damping * u) / (slope + damping)
             u += change
             if slope == before and abs(change) <= 1e-12 + 1e-9 * abs(u):
                 break
             before = slope
-            force, slope = mesh(at - h * u, v - u, s, h, values)
-    state[0], state[1] = at - h * u, v - u
-    if values[6] > 0.0:
-        reach = values[6] / values[5]
-        state[2] = min(max(s, state[0] - reach), state[0] + reach)
+            force, slope = mesh(at - h * u, v - u, s, h, c)
+    x = at - h * u
+    if c.slip > 0.0:
+        s = min(max(s, x - c.reach), x + c.reach)
+    return x, v - u, s
 
 
 @njit(cache=True, error_model="numpy")
-def advanced(state: np.ndarray, a: Drive, i: int, b: Drive, j: int, longest: float, values: np.ndarray) -> None:
-    """Move `state` from sample i of a to sample j of b.
+def advanced(
+    x: float, rate: float, slider: float, a: Drive, i: int, b: Drive, j: int, longest: float, c: Contact
+) -> tuple[float, float, float]:
+    """Delta, its rate and s moved from sample i of a to sample j of b.
 
     In between the motor moves as the cubic through positions and velocities, torque and inertia change evenly; steps
     are no longer than `longest` [s].
@@ -110,15 +135,18 @@ def advanced(state: np.ndarray, a: Drive, i: int, b: Drive, j: int, longest: flo
     dt = b.t[j] - a.t[i]
     n = max(1, int(np.ceil(dt / longest - 1e-6)))
     p, r, d, before = a.v[i] * dt, b.v[j] * dt, b.q[j] - a.q[i], 0.0
-    if abs(d) < _STILL and abs(p) < _STILL and abs(r) < _STILL and abs(state[1]) * dt < _STILL:
+    torque, inertia = a.torque[i], a.inertia[i]
+    more, heavier = b.torque[j] - torque, b.inertia[j] - inertia
+    if abs(d) < _STILL and abs(p) < _STILL and abs(r) < _STILL and abs(rate) * dt < _STILL:
         n = 1
     for k in range(n):
         s = (k + 1) / n
         at = s * (p + s * (3.0 * d - 2.0 * p - r + s * (p + r - 2.0 * d)))
-        torque = a.torque[i] + s * (b.torque[j] - a.torque[i])
-        inertia = a.inertia[i] + s * (b.inertia[j] - a.inertia[i])
-        stepped(state, at - before, torque, inertia, dt / n, values)
+        x, rate, slider = stepped(
+            x, rate, slider, at - before, torque + s * more, inertia + s * heavier, dt / n, c
+        )  # fmt: skip
         before = at
+    return x, rate, slider
 
 
 @njit(cache=True, error_model="numpy")
@@ -128,13 +156,13 @@ def simulated(drive: Drive, begins: np.ndarray, starts: np.ndarray, longest: flo
     `begins` (m + 1,) are their first samples and n, `starts` (m,) delta there [rad], at rest; steps as of `advanced`.
     `values` (7,) are g, c, f_c, f_v, T, k, t.
     """
-    out, state = np.empty(len(drive.q)), np.empty(3)
+    out, c = np.empty(len(drive.q)), contact(values)
     for m in range(len(starts)):
-        state[0], state[1], state[2] = starts[m], 0.0, starts[m]
-        out[begins[m]] = starts[m]
+        x, rate, slider = starts[m], 0.0, starts[m]
+        out[begins[m]] = x
         for i in range(begins[m], begins[m + 1] - 1):
-            advanced(state, drive, i, drive, i + 1, longest, values)
-            out[i + 1] = state[0]
+            x, rate, slider = advanced(x, rate, slider, drive, i, drive, i + 1, longest, c)
+            out[i + 1] = x
     return out
 
 
@@ -231,7 +259,8 @@ def streamed(
             if drives.plays[i]:
                 states[i, j, 0] = carried(states[i, j, 0] + b.q[i] - a.q[i], b, i, drives.values[i])
             else:
-                advanced(states[i, j], a, i, b, i, longest, drives.values[i])
+                c, x = contact(drives.values[i]), states[i, j]
+                x[0], x[1], x[2] = advanced(x[0], x[1], x[2], a, i, b, i, longest, c)
 
 
 @njit(cache=True, error_model="numpy")
