@@ -17,6 +17,7 @@ from calibration.prediction.base_pose import BaseState, LoadedBase
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, planar_forcing, wrenches_along
+from calibration.stages.stick_slip.kernel import ACCELERATION, LANES
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.stream import Sample, SlipStream, slip_stream
 from calibration.stages.suspension.floor_wrench import root_in_base
@@ -85,7 +86,7 @@ class SlippingBase:
         """(2, 3) linear and angular of the base frame [m/s2, rad/s2, lab axes], mean of the members; None at rest."""
         if state.slip is None:
             return None
-        return np.asarray(_accelerations(state.slip.states, len(self._stream.direction.ensemble), at.T_lab_0))
+        return np.asarray(_accelerations(state.slip.bases.state, len(self._stream.direction.ensemble), at.T_lab_0))
 
     def _driven(self, gravity: np.ndarray, moving: np.ndarray) -> np.ndarray:
         """What the arm does to the base in the floor's plane (9,), see `Sample`; gravity (3,) in frame 0."""
@@ -111,12 +112,13 @@ class SlippingBase:
 
 @njit(cache=True, error_model="numpy")
 def _accelerations(states: np.ndarray, members: int, T_lab_0: np.ndarray) -> np.ndarray:
-    """`SlippingBase.accelerations` of the first of the states."""
+    """`SlippingBase.accelerations` of the first of the bases, states as in `kernel.Bases`."""
     found = np.zeros((2, 3))
     for k in range(members):
+        a = states[k // LANES, ACCELERATION : ACCELERATION + 3, k % LANES]
         for i in range(3):
-            found[0, i] += (T_lab_0[i, 0] * states[k, 9] + T_lab_0[i, 1] * states[k, 10]) / members
-            found[1, i] += T_lab_0[i, 2] * states[k, 11] / members
+            found[0, i] += (T_lab_0[i, 0] * a[0] + T_lab_0[i, 1] * a[1]) / members
+            found[1, i] += T_lab_0[i, 2] * a[2] / members
     return found
 
 

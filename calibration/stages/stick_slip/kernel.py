@@ -31,7 +31,14 @@ COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
 LANES = 16  # bases side by side
 _VECTOR = 4  # lanes that one instruction takes
 _WHEEL, _E = 12, 10  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), and its deflections from row _E on
-_X, _V, _DX, _A, _STICKS, _P = 0, 3, 6, 9, 12, 13  # rows of a state: x, v, the correction to come, the acceleration,
+_X, _V, _DX, ACCELERATION, _STICKS, _P = (
+    0,
+    3,
+    6,
+    9,
+    12,
+    13,
+)  # rows of a state: x, v, the correction to come, the acceleration,
 _D, _F, SLID, _BITS = 19, 25, 28, 29  # which wheels stuck plus one, P; the step's d, force, wheels that slide, stick
 _BODY, _ROWS = 30, 34  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 
@@ -132,7 +139,7 @@ def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         inertia[6], inertia[7], inertia[8], inertia[9], inertia[10], inertia[11], inertia[12], inertia[13], inertia[14]
     )  # fmt: skip
     for l in range(n):
-        a0, a1, a2 = s[_A * LANES + l], s[(_A + 1) * LANES + l], s[(_A + 2) * LANES + l]
+        a0, a1, a2 = s[ACCELERATION * LANES + l], s[(ACCELERATION + 1) * LANES + l], s[(ACCELERATION + 2) * LANES + l]
         s[_D * LANES + l] = h * s[_V * LANES + l] + s[_DX * LANES + l]
         s[(_D + 1) * LANES + l] = h * s[(_V + 1) * LANES + l] + s[(_DX + 1) * LANES + l]
         s[(_D + 2) * LANES + l] = h * s[(_V + 2) * LANES + l] + s[(_DX + 2) * LANES + l]
@@ -198,7 +205,7 @@ def _ended(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         a0 = (c00 * b0 + c01 * b1 + c02 * b2) * i
         a1 = (c01 * b0 + c11 * b1 + c12 * b2) * i
         a2 = (c02 * b0 + c12 * b1 + c22 * b2) * i
-        s[_A * LANES + l], s[(_A + 1) * LANES + l], s[(_A + 2) * LANES + l] = a0, a1, a2
+        s[ACCELERATION * LANES + l], s[(ACCELERATION + 1) * LANES + l], s[(ACCELERATION + 2) * LANES + l] = a0, a1, a2
         s[_X * LANES + l] += s[_D * LANES + l]
         s[(_X + 1) * LANES + l] += s[(_D + 1) * LANES + l]
         s[(_X + 2) * LANES + l] += s[(_D + 2) * LANES + l]
