@@ -130,6 +130,27 @@ def commanded(lag: int = 8) -> Spoil:
     return lambda c: c.changed("calibration", of_trial)
 
 
+def link(joint: int, change: Callable[[np.ndarray, Trial], np.ndarray], share: float = -1.0) -> Spoil:
+    """Change what a joint's link encoder reads (n,), from a share of the recording on."""
+
+    def spoil(c: Campaign) -> Campaign:
+        rows = c.part("calibration", share, "t_robot")
+
+        def of_trial(trial: Trial, name: str) -> Trial:
+            q = trial.q_link.copy()
+            q[:, joint] = np.where(rows[name], change(q[:, joint], trial), q[:, joint])
+            return replace(trial, q_link=q)
+
+        return c.changed("calibration", of_trial)
+
+    return spoil
+
+
+def wrapped(q: np.ndarray, at: float) -> np.ndarray:
+    """Readings (n,) that are a turn less above `at` [rad]."""
+    return np.where(q > at, q - 2.0 * np.pi, q)
+
+
 def exchanged_sides(joints: list[int]) -> Spoil:
     def of_trial(trial: Trial, name: str) -> Trial:
         q, link = trial.q_motor.copy(), trial.q_link.copy()

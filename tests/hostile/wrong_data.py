@@ -22,6 +22,7 @@ from tests.hostile.campaign import (
     gone,
     hidden,
     late,
+    link,
     lost_plate,
     lost_readings,
     moved,
@@ -29,6 +30,7 @@ from tests.hostile.campaign import (
     shifted_dwells,
     slip,
     validated_on_calibration,
+    wrapped,
 )
 
 
@@ -72,6 +74,17 @@ TABLE = (
     Mistake("arm_2 gain -2 %", gain(2, -0.02), "arm_2_joint are off in scale"),
     Mistake("arm_3 slips by 1 deg", slip(3, 0.0175, 0.5), SLIPPED),
     Mistake("arm_3 drifts by 1 deg", drift(3, 0.0175), SLIPPED),
+    Mistake("link of arm_3 turned", link(3, lambda q, t: -q), "arm_3_joint has its sign turned"),
+    Mistake("link of arm_3 in degrees", link(3, lambda q, t: np.degrees(q)), "arm_3_joint is in degrees"),
+    Mistake("link of arm_3 5 % too large", link(3, lambda q, t: 1.05 * q), "1.05 of its motor's scale"),
+    Mistake("link of arm_3 wraps", link(3, lambda q, t: wrapped(q, float(np.nanmedian(q)))), "arm_3_joint wraps by"),
+    Mistake(
+        "link of arm_3 saturates",
+        link(3, lambda q, t: np.minimum(q, np.nanquantile(q, 0.7))),
+        "arm_3_joint does not exceed",
+    ),
+    Mistake("link of arm_3 reads arm_2", link(3, lambda q, t: t.q_link[:, 2]), "arm_3_joint follows the motor of"),
+    Mistake("link of arm_3 slips by 10 mrad", link(3, lambda q, t: q + 0.01, 0.5), "encoder of arm_3_joint slips by"),
     Mistake("readings 50 ms late from half-way on", late(0.05, 0.5), SLIPPED),
     Mistake("hand markers slip by 10 mm", moved("gripper", [0.0, 0.01, 0.0], 0.5), SLIPPED),
     Mistake("base markers slip by 10 mm", moved("base", [0.01, 0.0, 0.0], 0.5), SLIPPED),
