@@ -129,7 +129,9 @@ def _concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tupl
     )
     found = [Verdict("clocks", "ok", message)]
     if outliers:
-        found.append(Verdict("clocks", "warning", f"{instrument}: trials off the others' clock left out: {', '.join(outliers)}"))
+        found.append(
+            Verdict("clocks", "warning", f"{instrument}: trials off the others' clock left out: {', '.join(outliers)}")
+        )
     return clock, tuple(found)
 
 
