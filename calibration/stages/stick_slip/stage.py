@@ -168,8 +168,9 @@ def _behind(directions: Sequence[Direction]) -> list[str]:
     if len(directions) < len(SOURCES):
         return []
     calm = _calm(directions)
-    plate, dynamics = (np.where(d.linear, 1.0, d.held_out.only(calm).r2) for d in directions)
-    return [a for a, p, d in zip(_AXES, plate, dynamics, strict=True) if p < d - _LESS]
+    plate, dynamics = (d.held_out.only(calm).r2 for d in directions)
+    slips = ~np.asarray(directions[0].linear, dtype=bool)
+    return [a for a, p, d, s in zip(_AXES, plate, dynamics, slips, strict=True) if s and p < d - _LESS]
 
 
 def _calm(directions: Sequence[Direction]) -> np.ndarray:

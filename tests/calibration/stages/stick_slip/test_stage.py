@@ -7,7 +7,7 @@ import pytest
 import mjcf
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses
-from calibration.stages.stick_slip.stage import _linear, _misplaced
+from calibration.stages.stick_slip.stage import _behind, _linear, _misplaced
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -101,6 +101,13 @@ def test_where_slip_does_not_explain_yaw_the_compliance_need_not_be_better(recor
     for error, linear in ((0.4e-6, True), (0.1e-6, False)):
         own = HeldOut(error * sums[:, :3], 1e-6 * sums[:, :3], 0.0 * sums[:, :3], np.ones(8))
         assert np.all(_linear(replace(direction, held_out=own), as_good).linear == linear)
+
+
+def test_an_axis_that_is_linear_from_dynamics_alone_speaks_against_no_plate(recorded, suspension):
+    (plate,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    half = replace(plate, held_out=replace(plate.held_out, error=0.5 * plate.held_out.motion))
+    assert not _behind((half, replace(half, linear=np.array([True, False, False]))))
+    assert _behind((half, plate)) == ["x", "y", "yaw"]
 
 
 def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
