@@ -30,7 +30,9 @@ const inside = e => e.closest("svg, .scroll, .drawing, pre");
 const wide = e => e.getBoundingClientRect().right > width + 1;
 const over = [...page.querySelectorAll("body *")].filter(e => !inside(e) && wide(e));
 const cut = [...page.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth + 1);
-document.title = JSON.stringify({width, page: page.documentElement.scrollWidth, first, text, broken, outside,
+const numbers = [...page.querySelectorAll('[aria-label^="Ladder"] td:not(.text):nth-of-type(4)')];
+const hidden = numbers.filter(e => e.getBoundingClientRect().right > width).length;
+document.title = JSON.stringify({width, numbers: numbers.length, hidden, page: page.documentElement.scrollWidth, first, text, broken, outside,
   body: luminance(page.body), over: over.map(e => e.outerHTML.slice(0, 80)), cut: cut.map(e => e.ariaLabel)});
 """
 
@@ -83,6 +85,11 @@ def test_text_is_dark_on_light_or_light_on_dark(run, scheme):
 
 def test_no_table_is_cut_on_a_laptop(run):
     assert measured(run, 1280)["cut"] == []
+
+
+def test_errors_of_all_rows_are_seen_on_a_phone_without_scrolling(run):
+    found = measured(run, 390)
+    assert found["numbers"] > 10 and found["hidden"] == 0
 
 
 def test_the_first_screen_answers(run):
