@@ -32,7 +32,8 @@ const over = [...page.querySelectorAll("body *")].filter(e => !inside(e) && wide
 const cut = [...page.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth + 1);
 const numbers = [...page.querySelectorAll('[aria-label^="Ladder"] td:not(.text):nth-of-type(4)')];
 const hidden = numbers.filter(e => e.getBoundingClientRect().right > width).length;
-document.title = JSON.stringify({width, numbers: numbers.length, hidden, page: page.documentElement.scrollWidth, first, text, broken, outside,
+document.title = JSON.stringify({width, numbers: numbers.length, hidden, first, text,
+  page: page.documentElement.scrollWidth, broken, outside,
   body: luminance(page.body), over: over.map(e => e.outerHTML.slice(0, 80)), cut: cut.map(e => e.ariaLabel)});
 """
 
