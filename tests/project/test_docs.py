@@ -86,6 +86,12 @@ def test_generated_pages_show_the_kept_results(monkeypatch):
         assert page.read_text(encoding="utf-8") == text, f"{page.name} is not of its results"
 
 
+def test_every_page_of_results_is_listed_with_what_makes_it():
+    table = (ROOT / "docs/results/README.md").read_text(encoding="utf-8")
+    pages = {path.name for path in ROOT.glob("docs/results/*.md")} - {"README.md"}
+    assert pages == set(re.findall(r"\(([a-z_0-9]+\.md)\)", table))
+
+
 def test_decisions_and_changelog_stay_short():
     records = [*ROOT.glob("docs/decisions/*.md"), ROOT / "CHANGELOG.md"]
     assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in records) <= 500
