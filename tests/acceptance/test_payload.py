@@ -27,7 +27,10 @@ def test_a_declared_payload_is_known_to_both(trials):
         assert dynamics < 1.25 * plate
 
 
-@pytest.mark.parametrize("trial", ["xyz_0kg", "xyz_2kg", "push"])
+PUSHED = pytest.mark.xfail(reason="a push is in no joint's load: docs/limits.md", strict=True)
+
+
+@pytest.mark.parametrize("trial", ["xyz_0kg", "xyz_2kg", pytest.param("push", marks=PUSHED)])
 def test_drive_trains_know_what_loads_them(trials, trial):
     errors = {name: trials[name, "full", "measured", "motor"] for name in ("xyz", trial)}
     assert errors[trial] < 1.3 * errors["xyz"]
