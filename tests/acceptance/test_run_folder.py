@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray
+from scipy.ndimage import uniform_filter1d
 
 import calibration
 from calibration import Compensator, load_estimate
@@ -179,7 +180,9 @@ def swing(result, compensator):
     ok = (t_robot >= trial.t_robot[0]) & (t_robot <= trial.t_robot[-1])
     ok &= (t_plate >= trial.t_plate[0]) & (t_plate <= trial.t_plate[-1])
     t, q = trial.t_mocap[ok], readings_at(trial, predict.robot, trial.t_mocap[ok], trial.q_motor)
-    w = np.stack([np.interp(t_plate[ok], trial.t_plate, column) for column in trial.plate_wrench[:, 0].T], axis=1)
+    samples = round(float(np.diff(trial.t_mocap).mean() / np.diff(trial.t_plate).mean()))  # of the plate in a picture
+    averaged = uniform_filter1d(trial.plate_wrench[:, 0], samples, axis=0)
+    w = np.stack([np.interp(t_plate[ok], trial.t_plate, column) for column in averaged.T], axis=1)
     nothing = np.full_like(q, np.nan)
     same = replace(
         trial, t_mocap=t, marker_position=trial.marker_position[ok], t_robot=t, q_motor=q, q_link=nothing,
@@ -202,7 +205,7 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     t, q, w, start, rows, real, _ = swing
     found, row = compensator.predict(t, q, w, start), ROW[estimate.main]
     np.testing.assert_allclose(found.T, rows[row, "plate"], rtol=0.0, atol=1e-12)
-    # as recorded: the plate's noise is averaged over its samples there, and picked at the camera's times here
+    # as recorded: at the plate's own times there, averaged and picked at the camera's times here
     assert np.sqrt(((found.T - real[row, "plate"])[:, :3, 3] ** 2).mean()) < 1e-4
     still = compensator.predict(t, q, T_lab_base_start=start)
     np.testing.assert_allclose(still.T, rows[row, "fixed"], rtol=0.0, atol=1e-12)
