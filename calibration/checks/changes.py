@@ -35,6 +35,7 @@ _FAR_OFF = 4.0  # tolerances of a body of markers the hand may be off throughout
 _MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
 _LATE, _SLOW = 3e-3, 0.02  # [s]; [rad/s, m/s] below which backlash is not on one side
 _NEAR, _UNCLEAR = 3.0, 0.25  # sigma from exchanged; a sigma that leaves sides open [-]
+_GEAR = 10.0  # times what a gear explains: a difference of sides that no exchange makes, see `joint_readings`
 _OTHERS = 0.06  # of what a gear explains: errors of a hand that follow the difference of a joint's sides
 _WRONG = 3.0  # times what is explained beyond which the effect is not bounded
 
@@ -149,15 +150,17 @@ def exchanged_sides(left: Unexplained, description: Description) -> Iterator[Ver
     q, J = left.x.q[:, columns][:, known], left.J[:, :, known]
     d = d[:, known] - np.median(d[:, known], axis=0)
     waves = _waves(q)
-    others = [_OTHERS * _play(left, description, int(j))[0] for j in known]
+    play, lag = np.array([_play(left, description, int(j))[0] for j in known]), _less_waves(d, waves).std(axis=0)
     value, S, _ = left.fitted(np.concatenate([J * x[:, None] for x in (d, *waves)], axis=2), len(known))
-    sigma = np.hypot(np.sqrt(np.diag(S)), others / np.maximum(_less_waves(d, waves).std(axis=0), 1e-9))
-    wrong = (value < 0.5) & (np.abs(value) < _NEAR * sigma)
-    if np.linalg.norm((1.0 - value)[wrong] / sigma[wrong]) > _SURE:
+    sigma = np.hypot(np.sqrt(np.diag(S)), _OTHERS * play / np.maximum(lag, 1e-9))
+    near = (value < 0.5) & (np.abs(value) < _NEAR * sigma) & (lag < _GEAR * play)
+    far = np.where(near, (1.0 - value) / sigma, 0.0)
+    wrong = far > min(_NEAR, float(far.max()) - 1e-9)
+    if np.linalg.norm(far) > _SURE:
         names = ", ".join(joints[known[k]] for k in np.flatnonzero(wrong))
         message = (
-            f"motor and link readings of {names} are exchanged: the motor readings place the hand "
-            f"({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
+            f"motor and link readings of {names} are exchanged, or a link encoder is wrong: the motor readings place "
+            f"the hand ({value[wrong].mean():.2f} of their difference moves it, +- {sigma[wrong].mean():.2f})"
         )
         unclear = ", ".join(joints[known[k]] for k in np.flatnonzero(~wrong & (sigma > _UNCLEAR)))
         message += f"; sides of {unclear} differ too little to be judged, check them too" if unclear else ""
