@@ -72,7 +72,7 @@ class DriveTrain:
         link: (5,) offset of the link encoder from the motor's, and its eccentricity [rad]; NaN without one.
         start: Share of [D(tau - f_c), D(tau + f_c)] at which trials start, mean and standard deviation [-].
         torque_sigma: Standard deviation of the torque at which the side changes [N.m].
-        residual: Rms that trials left out kept of what the model explains [rad].
+        residual: Rms that trials left out kept of what the model explains, in motion [rad].
         inertials: (p,) masses and first moments, less the nominal ones, that this joint's load identifies, in the order
             of `torques.inertials` [kg, kg.m]; empty: nominal.
         parameters: What is reported, with standard deviations.

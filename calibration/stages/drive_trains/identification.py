@@ -62,7 +62,7 @@ class Candidate:
     Attributes:
         fit: Of all trials.
         score: Of trials left out; less is better.
-        left_out: Rms of what is left of trials left out [rad].
+        left_out: Rms of what is left of trials left out, in motion [rad].
         covariance: (p + 5, p + 5) of theta and gamma.
     """
 
@@ -236,9 +236,11 @@ def _predicting(fit: TrainFit, without: np.ndarray, covariance: np.ndarray) -> C
     for i, x in enumerate(without):
         left[data.trial == i] = replace(problem, data=data.only(i)).left(x[:n], x[n:])
     size = sizes(problem, left, FLOORS[-1])
-    moves = data.group[data.known & (data.regime != REST)]
-    score = float((np.bincount(moves, minlength=len(size)) * np.log(size)).sum()) / problem.correlated
-    return Candidate(fit, score, float(np.sqrt(np.nanmean(left**2))), covariance)
+    moves = data.known & (data.regime != REST)
+    moves = moves if moves.any() else data.known
+    count = np.bincount(data.group[moves], minlength=len(size))
+    score = float((count * np.log(size)).sum()) / problem.correlated
+    return Candidate(fit, score, float(np.sqrt(np.mean(left[moves] ** 2))), covariance)
 
 
 def _starts(problem: Problem) -> list[np.ndarray]:
