@@ -11,7 +11,7 @@ import numpy as np
 from scenarios import load, run
 
 SAMPLED = ("twin.widths.spread=0.5",)
-"""Gaps of gears and offsets of readings sampled; friction, stiffness and wheels are the default robot's."""
+"""Gap, offset, stiffness and friction of every gear, stiffness and friction of each type of wheel are sampled."""
 SEEDS, MORE = range(1000, 1010), range(2000, 2020)
 """Robots that no method was developed on."""
 

@@ -119,7 +119,7 @@ def test_the_printed_joint_model_explains_a_settled_repetition(evaluations, join
 
 
 def test_the_papers_nominal_error_is_one_of_the_series(capsys):
-    """Placements, clusters and masses redrawn, offsets and gaps within 20 %; validation swings only."""
+    """Placements, clusters and masses redrawn, gears and wheels within 20 %; validation swings only."""
     scenario = load("humanoids2024")
     config = replace(scenario.twin, widths=replace(scenario.twin.widths, spread=0.2))
     config = replace(config, campaign=replace(config.campaign, validation_swing=20.0))

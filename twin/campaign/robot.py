@@ -13,7 +13,7 @@ from twin.defects.differential import Differential
 from twin.defects.gear import DirectDrive
 from twin.defects.inertia import LinkMass
 from twin.defects.placement import Placement
-from twin.defects.wheels.base import ground, wheels_of
+from twin.defects.wheels.base import Base, WheelType, ground, wheels_of
 from twin.defects.wheels.wheel import Wheel
 from twin.fields.names import ARM, BASE, TORSO
 from twin.fields.values import point
@@ -60,7 +60,8 @@ def _place(defect: Defect) -> tuple[type, str]:
 
 def sample(config: RobotConfig, seed: int) -> Robot:
     """One robot of the series; the same seed gives the same robot."""
-    wheels, torso = wheels_of(config.base), config.torso
+    base, torso = _base(config, seed), config.torso
+    wheels = wheels_of(base)
     arm = {name: _joint(config, seed, joint) for name, joint in config.arm.items()}
     return Robot(
         defects=(
@@ -71,7 +72,7 @@ def sample(config: RobotConfig, seed: int) -> Robot:
             *_gears(config, arm),
             DirectDrive(TORSO, torso.rotor_inertia, torso.servo_stiffness),
             Flexibility("torso_lift_link", torso.bending_stiffness, torso.bending_damping),
-            *ground(config.base, wheels),
+            *ground(base, wheels),
             config.payload.sample(generator(seed, "payload")),
             *config.departures.defects(),
             *(d.sample(generator(seed, "defect", str(k))) for k, d in enumerate(config.defects)),
@@ -118,13 +119,43 @@ def _masses(config: RobotConfig, seed: int) -> tuple[LinkMass, ...]:
 
 
 def _joint(config: RobotConfig, seed: int, joint: ArmJoint) -> ArmJoint:
-    """Gap and offset scattered about what is written."""
+    """Gap, offset, stiffness and friction scattered about what is written."""
+    spread = config.widths.spread
+    wider = max(spread, config.widths.gaps_and_offsets)
 
-    def scattered(what: str) -> float:
-        factor = float(generator(seed, "spread", what, joint.joint_name).uniform(-1.0, 1.0))
-        return float(getattr(joint, what)) * (1.0 + config.widths.spread * factor)
+    def scattered(what: str, width: float) -> float:
+        return float(getattr(joint, what)) * _factor(seed, width, what, joint.joint_name)
 
-    return replace(joint, gap=scattered("gap"), offset=scattered("offset"))
+    return replace(
+        joint,
+        gap=scattered("gap", wider),
+        offset=scattered("offset", wider),
+        stiffness=scattered("stiffness", spread),
+        coulomb=scattered("coulomb", spread),
+        viscous=scattered("viscous", spread),
+    )
+
+
+def _base(config: RobotConfig, seed: int) -> Base:
+    """Stiffness along the floor and across it, and friction, of each type of wheel scattered about what is written."""
+    width = config.widths.spread
+
+    def one(name: str, of: WheelType) -> WheelType:
+        (kx, ky, kz), k = of.stiffness, _factor(seed, width, "k", name)
+        stiffness = (k * kx, k * ky, _factor(seed, width, "kz", name) * kz)
+        return replace(of, stiffness=stiffness, friction=of.friction * _factor(seed, width, "mu", name))
+
+    base = config.base
+    return replace(
+        base,
+        drive=one("drive", base.drive),
+        caster_front=one("caster_front", base.caster_front),
+        caster_back=one("caster_back", base.caster_back),
+    )
+
+
+def _factor(seed: int, width: float, what: str, of: str) -> float:
+    return 1.0 + width * float(generator(seed, "spread", what, of).uniform(-1.0, 1.0))
 
 
 def _gears(config: RobotConfig, arm: dict[str, ArmJoint]) -> tuple[Defect, ...]:

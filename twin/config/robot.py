@@ -95,7 +95,9 @@ class Widths:
         link_com: Per axis [m].
         mount_translation: Where the arm is bolted on, per axis, on top of its first joint's placement [m].
         mount_rotation: The same, per axis [rad].
-        spread: Half width of the uniform factor on offsets and gaps [-]; 0 leaves them as written.
+        spread: Half width of the uniform factor on gap, offset, stiffness and friction of each gear and on stiffness
+            and friction of each type of wheel [-]; 0 leaves them as written.
+        gaps_and_offsets: The same of gaps and offsets alone, where it is wider than `spread` [-].
         makes: Arms of other makes, of which a robot has one: masses of its links over the datasheet's [-], 1 where
             none is given. Without any, the datasheet's.
     """
@@ -105,6 +107,7 @@ class Widths:
     link_mass: Annotated[float, Field(ge=0.0, le=0.3), DRAWN]
     link_com: NonNegative
     spread: Annotated[float, Field(ge=0.0, le=0.9), DRAWN] = 0.0
+    gaps_and_offsets: Annotated[float, Field(ge=0.0, le=0.9), DRAWN] = 0.0
     mount_translation: NonNegative = 0.0
     mount_rotation: NonNegative = 0.0
     makes: tuple[dict[ArmLinkName, Annotated[float, Field(ge=0.3, le=3.0), DRAWN]], ...] = ()

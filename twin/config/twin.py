@@ -1,7 +1,7 @@
 """A robot and its laboratory as a scenario describes them: magnitudes, widths and instruments.
 
 SI units. Every field is validated here once; nothing downstream checks it again. Magnitudes of one robot are values,
-what differs between robots is sampled: placements from zero-mean normals, offsets and gaps within +-spread of theirs,
+what differs between robots is sampled: placements from zero-mean normals, gears and wheels within +-spread of theirs,
 and any value that is given as a distribution (`twin.fields.distributions`).
 """
 

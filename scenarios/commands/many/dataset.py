@@ -22,7 +22,7 @@ def dataset(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Simulate N sampled robots of a scenario (offsets and gaps 0.5 to 1.5 of its own); run again to resume."""
+    """Simulate N sampled robots of a scenario (gears and wheels 0.5 to 1.5 of its own); run again to resume."""
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import run_content
