@@ -13,9 +13,8 @@ from calibration.evaluation.evaluate import evaluate
 from calibration.recording.dataset import Dataset
 from calibration.verdict import Verdict
 from tests.hostile.campaign import Campaign
-from tests.hostile.wrong_data import Mistake
+from tests.hostile.wrong_data import STAGES, Mistake
 
-STAGES = ("registration", "geometry")
 ROW = "model_2"
 _LEAST = 1.0  # [mm] an error that matters
 
@@ -44,9 +43,9 @@ class Tried:
         return self.calibrated and not self.said and self.error > max(2.0 * self.clean, _LEAST)
 
 
-def calibrated(dataset: Dataset) -> Estimate:
-    """An estimate of the geometry: clocks, marker bodies, placements."""
-    return calibrate(dataset, STAGES)
+def calibrated(dataset: Dataset, stages: tuple[str, ...] = STAGES) -> Estimate:
+    """An estimate, of clocks, marker bodies and placements unless more stages are named."""
+    return calibrate(dataset, stages)
 
 
 def error_of(estimate: Estimate, good: Dataset) -> float:
@@ -62,7 +61,7 @@ def tried(mistake: Mistake, campaign: Campaign, good: Dataset, reference: tuple[
     logging.disable(logging.WARNING)
     try:
         dataset = load(mistake.spoil(campaign).written(at))
-        estimate = calibrated(dataset)
+        estimate = calibrated(dataset, mistake.stages)
         said = _said(estimate.verdicts, known)
         if estimate.calibrated:
             said += _said(evaluate(estimate, dataset).verdicts, known)

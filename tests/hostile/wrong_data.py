@@ -33,6 +33,9 @@ from tests.hostile.campaign import (
     wrapped,
 )
 
+STAGES = ("registration", "geometry")
+LINKS = (*STAGES, "joints", "bundle")
+
 
 @dataclass(frozen=True)
 class Mistake:
@@ -43,6 +46,7 @@ class Mistake:
         spoil: Makes it so.
         says: Words of a verdict, any of them between `|`; empty where the data remain usable and nothing need be said.
         worst: Largest true error of an estimate that is nevertheless called good, times the clean one [-].
+        stages: That calibrate.
         judged: Seen in the recordings alone, before anything is fitted: the fast rows.
     """
 
@@ -51,9 +55,9 @@ class Mistake:
     says: str
     worst: float = 2.0
     judged: bool = False
+    stages: tuple[str, ...] = STAGES
 
 
-WRONG_LINK = "arm_3_joint are exchanged, or a link encoder is wrong"
 SLIPPED = "elsewhere|slipped|drift|off in scale|late|moved|contradict|did not converge|refused"
 FAST = (
     Mistake("markers 1 % too large", scaled(1.01), "times as far apart as in dataset.json", judged=True),
@@ -75,24 +79,17 @@ TABLE = (
     Mistake("arm_2 gain -2 %", gain(2, -0.02), "arm_2_joint are off in scale"),
     Mistake("arm_3 slips by 1 deg", slip(3, 0.0175, 0.5), SLIPPED),
     Mistake("arm_3 drifts by 1 deg", drift(3, 0.0175), SLIPPED),
-    Mistake("link of arm_3 turned", link(3, lambda q, t: -q), "arm_3_joint has its sign turned"),
-    Mistake("link of arm_3 in degrees", link(3, lambda q, t: np.degrees(q)), "arm_3_joint is in degrees"),
-    Mistake("link of arm_3 5 % too large", link(3, lambda q, t: 1.05 * q), "1.05 of its motor's scale"),
-    Mistake("link of arm_3 wraps", link(3, lambda q, t: wrapped(q, float(np.nanmedian(q)))), "arm_3_joint wraps by"),
-    Mistake(
-        "link of arm_3 saturates",
-        link(3, lambda q, t: np.minimum(q, np.nanquantile(q, 0.7))),
-        "arm_3_joint does not exceed|" + WRONG_LINK,
-    ),
-    Mistake(
-        "link of arm_3 reads arm_2",
-        link(3, lambda q, t: t.q_link[:, 2]),
-        "arm_3_joint follows the motor of|" + WRONG_LINK,
-    ),
-    Mistake(
-        "link of arm_3 slips by 10 mrad",
-        link(3, lambda q, t: q + 0.01, 0.5),
-        "encoder of arm_3_joint slips by|" + WRONG_LINK,
+    *(
+        Mistake(f"link of arm_3 {what}", link(3, change, share), says, stages=LINKS)
+        for what, change, share, says in (
+            ("turned", lambda q, t: -q, -1.0, "arm_3_joint has its sign turned"),
+            ("in degrees", lambda q, t: np.degrees(q), -1.0, "arm_3_joint is in degrees"),
+            ("5 % too large", lambda q, t: 1.05 * q, -1.0, "1.05 of its motor's scale"),
+            ("wraps", lambda q, t: wrapped(q, float(np.nanmedian(q))), -1.0, "arm_3_joint wraps by"),
+            ("saturates", lambda q, t: np.minimum(q, np.nanquantile(q, 0.7)), -1.0, "arm_3_joint does not exceed"),
+            ("reads arm_2", lambda q, t: t.q_link[:, 2], -1.0, "arm_3_joint follows the motor of"),
+            ("slips by 10 mrad", lambda q, t: q + 0.01, 0.5, "encoder of arm_3_joint slips by"),
+        )
     ),
     Mistake("readings 50 ms late from half-way on", late(0.05, 0.5), SLIPPED),
     Mistake("hand markers slip by 10 mm", moved("gripper", [0.0, 0.01, 0.0], 0.5), SLIPPED),
