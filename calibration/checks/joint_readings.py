@@ -42,7 +42,7 @@ def implausible_readings(chain: Chain, q: np.ndarray) -> Iterator[str]:
     """Joints whose readings q (n, n_measured) are far outside their limits."""
     if not len(q):
         return
-    for name, column, low, high in zip(chain.measured, q.T, *chain.limits(), strict=True):
+    for name, column, low, high in zip(chain.measured, q.T, *chain.limits, strict=True):
         margin = _MARGIN * (1.0 + (high - low))
         outside = float(((column < low - margin) | (column > high + margin)).mean())
         if outside > _SHARE:

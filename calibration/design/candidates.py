@@ -80,7 +80,7 @@ class Room:
 def room_of(shapes: Shapes, description: Description, rng: np.random.Generator) -> Room:
     """Inside the limits by a margin; measured joints that carry nothing of the chain stay in their middle."""
     chain = shapes.chain
-    low, high = (np.where(np.isfinite(x), x, s * np.pi) for x, s in zip(chain.limits(), (-1, 1), strict=True))
+    low, high = (np.where(np.isfinite(x), x, s * np.pi) for x, s in zip(chain.limits, (-1, 1), strict=True))
     margin = np.array([MARGIN * (METRES_PER_RAD if chain.is_prismatic(j) else 1.0) for j in chain.measured])
     margin = np.where(np.isin(np.arange(len(low)), chain.columns), np.minimum(margin, 0.25 * (high - low)), np.inf)
     middle = 0.5 * (low + high)

@@ -122,7 +122,7 @@ def _known(
         hand = hand_of(model, chain, frames)
         play = model.reading_sigma if len(model.reading_sigma) else play
     description = _as_measured(description, postures)
-    low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits())
+    low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits)
     anywhere = rng.uniform(low, high, size=(_PROBES, len(low)))
     V = identified_directions(prospect(hand, parameters, description, play, anywhere, anywhere[:1], np.eye(p)).B)
     told = prospect(hand, parameters, description, play, postures.q, anywhere[:1], np.eye(p))

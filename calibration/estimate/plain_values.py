@@ -42,7 +42,7 @@ def restored(kind: type[T], value: Any, at: str = "") -> T:
     try:
         return _restored(kind, value)
     except (KeyError, TypeError, ValueError, AttributeError, ShapeError) as error:
-        raise InputError(at, f"is no {getattr(kind, '__name__', kind)}: {error!r}") from error
+        raise InputError(at, f"its values do not fit a {getattr(kind, '__name__', kind)}: {error!r}") from error
 
 
 def _restored(kind: Any, value: Any) -> Any:

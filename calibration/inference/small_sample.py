@@ -30,4 +30,6 @@ def small_sample_covariance(fit: Fit) -> np.ndarray:
     taken = (Phi * Q).sum(axis=(2, 3)) - 0.5 * np.tensordot(seen, seen, axes=((1, 2), (2, 1)))
     W = np.linalg.pinv(0.5 * own - taken, hermitian=True)
     L = np.tensordot(W, Q, axes=2) - (P @ np.tensordot(W, seen, axes=1)).sum(axis=0)
-    return np.asarray(Phi + Phi @ (L + L.T) @ Phi)
+    size, V = np.linalg.eigh(L + L.T)
+    more = (Phi @ V) * np.sqrt(np.maximum(size, 0.0))  # rounding apart none is negative
+    return np.asarray(Phi + more @ more.T)

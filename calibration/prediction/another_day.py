@@ -104,7 +104,10 @@ def _postures(
             q, T = positions.q, inverse(robot.arm.bends(robot.hand, positions)) @ T
     else:
         trial = relabelled_trial(dataset, entry)
-        q, T = predict.positions(name, "motor", trial), inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
+        q, T = (
+            predict.row_readings.positions(name, "motor", trial),
+            inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T,
+        )
         groups = [np.flatnonzero((trial.t_mocap >= a) & (trial.t_mocap <= b)) for a, b in dwell_windows(trial)]
         if robot.arm is not None and predict.bundled is not None and predict.robot is not None:
             bent = predict.bundled.hand_in_base(trial, predict.robot)

@@ -14,7 +14,7 @@ link angles and sigma theirs, the column bends, and the base sticks and slips (`
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,9 +25,19 @@ from calibration.estimate.estimate import Estimate
 from calibration.estimate.files import load_estimate
 from calibration.estimate.rows import LADDER, row_of
 from calibration.numerics.lie import from_vector, inverse
-from calibration.prediction.base_pose import BaseState, LoadedBase, base_at, loaded_base
+from calibration.prediction.base_pose import LoadedBase, base_at, loaded_base
 from calibration.prediction.bundled_arm import ArmPositions, BundledArm
-from calibration.prediction.hand_pose import HandPose, RobotState, at_readings, in_lab, needed, uncertain
+from calibration.prediction.hand_pose import (
+    HandPose,
+    RobotState,
+    at_readings,
+    continuous,
+    in_lab,
+    needed,
+    placed,
+    proper_acceleration,
+    uncertain,
+)
 from calibration.prediction.slipping_base import SlippingBase
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -40,8 +50,6 @@ from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
 from calibration.stages.suspension.model import Source, Suspension
-
-_SPACING, _SPAN = 0.05, 1.0  # [s] between samples at most, and of all of them at least, for velocities
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,7 @@ class Compensator:
     arm: BundledArm | None = None
     slipping: SlippingBase | None = None
     clocks: tuple[Clock, ...] = ()
+    _bases: dict[bytes, LoadedBase] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def spread(self) -> Spread:
@@ -167,12 +176,12 @@ class Compensator:
             else:
                 moved, spread = self.slipping.moved(there, t, q, w)
                 variance = partial(np.asarray, spread)
-        elif base is not None and self.slipping is not None and self.slipping.source != "plate" and _continuous(t):
+        elif base is not None and self.slipping is not None and self.slipping.source != "plate" and continuous(t):
             moved, spread = self.slipping.moved(base, t, q, None)
             variance = partial(np.asarray, spread)
-        known = velocity is not None or _continuous(t)
+        known = velocity is not None or continuous(t)
         if self.arm is not None:
-            T = _placed(T_lab_base_start, moved, len(t))
+            T = placed(T_lab_base_start, moved, len(t))
             along = self.arm.along(t, q, velocity, T) if known else self.arm.at_rest(q, T_lab_base_start)
             found = self._on_links(along)
         else:
@@ -241,30 +250,16 @@ class Compensator:
                 variance = partial(self.slipping.variance, state)
         arm, in_base = None, None
         if self.arm is not None and moving is not None:
-            arm = self.arm.stepped(t, moving, before.arm, self._loads_of(state, T_lab_base_start, base))
+            loads = proper_acceleration(self.arm, self.slipping, base, state, T_lab_base_start)
+            arm = self.arm.stepped(t, moving, before.arm, loads)
             in_base = self._on_links(arm.positions)
         in_base = in_base or self._hand(np.array([t]), q, v)
         moved = None if state is None else state.moved
         return in_lab(in_base, base, moved, T_lab_base_start, variance, RobotState(arm, state))
 
-    def _loads_of(
-        self, state: BaseState | None, T_lab_base: np.ndarray | None, base: LoadedBase | None
-    ) -> np.ndarray | None:
-        """Proper acceleration (6,) of the root after a sample, the base at the start at T_lab_base (4, 4)."""
-        if self.arm is None:
-            return None
-        if state is None or base is None:
-            return self.arm.proper(T_lab_base)
-        T = state.moved[0] if T_lab_base is None else state.moved[0] @ T_lab_base
-        return self.arm.proper(T, None if self.slipping is None else self.slipping.accelerations(base, state))
-
     def _refuse_impossible(self, q: np.ndarray) -> None:
-        if beyond(q, *self._limits) and (wrong := list(implausible_readings(self.hand.nominal, q))):
+        if beyond(q, *self.hand.nominal.limits) and (wrong := list(implausible_readings(self.hand.nominal, q))):
             raise InputError("q_motor", "; ".join(wrong))
-
-    @cached_property
-    def _limits(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.hand.nominal.limits()
 
     def _base(self, T_lab_base: np.ndarray | None) -> LoadedBase | None:
         """The base at its pose, None without a suspension or a laboratory."""
@@ -275,11 +270,6 @@ class Compensator:
             self._bases.clear()
             self._bases[key] = loaded_base(self.suspension, self.laboratory, T_lab_base)
         return self._bases[key]
-
-    @cached_property
-    def _bases(self) -> dict[bytes, LoadedBase]:
-        """The base where it stood last."""
-        return {}
 
     def _hand(self, t: np.ndarray, q: np.ndarray, velocity: np.ndarray | None) -> HandPose:
         """In the base frame, by readings less the joint models."""
@@ -308,17 +298,3 @@ class Compensator:
         covariance = found.J @ self.covariance @ np.swapaxes(found.J, 1, 2)
         covariance += (found.J_joint * variance[:, None, :]) @ np.swapaxes(found.J_joint, 1, 2)
         return np.asarray(covariance + np.diag(self.spread.hand_variances))
-
-
-def _placed(T_lab_base: np.ndarray | None, moved: np.ndarray | None, n: int) -> np.ndarray | None:
-    """The base (n, 4, 4) from its pose at the start and how it moved in the lab; None where neither is known."""
-    if moved is None and T_lab_base is None:
-        return None
-    start = np.eye(4) if T_lab_base is None else np.asarray(T_lab_base, dtype=float)
-    return np.broadcast_to(start, (n, 4, 4)) if moved is None else moved @ start
-
-
-def _continuous(t: np.ndarray) -> bool:
-    """Whether readings are many and close enough to have velocities."""
-    steps = np.diff(t)
-    return len(t) > 1 and steps.min() > 0.0 and steps.max() <= _SPACING and t[-1] - t[0] >= _SPAN

@@ -11,10 +11,13 @@ from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model
 from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase
-from calibration.prediction.bundled_arm import ArmState
+from calibration.prediction.bundled_arm import ArmState, BundledArm
+from calibration.prediction.slipping_base import SlippingBase
 from calibration.recording.clock import Clock
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
+
+_SPACING, _SPAN = 0.05, 1.0  # [s] between samples at most, and of all of them at least, for velocities
 
 
 class RobotState(NamedTuple):
@@ -112,3 +115,31 @@ def uncertain(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarra
         vector = np.array([model.parameters[i].value for i in arm])
         G[np.ix_([names.index(name) for name in placement], arm)] = placement_derivative(chain, vector)
     return names, np.asarray(G @ model.random_covariance @ G.T)
+
+
+def placed(T_lab_base: np.ndarray | None, moved: np.ndarray | None, n: int) -> np.ndarray | None:
+    """The base (n, 4, 4) from its pose at the start and how it moved in the lab; None where neither is known."""
+    if moved is None and T_lab_base is None:
+        return None
+    start = np.eye(4) if T_lab_base is None else np.asarray(T_lab_base, dtype=float)
+    return np.broadcast_to(start, (n, 4, 4)) if moved is None else moved @ start
+
+
+def continuous(t: np.ndarray) -> bool:
+    """Whether readings are many and close enough to have velocities."""
+    steps = np.diff(t)
+    return len(t) > 1 and steps.min() > 0.0 and steps.max() <= _SPACING and t[-1] - t[0] >= _SPAN
+
+
+def proper_acceleration(
+    arm: BundledArm,
+    slipping: SlippingBase | None,
+    base: LoadedBase | None,
+    state: BaseState | None,
+    T_lab_base: np.ndarray | None,
+) -> np.ndarray | None:
+    """Proper acceleration (6,) of the root after a sample, the base at the start at T_lab_base (4, 4)."""
+    if state is None or base is None:
+        return arm.proper(T_lab_base)
+    T = state.moved[0] if T_lab_base is None else state.moved[0] @ T_lab_base
+    return arm.proper(T, None if slipping is None else slipping.accelerations(base, state))

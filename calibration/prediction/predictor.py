@@ -17,11 +17,11 @@ markers of its first second (throughout where the base is `measured`), never han
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, TypeVar
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 
-from calibration.errors import NotEnoughData
 from calibration.estimate.rows import LADDER, NOMINAL, SOURCES, Base, Encoder, LadderRow, row_of
 from calibration.mocap.cluster_pose import poses_of_means
 from calibration.mocap.postures import dwell_windows, readings_at
@@ -29,6 +29,7 @@ from calibration.numerics.lie import from_vector, inverse
 from calibration.prediction.base_pose import BaseInTrial, measured_base
 from calibration.prediction.bundled_arm import BundledArm
 from calibration.prediction.predicted_trial import Delivered, PredictedTrial, Prediction, base_motion, joint_samples
+from calibration.prediction.row_readings import RowReadings, Side
 from calibration.recording.clock import Clock
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Description, TrialEntry
@@ -36,15 +37,13 @@ from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.drive_trains.geometry_refit import CorrectedTrial
-from calibration.stages.joints.correction import Corrected, JointModels, correct
-from calibration.stages.joints.samples import aligned_link_readings
+from calibration.stages.joints.correction import Corrected, JointModels
 from calibration.stages.stick_slip.poses import BasePrediction
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
 
 T = TypeVar("T")
-Side = Literal["motor", "corrected", "bundled", "bundled link", "link"]  # readings the geometry is evaluated at
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class Predictor:
     def poses(self, entry: TrialEntry, trial: Trial) -> "TrialPoses":
         """What the rows of one trial are made of."""
         T_lab_B, start = measured_base(self.description.base_body, trial)
-        still, corrected = np.broadcast_to(start, T_lab_B.shape), self._corrected(trial)
+        still, corrected = np.broadcast_to(start, T_lab_B.shape), self.row_readings.corrected(trial)
         return TrialPoses(self, entry, trial, T_lab_B, still, self._base(entry, trial, start), corrected)
 
     def of_means(self, entry: TrialEntry, means: PostureMeans) -> Iterator[Prediction]:
@@ -132,7 +131,7 @@ class Predictor:
 
     def _at_rest(self, row: LadderRow, hand: HandModel, q: np.ndarray) -> np.ndarray:
         """T_B_H (n, 4, 4) at motor readings (n, n_joints), each at rest for itself."""
-        if self.side(row, "motor") != "bundled" or self.bundled is None:
+        if self.row_readings.side(row, "motor") != "bundled" or self.bundled is None:
             return hand.poses(q)
         arm = BundledArm(self.bundled.trains, self.bundled.bending, self.bundled.at_rest)
         return arm.poses(hand, arm.at_rest(q))
@@ -145,40 +144,10 @@ class Predictor:
                 if encoder == "motor" or not row.bundle or (self.bundled and self.bundled.knows_link_encoders):
                     yield row, self.models[row.name], encoder
 
-    def positions(self, name: str, encoder: Encoder, trial: Trial) -> np.ndarray:
-        """Joint positions (n, n_joints) [rad, m] the geometry is evaluated at, at the motion capture's times.
-
-        The base is measured throughout the trial, by which other sessions are registered.
-        """
-        side = self.side(row_of(name), encoder)
-        if side == "bundled" and self.bundled is not None and self.robot is not None:
-            return self.readings(side, trial, self.bundled.corrected(trial, self.robot).trial.q_motor)
-        corrected = self._corrected(trial) if side == "corrected" else None
-        return self.readings(side, trial, None if corrected is None else corrected.q)
-
-    def side(self, row: LadderRow, encoder: Encoder) -> Side:
-        """Which readings the geometry of a row is evaluated at."""
-        if row.bundle and self.bundled is not None and self.bundled.trains.trains:
-            return "bundled" if encoder == "motor" else "bundled link"
-        if self.joints is None or (encoder == "motor" and not row.joints):
-            return "motor"
-        return "link" if encoder == "link" else "corrected"
-
-    def readings(self, side: Side, trial: Trial, corrected: np.ndarray | None) -> np.ndarray:
-        """Readings (n, n_joints) [rad, m] of a side of the gears, or corrected ones, at the motion capture's times."""
-        if self.robot is None or not len(trial.t_robot):
-            raise NotEnoughData(f"{trial.id}: no joint readings on a known clock, so no hand pose can be predicted")
-        readings = trial.q_motor
-        if side == "link" and self.joints is not None:
-            readings = aligned_link_readings(trial, self.joints.zero)
-        elif side != "motor" and corrected is not None:
-            readings = corrected
-        return readings_at(trial, self.robot, trial.t_mocap, readings)
-
-    def _corrected(self, trial: Trial) -> Corrected | None:
-        if self.joints is None or not len(trial.t_robot):
-            return None
-        return correct(self.joints.of_trial(trial.id), trial.t_robot, trial.q_motor)
+    @cached_property
+    def row_readings(self) -> RowReadings:
+        """What the geometry of each row is evaluated at."""
+        return RowReadings(self.robot, self.joints, self.bundled)
 
     def _base(self, entry: TrialEntry, trial: Trial, T_lab_B: np.ndarray) -> BaseInTrial | None:
         """The base on its suspension, its marker body at rest at T_lab_B (4, 4)."""
@@ -213,7 +182,7 @@ class TrialPoses:
 
     def in_base(self, row: LadderRow, encoder: Encoder, source: Base) -> np.ndarray:
         """T_B_H (n, 4, 4) of a row, NaN where a reading is missing; `source` of the base's motion, which loads it."""
-        p, side = self.predictor, self.predictor.side(row, encoder)
+        p, side = self.predictor, self.predictor.row_readings.side(row, encoder)
         hand, geared = p.models[row.name], self.geared(source) if side in ("bundled", "bundled link") else None
         return self._once(("in base", id(hand), side, id(geared)), lambda: self._in_base(hand, side, geared))
 
@@ -265,7 +234,7 @@ class TrialPoses:
         source, T_lab_B = next(found, (None, None))
         if source is None or T_lab_B is None:
             return None
-        side, hand = p.side(row, "motor"), p.models[row.name].carrying(self.entry.payload)
+        side, hand = p.row_readings.side(row, "motor"), p.models[row.name].carrying(self.entry.payload)
         T_B_H, columns = self.in_base(row, "motor", source), hand.chain.columns
         q, motor = self._readings(side), self._readings("motor")
         link = readings_at(self.trial, p.robot, self.trial.t_mocap, self.trial.q_link) if p.robot else motor
@@ -297,7 +266,7 @@ class TrialPoses:
         """Readings (n, n_joints) [rad, m] of a side of the gears at the motion capture's times."""
         corrected = None if self.corrected is None else self.corrected.q
         geared = self.geared() if side == "bundled" else None
-        return self.predictor.readings(side, self.trial, corrected if geared is None else geared.trial.q_motor)
+        return self.predictor.row_readings.of(side, self.trial, corrected if geared is None else geared.trial.q_motor)
 
     def _displaced(self, source: Source, hand: HandModel) -> tuple[Rest, np.ndarray] | None:
         if self.loaded is None or not self._recorded(source):

@@ -71,11 +71,15 @@ def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[n
 def _dwells(predict: Predictor, name: str, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     """Mean positions (n, n_joints) and measured T_B_H (n, 4, 4), unbent, of the dwells that show both bodies."""
     base, hand = predict.description.base_body, predict.description.hand_body
-    q = predict.positions(name, "motor", trial)
+    q = predict.row_readings.positions(name, "motor", trial)
     T = inverse(poses_of(base, trial).T) @ poses_of(hand, trial).T
     known = np.isfinite(q).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
     bundled = predict.bundled
-    if bundled is not None and predict.robot is not None and predict.side(row_of(name), "motor") == "bundled":
+    if (
+        bundled is not None
+        and predict.robot is not None
+        and predict.row_readings.side(row_of(name), "motor") == "bundled"
+    ):
         bends = bundled.hand_in_base(trial, predict.robot)[known] @ inverse(bundled.hand.poses(q[known]))
         T[known] = inverse(bends) @ T[known]
     inside = [known & (trial.t_mocap >= a) & (trial.t_mocap <= b) for a, b in dwell_windows(trial)]

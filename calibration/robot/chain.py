@@ -123,6 +123,7 @@ class Chain:
             return neutral + q[:, order]
         return np.array([pin.integrate(self.nominal, neutral, row) for row in q[:, order]])
 
+    @cached_property
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper joint limits of `measured` [rad, m], -inf and inf for a continuous joint."""
         lower, upper = np.full(len(self.measured), -np.inf), np.full(len(self.measured), np.inf)

@@ -76,7 +76,7 @@ def design(  # noqa: PLR0913  a file each
     if play is not None:
         chain = found.task.model.nominal
         slides = [chain.is_prismatic(joint) for joint in description.joint_names]
-        tour = played(description.joint_names, found.postures, chain.limits(), slides)
+        tour = played(description.joint_names, found.postures, chain.limits, slides)
         with output_folder.updating(play, PLAYED) as new:
             tour.write(new)
     return Designed(found, against)

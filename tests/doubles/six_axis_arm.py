@@ -33,7 +33,7 @@ def measured(seed: int, n: int, marker_sigma: float = 1e-4, encoder_sigma: float
     """One arm: placements off by 1 mm and 2 mrad, zeros by 10 mrad."""
     rng, nominal = np.random.default_rng(seed), chain()
     true = nominal.with_placements(np.repeat([1e-3, 2e-3], 3) * rng.normal(size=(6, 6)))
-    low, high = nominal.limits()
+    low, high = nominal.limits
     angles = rng.uniform(0.6 * low, 0.6 * high, (n, 6))
     X = pin.SE3(pin.exp3(np.array([0.02, -0.03, 0.7])), np.array([0.5, -0.3, 0.1])).homogeneous
     Y = pin.SE3(pin.exp3(np.array([0.1, 0.0, -0.2])), np.array([0.0, 0.01, 0.05])).homogeneous

@@ -20,7 +20,7 @@ CHAIN = chain_of(mjcf.urdf(), DESCRIBED)
 PARAMETERS = geometry_parameters(CHAIN, DESCRIBED)
 HAND = nominal_hand(CHAIN, PARAMETERS.nominal[:12])
 PLAY = reading_sigma(CHAIN, DESCRIBED)
-Q = np.random.default_rng(0).uniform(*(np.clip(x, -2.0, 2.0) for x in CHAIN.limits()), size=(40, len(CHAIN.measured)))
+Q = np.random.default_rng(0).uniform(*(np.clip(x, -2.0, 2.0) for x in CHAIN.limits), size=(40, len(CHAIN.measured)))
 DEPARTURES = departures_of(CHAIN, Q)
 
 

@@ -302,7 +302,7 @@ BAD = {
     "moments in another unit than said": (
         set_parameter("ANALOG", "UNITS", ["N", "N", "N", "N.mm", "N.m", "N.mm"] * 2), "map the right `moment_unit`",
     ),
-    "no units": (set_parameter("ANALOG", "UNITS", [""] * 12), "say [''] and the mapping nothing of its moments"),
+    "no units": (set_parameter("ANALOG", "UNITS", [""] * 12), "are [''] and the mapping nothing of its moments"),
     "pounds": (set_parameter("ANALOG", "UNITS", ["lbf"] * 12), "expected N and N.mm"),
     "type 3": (set_parameter("FORCE_PLATFORM", "TYPE", [3, 3]), "is of type 3; export it as type 2 or 4"),
     "one plate": (set_parameter("FORCE_PLATFORM", "USED", [1]), "FORCE_PLATFORM:USED is 1, there is no plate 2"),

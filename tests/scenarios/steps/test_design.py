@@ -68,7 +68,7 @@ def test_thirty_designed_postures_beat_random_ones_where_the_robot_departs_from_
 def test_a_robot_plays_the_tour(found, tmp_path):
     chain = found.task.model.nominal
     slides = [chain.is_prismatic(j) for j in chain.measured]
-    tour = played(chain.measured, found.postures, chain.limits(), slides)
+    tour = played(chain.measured, found.postures, chain.limits, slides)
     paths = {path.name: path for path in tour.write(tmp_path)}
     assert tuple(paths) == PLAYED
     motion = read_trajectory(paths["tour.csv"], "tour", "calibration", rest=1.0)  # limits and speeds of the twin
@@ -77,7 +77,7 @@ def test_a_robot_plays_the_tour(found, tmp_path):
         at = [np.array([np.interp(t, tour.t, column) for column in tour.q.T]) for t in (start - 0.01, start, stop)]
         np.testing.assert_allclose(at[1:], [posture.q] * 2, atol=1e-9)
         asked = np.array(posture.approach)
-        low, high = chain.limits()
+        low, high = chain.limits
         free = (asked != 0) & (np.abs(np.array(posture.q) - np.where(asked > 0, low, high)) > 1e-3)
         np.testing.assert_array_equal(np.sign(at[1] - at[0])[free], asked[free])
         assert stop - start == pytest.approx(2.0)
@@ -100,7 +100,7 @@ def test_without_departures_they_beat_random_ones_by_thirty_percent(task, claim)
 
 
 def test_designed_postures_are_inside_the_limits_clear_of_the_robot_and_in_sight(found, task):
-    q, (low, high) = np.array([p.q for p in found.postures]), task.model.chain.limits()
+    q, (low, high) = np.array([p.q for p in found.postures]), task.model.chain.limits
     assert (q > low + 0.005).all() and (q < high - 0.005).all()
     assert not task.room.shapes.collides(q).any() and in_sight(task.room.shapes, DESCRIBED, q).all()
     assert len(np.unique(np.round(q, 3), axis=0)) == 30

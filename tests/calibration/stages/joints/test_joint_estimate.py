@@ -49,7 +49,7 @@ def test_a_trial_s_own_payload_reaches_the_joint_models(dataset: Dataset) -> Non
         inputs = input_model(Laboratory(dataset.urdf, description), hand)
         joints = JointModels(inputs, np.zeros(len(inputs.measured)), (yielding("arm_4_joint"),))
         predict = Predictor({"model_3": hand}, dataset.urdf, description, ROBOT, joints=joints)
-        turned[mass] = predict.positions("model_3", "motor", trial)[:, ARM_4]
+        turned[mass] = predict.row_readings.positions("model_3", "motor", trial)[:, ARM_4]
     q = trial.q_motor - joint_data.OFFSET
     J, R = hand.chain.joint_jacobians(q), hand.chain.poses(q)[:, :3, :3]
     torque = (2.0 - 0.437) * 9.81 * np.einsum("ni,ni->n", R[:, 2], J[:, :3, ARM_4])
