@@ -6,7 +6,15 @@ from tests.acceptance.base_lines import lines
 from tests.acceptance.series import SAMPLED, kept_series
 
 pytestmark = pytest.mark.slow
-OPEN = {"share in the 95 % band, swing", "share in the 95 % band, static"}  # as docs/limits.md says
+OPEN = {  # as docs/limits.md says; bounds are the default robot's
+    "fixed": {"share in the 95 % band, swing"},
+    "sampled": {
+        "max of swing/plate",
+        "median of swing/dynamics",
+        "max of swing/dynamics",
+        "share of swings with yaw R2 of .95",
+    },
+}
 ROBOTS = {"fixed": ("humanoids2024", ()), "sampled": ("humanoids2024", SAMPLED), "jolts": ("jolts", ())}
 
 
@@ -16,6 +24,6 @@ def test_every_line_but_the_open_ones_holds(robots, tmp_path_factory, claim):
     broken = []
     for line in lines(kept_series(robots, tmp_path_factory.mktemp, overrides, scenario).scores):
         claim(f"slip/{robots}/{line.name}", line.figures or (line.value,))
-        if not line.holds and line.name not in OPEN:
+        if not line.holds and line.name not in OPEN.get(robots, ()):
             broken.append(line)
     assert not broken
