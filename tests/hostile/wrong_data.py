@@ -58,6 +58,7 @@ class Mistake:
     stages: tuple[str, ...] = STAGES
 
 
+WRONG_LINK = "arm_3_joint are exchanged, or a link encoder is wrong"
 SLIPPED = "elsewhere|slipped|drift|off in scale|late|moved|contradict|did not converge|refused"
 FAST = (
     Mistake("markers 1 % too large", scaled(1.01), "times as far apart as in dataset.json", judged=True),
@@ -80,7 +81,7 @@ TABLE = (
     Mistake("arm_3 slips by 1 deg", slip(3, 0.0175, 0.5), SLIPPED),
     Mistake("arm_3 drifts by 1 deg", drift(3, 0.0175), SLIPPED),
     *(
-        Mistake(f"link of arm_3 {what}", link(3, change, share), says, stages=LINKS)
+        Mistake(f"link of arm_3 {what}", link(3, change, share), f"{says}|{WRONG_LINK}", stages=LINKS)
         for what, change, share, says in (
             ("turned", lambda q, t: -q, -1.0, "arm_3_joint has its sign turned"),
             ("in degrees", lambda q, t: np.degrees(q), -1.0, "arm_3_joint is in degrees"),
