@@ -71,7 +71,7 @@ pictures: $(READY)
 	$(BIN)/python docs/evidence.py runs/demo
 
 gallery: $(READY)
-	for name in $$($(BIN)/tiago-twin list | cut -d' ' -f1 | grep -v humanoids2024); do \
+	for name in $$($(BIN)/tiago-twin list | cut -d' ' -f1 | grep -v -e humanoids2024 -e swing20); do \
 	  $(BIN)/tiago-twin run $$name --quick --out runs/gallery/$$name && \
 	  $(BIN)/python docs/evidence.py runs/gallery/$$name || exit 1; done
 
