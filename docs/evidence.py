@@ -121,9 +121,6 @@ def prose() -> Iterator[tuple[Path, str, str]]:
     yield limits, r"floor of the instruments [\d.]+ mm", f"floor of the instruments {run['floor']} mm"
     yield limits, r"\d+ of \d+ contain the truth in the default run", f"{inside} contain the truth in the default run"
     yield limits, r"\d+ to \d+ % on twenty", f"{range_} on twenty"
-    swing, static = (claims[f"slip/fixed/share in the 95 % band, {kind}"]["figures"] for kind in ("swing", "static"))
-    shares = " and ".join(f"{100 * sum(x) / len(x):.0f} %" for x in (swing, static))
-    yield limits, r"\d+ % and \d+ % inside", f"{shares} inside"
 
 
 def main(runs: list[Path]) -> int:

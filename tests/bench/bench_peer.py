@@ -62,7 +62,7 @@ def robot(n: int, m: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     chain = chain_of_frames(mjcf.urdf(), JOINTS, "universe", TOOL)
     xi = rng.normal(size=(8, 6)) * np.repeat([3e-3, 1e-2], 3)
-    q = rng.uniform(*chain.limits(), size=(n + HELD_OUT, 8))
+    q = rng.uniform(*chain.limits, size=(n + HELD_OUT, 8))
     T = from_vector(np.array([0.9, 0.5, 0.1, 0.02, -0.01, 1.2])) @ chain.with_placements(xi).poses(q)
     p = np.einsum("nij,mj->nmi", T[:, :3, :3], TIPS[:m]) + T[:, None, :3, 3]
     return q, p + NOISE * rng.normal(size=p.shape)

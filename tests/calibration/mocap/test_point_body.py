@@ -27,7 +27,7 @@ HAND = nominal_hand(CHAIN, PARAMETERS.nominal[:12])
 @pytest.fixture(scope="module")
 def postures():
     """Means of the nominal robot's markers, seen without noise from a base that stands somewhere."""
-    low, high = (np.clip(x, -2.0, 2.0) for x in CHAIN.limits())
+    low, high = (np.clip(x, -2.0, 2.0) for x in CHAIN.limits)
     q = RNG.uniform(low, high, size=(6, len(low)))
     base = next(b for b in DESCRIBED.bodies if b.name == "base")
     T = HAND.poses(q)
