@@ -212,8 +212,9 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     assert 1e3 * np.abs(found.T - still.T)[:, :3, 3].max() > 1.0
     robot, plate = (estimate.clock(name) for name in ("robot", "plate"))
     clocks = compensator.predict(robot.from_mocap(t), q, w, start, t_wrench=plate.from_mocap(t))
-    # the robot's second is 12 ppm off, so are velocities; a gear may change its side a moment earlier or later
-    assert np.mean(np.abs(clocks.T - found.T) > 5e-5) < 1e-3
+    off = np.abs(clocks.T - found.T)  # the robot's second is 12 ppm off, so are velocities
+    # a gear may cross its gap a moment earlier or later
+    assert (off > 5e-5).mean() < 1e-3 if estimate.main == "full" else off.max() <= 5e-5
 
 
 def test_without_a_plate_it_is_the_row_with_the_base_from_dynamics(result, compensator, swing):

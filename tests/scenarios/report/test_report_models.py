@@ -200,13 +200,13 @@ def test_the_base_is_judged_by_the_truth_where_there_is_one(run):
     assert said in text_of(run)
 
 
-@pytest.mark.parametrize(("rho", "told"), [(50.0, "50.0"), (2.0, "≤ 2.00"), (1000.0, "≥ 1000")])
-def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, told):
+@pytest.mark.parametrize(("rho", "shown"), [(50.0, "50.0"), (2.0, "≤ 2.00"), (1000.0, "≥ 1000")])
+def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, shown):
     model, none = known_joint()
     shutil.rmtree(run / "estimate")
     save_estimate(known_estimate(joint_models=(replace(model, rho=rho), none)), run / "estimate")
     write(run)
-    assert row_of(run, "The published joint model", JOINT)[1].replace("\u202f", "") == told
+    assert row_of(run, "The published joint model", JOINT)[1].replace("\u202f", "") == shown
     assert row_of(run, "The published joint model", PLAIN)[1] == "–"
 
 
