@@ -5,9 +5,11 @@ every page of claims.toml from it. Names that differ behind `#` alone, robots or
 """
 
 import json
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from datetime import date
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +20,28 @@ RESULTS = ROOT / "docs/results/claims.json"
 SENTENCES = Path(__file__).with_name("claims.toml")
 
 
+def measured() -> dict[str, str]:
+    """Date of today and commit of this tree, empty outside a clone: what a figure is kept with."""
+    return {"date": date.today().isoformat(), "tree": _tree()}
+
+
+@cache
+def _tree() -> str:
+    command = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
+    return subprocess.run(command, capture_output=True, text=True).stdout.strip()
+
+
+def when(figures: list[dict]) -> str:
+    """Last date and the trees of figures of one row."""
+    return ", ".join(
+        x for x in (max(f["date"] for f in figures), *dict.fromkeys(f.get("tree", "") for f in figures)) if x
+    )
+
+
 def keep(name: str, figures: np.ndarray | float) -> None:
     """Add the figures of a claim, one a robot, to runs/claims.jsonl."""
     KEPT.parent.mkdir(exist_ok=True)
-    content = {"date": date.today().isoformat(), "figures": [float(x) for x in np.atleast_1d(figures)]}
+    content = {**measured(), "figures": [float(x) for x in np.atleast_1d(figures)]}
     with KEPT.open("a", encoding="utf-8") as file:
         file.write(json.dumps({name: content}) + "\n")
 
@@ -53,7 +73,7 @@ def _section(section: dict, results: dict) -> list[str]:
             shown = [f"{value:.{section.get('decimals', 2)}f}" for value in (np.median(x), x.min(), x.max())]
             cells = shown[:1] if single else [str(len(x)), *shown]
             label = name.strip("/ []").replace("/", ", ")
-            lines.append(f"| {' | '.join((label, *cells, max(r['date'] for r in rows[name])))} |")
+            lines.append(f"| {' | '.join((label, *cells, when(rows[name])))} |")
         lines.append("")
     elif "figures" in section:
         lines += ["Not measured yet.", ""]
