@@ -1,8 +1,8 @@
 """An estimate of another program on one of our datasets: names, units and joints checked, marker frames registered.
 
 Every name must be one of the contract's for this robot. A model that places the hand becomes a row under its own name.
-A URDF does not hold where the marker bodies are: both frames are fitted to the static calibration postures, all else
-as submitted.
+A URDF does not contain the marker bodies' frames: both are fitted to the static calibration postures, all else as
+submitted.
 """
 
 import re
@@ -35,11 +35,13 @@ from calibration.verdict import Verdict
 
 _AXIS = "(x|y|z|rx|ry|rz)"
 _FREE = re.compile(  # of the contract, without effect on the hand's place
-    rf"(friction\.\w+\.(coulomb|viscous)|sigmoid\.\w+\.\w+|suspension\.\w+\.\w+|slip\.\w+(\.\w+\.[kdc])?|flexibility\.\w+\.kr?[xyz]|contact\.\w+\.\w+"
-    rf"|link\.\w+\.(mass|cx|cy|cz)|payload\.(mass|cx|cy|cz)|marker\.\w+\.[xyz]|plate\.\w+\.\w+"
-    rf"|clock\.\w+\.(offset|drift)|frame\.\w+\.\w+\.{_AXIS}|encoder\.\w+\.(motor|link)\.(offset|cos1|sin1|cos2|sin2)"
-    rf"|(gear|hysteresis)\.\w+\.\w+|backlash\.\w+\.gap|drive\.\w+\.\w+)"
+    r"(friction\.\w+\.(coulomb|viscous)|sigmoid\.\w+\.\w+|suspension\.\w+\.\w+|slip\.\w+(\.\w+\.[kdc])?|flexibility\.\w+\.kr?[xyz]|contact\.\w+\.\w+"
+    r"|link\.\w+\.(mass|cx|cy|cz)|payload\.(mass|cx|cy|cz)|marker\.\w+\.[xyz]|plate\.\w+\.\w+"
+    r"|clock\.\w+\.(offset|drift)|encoder\.\w+\.(motor|link)\.(offset|cos1|sin1|cos2|sin2)"
+    r"|(gear|hysteresis)\.\w+\.\w+|backlash\.\w+\.gap|drive\.\w+\.\w+)"
 )
+_FRAME = re.compile(rf"frame\.(\w+)\.(\w+)\.{_AXIS}")
+_FRAMES = {"lab", "base", "arm", "tool", "hand", "plate"}
 _JOINT = re.compile(r"(geometry|encoder|gear|hysteresis|backlash|friction|sigmoid)\.(\w+)\.")
 _STATIC = ("encoder", "gear", "backlash")
 _LARGEST = {"m": 0.5, "rad": 1.6}  # a value beyond it is of another unit
@@ -57,12 +59,14 @@ def check_names(estimate: Estimate, dataset: Dataset) -> tuple[Verdict, ...]:
     Raises:
         InputError: A name, a joint or a unit is not one of the contract's for this robot; all findings at once.
     """
-    hand = hand_model(chain_of(dataset.urdf, dataset.description), np.zeros(12))
+    chain, joints = chain_of(dataset.urdf, dataset.description), dataset.description.joint_names
+    frames = _FRAMES | {body.name for body in dataset.description.bodies} | {f.name for f in chain.nominal.frames}
+    hand = hand_model(chain, np.zeros(12))
     units = {name: unit for block in hand.blocks for name, unit in zip(block.names, block.units, strict=True)}
     findings, unused = [], set()
     for model in estimate.models:
         for p in model.parameters:
-            findings += [f"{model.name}: {text}" for text in _faults(p, units, dataset.description.joint_names)]
+            findings += [f"{model.name}: {text}" for text in _faults(p, units, joints, frames)]
             if p.name not in units and p.name.startswith(_STATIC) and estimate.robot is None:
                 unused.add(p.name)
     if findings:
@@ -72,11 +76,11 @@ def check_names(estimate: Estimate, dataset: Dataset) -> tuple[Verdict, ...]:
     return (Verdict("evaluation", "warning", f"no row uses {', '.join(sorted(unused))}"),)
 
 
-def _faults(p: Parameter, units: dict[str, str], joints: tuple[str, ...]) -> Iterator[str]:
-    joint = _JOINT.match(p.name)
+def _faults(p: Parameter, units: dict[str, str], joints: tuple[str, ...], frames: set[str]) -> Iterator[str]:
+    joint, frame = _JOINT.match(p.name), _FRAME.fullmatch(p.name)
     if joint and joint.group(2) not in joints:
         yield f"{p.name}: no joint {joint.group(2)!r}{_nearest(joint.group(2), joints)}"
-    elif p.name not in units and not _FREE.fullmatch(p.name):
+    elif p.name not in units and not (_FREE.fullmatch(p.name) or (frame and frames.issuperset(frame.group(1, 2)))):
         yield f"{p.name}: no such parameter{_nearest(p.name, tuple(units))}"
     elif p.unit and p.unit != units.get(p.name, p.unit):
         yield f"{p.name}: unit {p.unit!r}; it must be {units[p.name]!r}"
@@ -103,7 +107,9 @@ def registered(estimate: Estimate, dataset: Dataset) -> Estimate:
     for model in estimate.models:
         hand = hand_of(model, chain, lab.nominal_frames)
         models.append(_with(model, _fitted_frames(hand, chain, lab.description, postures)))
-    message = f"marker frames registered on {len(postures.q)} calibration postures; the URDF does not hold them"
+    zeros = any(p.name.startswith("encoder.") for model in estimate.models for p in model.parameters)
+    message = f"marker frames registered on {len(postures.q)} calibration postures"
+    message += "; a URDF has none" if zeros else ", encoder zeros 0; a URDF has neither (zeros: --zeros FILE)"
     verdicts = (*estimate.verdicts, Verdict("evaluation", "ok", message))
     return replace(estimate, models=tuple(models), clocks=estimate.clocks or clocks, verdicts=verdicts)
 

@@ -65,15 +65,18 @@ def _finish(bars: Any, steps: dict[str, "TaskID"]) -> None:
 
 
 def _lines(console: Console) -> Progress:
-    last_step, last_time = "", 0.0
+    last_step, last_time, start = "", 0.0, 0.0
 
     def show(step: str, at: str, fraction: float) -> None:
-        nonlocal last_step, last_time
+        nonlocal last_step, last_time, start
         now = time.monotonic()
-        if step != last_step or now - last_time > PLAIN_PERIOD:
-            line = f"{step} {fraction:4.0%} {at}" if fraction or at else step
-            console.print(line, markup=False, highlight=False, soft_wrap=True)
-            last_step, last_time = step, now
+        if step == last_step and now - last_time <= PLAIN_PERIOD:
+            return
+        start = now if step != last_step else start
+        left = f", {(now - start) * (1.0 / fraction - 1.0):.0f} s left" if now > start and 0.0 < fraction < 1.0 else ""
+        line = f"{step} {fraction:4.0%} {at}{left}" if fraction or at else step
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        last_step, last_time = step, now
 
     return show
 

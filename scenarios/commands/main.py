@@ -68,7 +68,7 @@ def options(
 
 @app.command("list", epilog=_example("list"), rich_help_panel=_SIMULATE)
 def list_scenarios() -> None:
-    """List the scenarios."""
+    """List the scenarios, each with the length of its recordings."""
     from scenarios.files import registry, yaml_file
 
     width = max(map(len, registry.names()), default=0)

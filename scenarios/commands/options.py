@@ -10,7 +10,7 @@ from typer.core import TyperGroup
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")]
 Seed = Annotated[int | None, typer.Option(min=0, metavar="N", help="Random seed; the scenario's unless given.")]
-Quick = Annotated[bool, typer.Option("--quick", help="A shorter campaign, at most 180 s of recordings.")]
+Quick = Annotated[bool, typer.Option("--quick", help="A shorter campaign, about 3 minutes of recordings.")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(

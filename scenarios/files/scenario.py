@@ -29,7 +29,7 @@ class Scenario(BaseModel):
     calibration: Annotated[Options, Field(default_factory=Options)]
 
     def quick(self) -> "Scenario":
-        """The same robot and laboratory, a campaign of at most 180 s: for tests, its figures are of less data."""
+        """The same robot and laboratory, a campaign of about 3 minutes: for tests; less data, larger errors."""
         whole = self.twin.campaign
         short = replace(
             whole,

@@ -11,14 +11,15 @@ _WORDS = {"in_sample": "In sample", "new_motion": "New motion", "static": "Stati
 _HEAD = """# Results: corrections of the joints, head to head
 
 Rms error of the link angle against the truth [mrad], after the zero of the calibration dwells; medians over robots, the
-worst in brackets. In sample: moving calibration trials. New motion: validation swings. Static: validation dwells. Made
-by `{command}`; fifty robots unless `-n` says otherwise.
+worst in brackets. In sample: moving calibration trials. New motion: validation swings. Static: validation dwells.
+
+{origin}
 """
 
 
-def page(found: Mapping[str, Sequence[Row]], command: str) -> str:
-    """Markdown of runs by scenario, made by a command."""
-    return _HEAD.format(command=command) + "".join(_of_scenario(name, rows) for name, rows in found.items())
+def page(found: Mapping[str, Sequence[Row]], origin: str) -> str:
+    """Markdown of runs by scenario; `origin` is the sentence that says how they were made."""
+    return _HEAD.format(origin=origin) + "".join(_of_scenario(name, rows) for name, rows in found.items())
 
 
 def _of_scenario(name: str, rows: Sequence[Row]) -> str:

@@ -11,7 +11,8 @@ from ruamel.yaml import YAML
 
 from scenarios.commands.main import app
 from tests.acceptance import claims
-from tests.bench import bench_page
+from tests.bench import bench_page, joints_page, peer_page
+from tests.hostile import page as hostile_page
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -80,9 +81,14 @@ def test_generated_pages_show_the_kept_results(monkeypatch):
     import evidence
 
     results = ROOT / "docs/results"
-    kept = {name: json.loads((results / f"{name}.json").read_text()) for name in ("claims", "runs", "bench_v1")}
-    pages = [*claims.pages(kept["claims"]), (results / "base.md", evidence.base_page(kept["runs"]))]
-    for page, text in (*pages, (bench_page.PAGE, bench_page.page(kept["bench_v1"]))):
+    kept = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in results.glob("*.json")}
+    pages = dict(claims.pages(kept["claims"]))
+    pages[results / "base.md"] = evidence.base_page(kept["runs"])
+    pages[results / "ladder.md"] = evidence.ladder(kept["runs"][evidence.DEFAULT])
+    makers = bench_page, joints_page, peer_page, hostile_page
+    pages |= {maker.PAGE: maker.page(kept[maker.KEPT.stem]) for maker in makers}
+    assert {*pages} >= {*results.glob("*.md")} - {results / "README.md"}
+    for page, text in pages.items():
         assert page.read_text(encoding="utf-8") == text, f"{page.name} is not of its results"
 
 

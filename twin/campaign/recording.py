@@ -74,7 +74,7 @@ def record(
                 entries.append(job.result())
                 done += motion.duration
                 if progress:
-                    progress(f"simulated {motion.id}, {motion.duration:.0f} s", done / total)
+                    progress(f"{motion.id} ({motion.duration:.0f} s)", done / total)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

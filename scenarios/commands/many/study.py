@@ -113,7 +113,7 @@ def _joints(scenarios: "Mapping[str, Scenario]", n: int, out: Path, workers: "Po
             for name, scenario in scenarios.items()
         }
     options = "".join(f" --set {change}" for change in changes)
-    text = page(found, f"tiago-twin study joints {' '.join(scenarios)} -n {n}{options} --out DIR")
+    text = page(found, f"Made by `tiago-twin study joints {' '.join(scenarios)} -n {n}{options} --out DIR`.")
     write_whole(out / "joints.md", text)
     typer.echo(text)
     if all(row.status != "ok" for rows in found.values() for row in rows):

@@ -94,6 +94,7 @@ def test_another_program_s_models_become_rows_and_agree_with_ours(saved, dataset
     [
         ({"name": "geometry.arm_1_jont.x", "value": 0.0}, "no joint 'arm_1_jont'; the nearest known is 'arm_1_joint'"),
         ({"name": "geometry.arm_1_joint.xx", "value": 0.0}, "nearest known is 'geometry.arm_1_joint.x'"),
+        ({"name": "frame.tool.hnd.x", "value": 0.0}, "nearest known is 'frame.tool.hand.x'"),
         ({"name": "geometry.arm_1_joint.x", "value": 0.1, "unit": "mm"}, "unit 'mm'; it must be 'm'"),
         ({"name": "geometry.arm_1_joint.x", "value": 1.2}, "1.2 m is no calibration's; values are in m and rad"),
         ({"name": "encoder.arm_5_joint.motor.offset", "value": 6.9}, "6.9 rad is no calibration's"),

@@ -61,7 +61,7 @@ def test_steps_are_lines_without_a_terminal(capfd, monkeypatch):
             now[0] += seconds
             show("simulate", at, seconds / 10)
         show("report", "", 0.0)
-    assert capfd.readouterr() == ("", "simulate   0% a [1/3]\nsimulate  90% c [3/3]\nreport\n")
+    assert capfd.readouterr() == ("", "simulate   0% a [1/3]\nsimulate  90% c [3/3], 1 s left\nreport\n")
 
 
 @pytest.mark.parametrize("fails", [False, True])

@@ -1,5 +1,6 @@
 """The scenarios that come with the program are valid, strict everywhere, and complete."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,9 +8,13 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
+import mjcf
 from scenarios import steps
 from scenarios.files import registry, yaml_file
 from scenarios.files.errors import ScenarioError
+from twin.motions.trial_schedule import schedule
+
+LENGTH = re.compile(r" \(([\d.]+) (s|min)\)$")
 
 
 def mappings(node: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -34,6 +39,16 @@ def test_a_scenario_is_named_after_its_file_and_described_in_a_line(name):
     scenario = steps.load(name)
     assert scenario.name == name
     assert 0 < len(scenario.description.splitlines()) == 1
+    assert LENGTH.search(scenario.description)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", registry.names())
+def test_a_scenario_says_how_long_its_recordings_are(name):
+    scenario = steps.load(name)
+    length, unit = LENGTH.search(scenario.description).groups()
+    seconds = sum(motion.duration for motion in schedule(scenario.twin.campaign, mjcf.model(), scenario.seed))
+    assert float(length) == pytest.approx(seconds / {"s": 1.0, "min": 60.0}[unit], rel=0.01)
 
 
 @pytest.mark.parametrize("name", registry.names())

@@ -16,8 +16,10 @@ def row(id: int, none: float, physical: float) -> Row:
 
 
 def test_the_page_has_medians_and_the_worst_and_counts_failed_robots():
-    text = page({"rigid": [row(0, 1.0, 0.1), row(1, 3.0, 0.3), row(2, 2.0, 0.2), Row(3, "failed", "no rank")]}, "this")
-    assert "Made\nby `this`" in text and "## `rigid`, 3 of 4 robots" in text
+    text = page(
+        {"rigid": [row(0, 1.0, 0.1), row(1, 3.0, 0.3), row(2, 2.0, 0.2), Row(3, "failed", "no rank")]}, "Made by hand."
+    )
+    assert "\n\nMade by hand.\n" in text and "## `rigid`, 3 of 4 robots" in text
     assert "| none | 2.00 [3.00] |" in text and "| physical | 0.20 [0.30] |" in text
     assert "| Static | arm_1 |" in text and "In sample |" not in text
 
