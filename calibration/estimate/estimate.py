@@ -42,7 +42,7 @@ class Estimate:
         verdicts: Findings of all stages.
         clocks: One for each instrument that was synchronised.
         models: In the order they were estimated.
-        main: Name of the model that calibrated.urdf and `Compensator` use; empty where there is none.
+        main: Name of the model that `Compensator` uses; empty where there is none.
         urdf: URDF text the geometry is relative to; None: the dataset's nominal one.
         robot: Joints and frames; None where the source does not say.
         suspension: Base under a wrench, of row `model_1`; None where there is none.
@@ -101,6 +101,11 @@ class Estimate:
     def calibrated(self) -> bool:
         """Whether the result may be used."""
         return self.status == "calibrated"
+
+    @property
+    def exported(self) -> str:
+        """Name of the model of calibrated.urdf and zeros.yaml: readers of those know no drive trains."""
+        return self.main if self.bundle is None else "model_2"
 
     @property
     def has_geometry(self) -> bool:

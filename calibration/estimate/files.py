@@ -4,8 +4,8 @@
     estimate.nc              covariances, one group a model
     record_next.yaml         postures and motions for what the data do not identify; only if there are any
     nominal.urdf             what the placement twists are relative to
-    calibrated.urdf          joint placements of the main model        } only if the result
-    zeros.yaml               zeros of the readings of the main model   } may be used: see `tables`
+    calibrated.urdf          joint placements of the exported model    } only if the result
+    zeros.yaml               zeros of its readings                     } may be used: see `tables`
     master_calibration.yaml  the same geometry as PAL's robots read it } see `calibrated_urdf`
     parameters.csv           every parameter of every model            }
 
@@ -54,7 +54,7 @@ def save_estimate(estimate: Estimate, folder: Path | str) -> None:
         chain = chain_of_frames(
             estimate.urdf, estimate.robot.joints, estimate.robot.base_frame, estimate.robot.tool_frame
         )
-        hand = hand_of(estimate.model(estimate.main), chain, np.zeros(12))
+        hand = hand_of(estimate.model(estimate.exported), chain, np.zeros(12))
         if estimate.has_geometry:
             _replace_text(folder / CALIBRATED, calibrated_urdf(estimate.urdf, hand.chain))
             _replace_text(folder / ZEROS, zeros_text(hand))

@@ -1,4 +1,4 @@
-"""The main model as two small texts other programs read.
+"""The exported model as two small texts other programs read.
 
     zeros.yaml                - joint: NAME            angle = reading - offset            [rad; m where a joint slides]
                                 offset: o              ... - compliance * torque - gap / 2 * tanh(torque / 0.3 N.m)

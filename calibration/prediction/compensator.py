@@ -9,8 +9,8 @@ covariance    of the local twist:   J Sigma J' + J_joint diag(sigma^2) J_joint' 
 Sigma is that of the parameters by random errors: what the model leaves out moves parameters and predictions together,
 and what it leaves of a prediction is in sigma, a joint's random reading error at rest or, where its model is used, that
 of the flank and of left-out trials; v what the suspension left of trials it had not seen, for a pose in the lab.
-The geometry is that of the estimate's main model, as in calibrated.urdf. Where that is `full` with drive trains, q are
-link angles and sigma theirs, the column bends, and the base sticks and slips (`bundled_arm`, `slipping_base`).
+The geometry is that of the main model. Where that is `full` with drive trains, q are link angles and sigma theirs, the
+column bends, and the base sticks and slips (`bundled_arm`, `slipping_base`).
 """
 
 from dataclasses import dataclass, field, replace

@@ -33,6 +33,12 @@ def test_the_exported_urdf_is_the_estimate_to_1e_9_on_1000_configurations(estima
     assert np.abs(exported.poses(q) - chain.poses(q)).max() > 1e-3
 
 
+def test_a_urdf_is_of_the_geometry_of_bare_motor_readings_where_drive_trains_are_known(estimate):
+    assert estimate.exported == estimate.main == "model_2"
+    assert replace(estimate, main="full").exported == "full"  # of posture means
+    assert replace(estimate, main="full", bundle=object()).exported == "model_2"
+
+
 def test_zeros_read_back_close_the_loop(estimate, chain, tmp_path):
     save_estimate(estimate, tmp_path)
     zeros = read_zeros(tmp_path / "zeros.yaml")
