@@ -120,7 +120,7 @@ LADDER = (
     ),
     LadderRow(
         "full",
-        "geometry, physical drive trains and stick-slip base; of posture means geometry with compliance and backlash",
+        "geometry, physical drive trains and stick-slip base; from posture means: geometry, compliance and backlash",
         "full",
         bundle=True,
         encoders=("motor", "link"),

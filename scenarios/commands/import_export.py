@@ -14,7 +14,7 @@ def import_(
     files: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[FORMAT] FILE...", help="Matched to trials by name; those of the mapping unless given."
+            metavar="[FORMAT] FILE...", help="Files, matched to trials by name; those the mapping names unless given."
         ),
     ] = None,
     mapping: Annotated[Path | None, typer.Option("--map", metavar="YAML", help="Frames, units, trial roles.")] = None,

@@ -38,14 +38,16 @@ def process(
 def base(  # noqa: PLR0913  an option each
     sources: Annotated[list[Path], typer.Argument(metavar="DATASET|FILE...", help="A dataset folder, or log files.")],
     out: Out,
-    mapping: Annotated[Path | None, typer.Option("--map", metavar="YAML", help="Of the log files.")] = None,
+    mapping: Annotated[
+        Path | None, typer.Option("--map", metavar="YAML", help="Mapping file of the log files.")
+    ] = None,
     fit: Annotated[
         float | None, typer.Option(min=0.0, metavar="S", help="Fit to the first S seconds, predict the rest.")
     ] = None,
     steady: Annotated[
         float | None, typer.Option(min=0.0, metavar="S", help="Leave out steady cycles in turn, from S seconds on.")
     ] = None,
-    cycle: Annotated[float, typer.Option(min=0.5, metavar="S", help="How long a cycle is.")] = 5.0,
+    cycle: Annotated[float, typer.Option(min=0.5, metavar="S", help="Length of a cycle [s].")] = 5.0,
 ) -> None:
     """Fit the base's motion to base markers and plate alone, predict the rest of the log, and score it."""
     from scenarios.commands import console

@@ -65,13 +65,19 @@ def picture(  # noqa: PLR0913  an option each
     trial: Annotated[str, typer.Option(metavar="ID", help="The trial.")] = "xyz",
     clip: Annotated[Path | None, typer.Option(metavar="FILE", help="The GIF to write.")] = None,
     still: Annotated[Path | None, typer.Option(metavar="FILE", help="The PNG to write, at --start.")] = None,
-    magnify: Annotated[float, typer.Option(min=0.0, help="How many times as large the base's motion is drawn.")] = 1.0,
-    start: Annotated[float, typer.Option(min=0.0, metavar="S", help="From the trial's start.")] = 0.0,
-    duration: Annotated[float, typer.Option(min=0.1, max=120.0, metavar="S", help="Of the clip.")] = 10.0,
-    ghost: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="Share of the nominal robot that is mixed in, 0 to 1.")
+    magnify: Annotated[
+        float, typer.Option(min=0.0, metavar="M", help="Show the base's motion M times as large.")
+    ] = 1.0,
+    start: Annotated[
+        float, typer.Option(min=0.0, metavar="S", help="Start of the clip, or time of the still [s].")
     ] = 0.0,
-    renderer: Annotated[Renderer, typer.Option(help="What draws.")] = Renderer.auto,
+    duration: Annotated[float, typer.Option(min=0.1, max=120.0, metavar="S", help="Length of the clip [s].")] = 10.0,
+    ghost: Annotated[
+        float, typer.Option(min=0.0, max=1.0, metavar="X", help="Opacity of the nominal robot beside it.")
+    ] = 0.0,
+    renderer: Annotated[
+        Renderer, typer.Option(help="egl: graphics driver; rays: ray casting without one.")
+    ] = Renderer.auto,
 ) -> None:
     """Render a trial of a simulated run, with markers and plate force."""
     if clip is None and still is None:
@@ -103,7 +109,9 @@ def view(
         str | None, typer.Option(metavar="ID", help="A held-out trial; the first that moves unless given.")
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="The page; RUN/view.html unless given.")] = None,
-    magnify: Annotated[float, typer.Option(min=0.0, help="How many times as large errors and base motion are.")] = 20.0,
+    magnify: Annotated[
+        float, typer.Option(min=0.0, metavar="M", help="Show errors and base motion M times as large.")
+    ] = 20.0,
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open it in a browser.")] = False,
 ) -> None:
     """Write a 3D page of a trial: robot, markers, force, predicted hands."""

@@ -129,9 +129,8 @@ def _concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tupl
     )
     found = [Verdict("clocks", "ok", message)]
     if outliers:
-        found.append(
-            Verdict("clocks", "warning", f"{instrument}: trials off the others' clock left out: {', '.join(outliers)}")
-        )
+        message = f"{instrument}: left out, since their clock disagrees with that of the other trials"
+        found.append(Verdict("clocks", "warning", f"{message}: {', '.join(outliers)}"))
     return clock, tuple(found)
 
 

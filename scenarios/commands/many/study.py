@@ -42,7 +42,9 @@ def study(  # noqa: PLR0913  an option each
     ] = False,
     effect: Annotated[
         Literal["time", "reversal", "load", "posture"] | None,
-        typer.Option(metavar="NAME", help="power: how large an effect that no model has must be, on matched robots."),
+        typer.Option(
+            metavar="NAME", help="power: size at which an unmodelled effect is detected: time, reversal, load, posture."
+        ),
     ] = None,
     workers: Workers = 0,
     scheduler: Scheduler = None,

@@ -226,5 +226,5 @@ def z_scores(found: Sequence[Known], against_truth: bool) -> Figure | None:
         return None
     with drawing():
         drawn = figure(0.5 * WIDTH, 2.4)
-        z_histogram(np.array([k.z for k in found]), _place(drawn, 0.45, _AXIS, 0.5 * WIDTH - 0.55, 2.4 - _AXIS - 0.08))
+        z_histogram(np.array([k.z for k in found]), _place(drawn, 0.6, _AXIS, 0.5 * WIDTH - 0.7, 2.4 - _AXIS - 0.08))
     return drawn

@@ -162,7 +162,22 @@ class Absorbed:
         model = main_model(self.view.results)
         if model is None or model.absorption is None:
             return None
-        return {"absorbed": model.absorption, "row_name": model.name, "hidden": tuple(hidden(model))}
+        return {
+            "absorbed": model.absorption,
+            "row_name": model.name,
+            "hidden": tuple(hidden(model)),
+            "meanings": MEANINGS,
+        }
+
+
+MEANINGS = {
+    "load": "compliance of gears under gravity",
+    "side": "backlash and friction on the side of the load",
+    "bending": "bending of links under gravity",
+    "wobble": "joint axes that wobble",
+    "eccentric": "joints and encoders out of centre",
+}
+"""What the names of defects mean that are no parameters of the model."""
 
 
 def main_model(results: Results) -> Model | None:

@@ -57,7 +57,9 @@ def test_absorption_is_a_section_with_what_is_hidden_first(tmp_path, undrawn):
     (tmp_path / "estimate" / "estimate.json").write_bytes((tmp_path / "again" / "estimate.json").read_bytes())
     write(tmp_path)
     text = Page(tmp_path / "report.html").text
-    assert text.index("wobble: 98 % absorbed, most of it by zeros.") < text.index("zeros: 62 % absorbed")
+    assert text.index("wobble (joint axes that wobble): 98 % absorbed, most of it by zeros.") < text.index(
+        "zeros: 62 % absorbed"
+    )
     assert "placements: 21 % absorbed" not in text
     assert "#absorption" in Page(tmp_path / "report.html").links
 
