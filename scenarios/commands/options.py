@@ -7,7 +7,17 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.")]
+
+def _scenarios(beginning: str) -> list[str]:
+    from scenarios.files import registry
+
+    return [name for name in registry.names() if name.startswith(beginning)]
+
+
+ScenarioName = Annotated[
+    str,
+    typer.Argument(metavar="SCENARIO", help="A name from `list`, or a YAML file.", autocompletion=_scenarios),
+]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="The folder to write.")]
 Seed = Annotated[int | None, typer.Option(min=0, metavar="N", help="Random seed; the scenario's unless given.")]
 Quick = Annotated[bool, typer.Option("--quick", help="A shorter campaign, about 3 minutes of recordings.")]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from threadpoolctl import threadpool_limits
+from typer.testing import CliRunner
 
 from calibration.options import Options
 from scenarios.commands import main
@@ -135,3 +136,8 @@ def test_help_lists_every_command_in_a_group_and_offers_completion(tiago_twin):
     text = tiago_twin("-h")[1]
     assert "Calibrate and evaluate:" in text and "--install-completion" in text
     assert "\nCommands:" not in text
+
+
+def test_completion_knows_the_scenarios():
+    asked = {"_TIAGO_TWIN_COMPLETE": "complete_bash", "COMP_WORDS": "tiago-twin run hum", "COMP_CWORD": "2"}
+    assert CliRunner().invoke(main.app, [], env=asked, prog_name="tiago-twin").output.split() == ["humanoids2024"]
