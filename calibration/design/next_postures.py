@@ -125,8 +125,8 @@ def _known(
     low, high = (np.clip(x, -np.pi, np.pi) for x in chain.limits)
     anywhere = rng.uniform(low, high, size=(_PROBES, len(low)))
     V = identified_directions(prospect(hand, parameters, description, play, anywhere, anywhere[:1], np.eye(p)).B)
-    told = prospect(hand, parameters, description, play, postures.q, anywhere[:1], np.eye(p))
-    C = by_tolerance = told.after(np.arange(len(postures)))
+    prospects = prospect(hand, parameters, description, play, postures.q, anywhere[:1], np.eye(p))
+    C = by_tolerance = prospects.after(np.arange(len(postures)))
     if not refused:
         C = model.covariance[np.ix_(rows, rows)] / np.outer(parameters.scale, parameters.scale)
     unobserved = int((np.linalg.eigvalsh(V.T @ by_tolerance @ V) > _UNOBSERVED).sum())
@@ -163,8 +163,8 @@ def _remedy(found: Plan, known: Known, lost: tuple[str, ...], short: int) -> Exp
         why += f"; not identifiable: {', '.join(name for name in lost if name not in never)}"
     if never:
         why += f"; no posture identifies {', '.join(never)}"
-    told = (Sigma("hand.position", "m", *hand), *(s for s in whole if s.name in named and s.name not in never))
-    return replace(found.remedy(STAGE, why), sigma=told)
+    prospects = (Sigma("hand.position", "m", *hand), *(s for s in whole if s.name in named and s.name not in never))
+    return replace(found.remedy(STAGE, why), sigma=prospects)
 
 
 def _directions(found: Plan) -> int:

@@ -32,9 +32,9 @@ def figure(score, model, base, encoder="motor", name="position_rmse_component_mm
 
 @pytest.mark.parametrize("source", ["plate", "dynamics"])
 def test_roll_and_pitch_of_the_base_are_predicted(result, score, base_r2, source):
-    told = next(b for b in score["base"] if b["source"] == source)
-    assert [told["roll_r2"], told["pitch_r2"]] == pytest.approx(base_r2(result.folder, result.estimate, source))
-    assert min(told["roll_r2"], told["pitch_r2"]) >= 0.95
+    reported = next(b for b in score["base"] if b["source"] == source)
+    assert [reported["roll_r2"], reported["pitch_r2"]] == pytest.approx(base_r2(result.folder, result.estimate, source))
+    assert min(reported["roll_r2"], reported["pitch_r2"]) >= 0.95
 
 
 @pytest.mark.parametrize("base", ["plate", "dynamics"])
@@ -59,8 +59,8 @@ def test_the_printed_joint_model_explains_a_settled_repetition(evaluation, joint
 
 
 def test_its_limits_are_shown_beside_it(result, evaluation):
-    told = {(x["joint"], x["regime"]) for x in evaluation["regimes"]}
-    assert {(joint, regime) for joint in SEVEN for regime in ("unseen_motion", "static")} <= told
+    reported = {(x["joint"], x["regime"]) for x in evaluation["regimes"]}
+    assert {(joint, regime) for joint in SEVEN for regime in ("unseen_motion", "static")} <= reported
     page = (result.folder / "report.html").read_text()
     assert "Other motions, held out: the rms falls" in page and "Static postures, held out: the rms falls" in page
 

@@ -94,9 +94,9 @@ def test_wrong_rows_are_imported_and_named(tmp_path, kind):
     file = written(tmp_path / "qualisys_2021-11-30_postures.csv", head, rows)
     import_export.import_files("csv", [file], ROOT / "docs/mappings/qualisys_postures.yaml", tmp_path / "dataset")
     estimate = calibrate(load(tmp_path / "dataset"))
-    told = [v.message for v in estimate.verdicts if v.stage == "geometry" and v.verdict == "warning"]
+    reported = [v.message for v in estimate.verdicts if v.stage == "geometry" and v.verdict == "warning"]
     assert estimate.calibrated
-    assert told == [
+    assert reported == [
         "4 of 37 postures contradict the others and were left out, counted from 0: "
         + ", ".join(f"postures {k}" for k in wrong)
     ]

@@ -123,8 +123,8 @@ def test_roll_and_pitch_of_the_base_are_predicted_from_the_plate(result, base_r2
     """Without its markers beyond the first second, on swings no stage has seen; inverse dynamics: test_seeds.py."""
     r2 = base_r2(result.folder, result.estimate, "plate")
     assert r2.min() >= 0.95
-    told = {b["source"]: b for b in json.loads((result.folder / "score.json").read_text())["base"]}
-    assert [told["plate"]["roll_r2"], told["plate"]["pitch_r2"]] == pytest.approx(r2, rel=1e-9)
+    reported = {b["source"]: b for b in json.loads((result.folder / "score.json").read_text())["base"]}
+    assert [reported["plate"]["roll_r2"], reported["plate"]["pitch_r2"]] == pytest.approx(r2, rel=1e-9)
 
 
 def test_the_papers_models_keep_their_order(rows):
@@ -142,9 +142,9 @@ def test_one_estimate_is_scored_under_both_protocols(result):
     assert [(p["protocol"], p["model"]) for p in found["protocols"]] == [
         (protocol, model) for protocol in ("public", "ours") for model in ("nominal", "model_1", "model_2", "model_3")
     ]
-    told = {(x["joint"], x["regime"]): x for x in found["regimes"]}
-    assert {(f"arm_{k}_joint", r) for k in range(1, 8) for r in ("unseen_motion", "static")} <= told.keys()
-    assert all(x["n"] > 0 and x["discrepancy_before_mrad"] > 0.0 for x in told.values())
+    reported = {(x["joint"], x["regime"]): x for x in found["regimes"]}
+    assert {(f"arm_{k}_joint", r) for k in range(1, 8) for r in ("unseen_motion", "static")} <= reported.keys()
+    assert all(x["n"] > 0 and x["discrepancy_before_mrad"] > 0.0 for x in reported.values())
     better = {tuple(c["b"]): c["finding"] for c in found["comparisons"]}
     assert better["model_2", "plate"] == "better"
     assert better["model_1", "plate"] != "worse"
@@ -290,19 +290,19 @@ def test_steps_under_a_wrench_follow_the_prediction_but_for_its_filter(compensat
     assert np.sqrt((e**2).mean()) < 0.1 * np.sqrt((moved**2).mean())
 
 
-def test_the_covariance_holds_the_truth_and_knows_what_it_was_not_told(compensator, swing):
+def test_the_covariance_contains_the_truth_and_counts_what_the_model_leaves_out(compensator, swing):
     t, q, w, start, _, _, true = swing
-    told, still, in_base = (
+    reported, still, in_base = (
         compensator.predict(t, q, w, start),
         compensator.predict(t, q, None, start),
         compensator.predict(t, q),
     )
     after = slice(200, None)
-    for pose in (told, still):
+    for pose in (reported, still):
         e = to_vector(inverse(pose.T[after]) @ true[after])
         nees = np.einsum("ni,nij,nj->n", e, np.linalg.inv(pose.covariance[after]), e)
         assert 0.1 < nees.mean() / 6.0 < 2.0
-    traces = [np.trace(p.covariance[:, :3, :3], axis1=1, axis2=2).mean() for p in (in_base, told, still)]
+    traces = [np.trace(p.covariance[:, :3, :3], axis1=1, axis2=2).mean() for p in (in_base, reported, still)]
     assert traces[0] < traces[1] < traces[2]
 
 
@@ -312,7 +312,7 @@ def test_another_payload_turns_the_joints(estimate, compensator, swing):
     assert np.abs(heavy.predict(t, q).T - compensator.predict(t, q).T)[:, :3, 3].max() > 1e-4
 
 
-def test_what_is_missing_is_told(compensator, swing):
+def test_what_is_missing_is_reported(compensator, swing):
     t, q, w, start, *_ = swing
     with pytest.raises(NotEnoughData, match="no suspension"):
         replace(compensator, suspension=None).predict(t, q, w, start)

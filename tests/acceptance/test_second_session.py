@@ -77,6 +77,6 @@ def test_reregistered_the_band_of_one_day_holds_on_another(shares):
 
 
 @pytest.mark.slow
-def test_markers_put_on_anew_are_not_in_the_band_of_any_day_but_in_one_that_states_it(shares):
+def test_markers_put_back_are_not_in_the_band_of_any_day_but_in_one_that_states_it(shares):
     assert shares[:, 2].mean() < 0.75
     assert shares[:, 3].mean() >= 0.75

@@ -1,4 +1,4 @@
-"""Throughput of `dataset`: two workers against one, real time, memory, size against what was told.
+"""Throughput of `dataset`: two workers against one, real time, memory, size against what was announced.
 
 BENCH_RUNS sets the number of runs (40) of two workers, one worker makes 100 of them at the most; 1000 take ten minutes.
 """
@@ -31,7 +31,7 @@ def memory_of(process: psutil.Process) -> int:
 
 
 def watched(out: Path, workers: int, n: int) -> tuple[float, np.ndarray, int]:
-    """Time from the first run to the last [s], memory [bytes] along the way, and bytes told before the start."""
+    """Time from the first run to the last [s], memory [bytes] along the way, and bytes reported before the start."""
     code = "from scenarios.commands.main import main; main()"
     arguments = ["dataset", "swing20", "-n", str(n), "--workers", str(workers), "--out", str(out)]
     process = subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE, text=True)
@@ -44,13 +44,13 @@ def watched(out: Path, workers: int, n: int) -> tuple[float, np.ndarray, int]:
 
     watcher = threading.Thread(target=sample)
     watcher.start()
-    told = next(line for line in process.stderr if "in all" in line)
+    reported = next(line for line in process.stderr if "in all" in line)
     start = time.monotonic()
     for _ in process.stderr:
         pass
     seconds = time.monotonic() - start
     watcher.join()
-    size, unit = re.search(r"([\d.]+) (\w+) in all", told).groups()
+    size, unit = re.search(r"([\d.]+) (\w+) in all", reported).groups()
     return seconds, np.array(samples), int(float(size) * {"kB": 1e3, "MB": 1e6, "GB": 1e9}[unit])
 
 
@@ -60,7 +60,7 @@ def test_throughput(tmp_path, keep):
     for workers in (1, 2):
         out = tmp_path / f"w{workers}"
         n = RUNS if workers == 2 else min(RUNS, 100)
-        seconds, memory, told = watched(out, workers, n)
+        seconds, memory, reported = watched(out, workers, n)
         rate[workers] = (n - 1) / seconds
         written = sum(p.stat().st_size for p in (out / "runs").rglob("*") if p.is_file() and p.name != "run.json")
         quarter = len(memory) // 4
@@ -71,10 +71,10 @@ def test_throughput(tmp_path, keep):
             f"dataset_{workers}_workers_memory_growth": float(
                 np.median(memory[-quarter:]) / np.median(memory[quarter : 2 * quarter])
             ),
-            f"dataset_{workers}_workers_bytes_over_told": written / told,
+            f"dataset_{workers}_workers_bytes_over_announced": written / reported,
             "dataset_MB_per_run": written / n / 1e6,
         }
         shutil.rmtree(out)
     figures["dataset_2_workers_over_1"] = rate[2] / rate[1]
     keep(figures)
-    assert abs(figures["dataset_2_workers_bytes_over_told"] - 1.0) < 0.1
+    assert abs(figures["dataset_2_workers_bytes_over_announced"] - 1.0) < 0.1

@@ -121,7 +121,7 @@ def ratio(mine: list[Draw], methods: list[str]) -> float:
     return float(np.mean([d.ours_mm for d in mine]) / min(np.mean([d.peer_mm[name] for d in mine]) for name in methods))
 
 
-def told(mine: list[Draw], methods: list[str]) -> str:
+def line(mine: list[Draw], methods: list[str]) -> str:
     """One line of the table."""
     theirs = ", ".join(f"{name} {np.mean([d.peer_mm[name] for d in mine]):.4f}" for name in methods)
     speed = ", ".join(f"{name} {np.median([d.peer_s[name] / d.ours_s for d in mine]):.0f}" for name in methods)
@@ -141,7 +141,7 @@ def test_held_out_error_and_speed_beside_the_peer(tmp_path):
             mine = [drawn(tmp_path, n, m, seed, methods) for seed in range(int(os.environ.get("PEER_DRAWS", "20")))]
             draws += mine
             cells.append(mine)
-            lines.append(told(mine, methods))
+            lines.append(line(mine, methods))
             keep(f"geometry/peer/{n} x {m}, mean error over the smallest mean of its methods", ratio(mine, methods))
             keep(
                 f"geometry/peer/{n} x {m}, worst robot, over the smallest of its methods there",

@@ -12,7 +12,7 @@ POSTURES = (20, 40, 80, 160)
 
 
 class Clock:
-    """Processor time spent in each stage, told by the progress of the pipeline."""
+    """Processor time spent in each stage, reported by the progress of the pipeline."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

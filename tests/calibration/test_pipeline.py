@@ -55,16 +55,16 @@ def test_the_calibrated_robot_is_the_true_one_within_its_play(estimate, truth, c
 
 
 def test_stages_can_be_chosen_and_bring_what_they_need(dataset):
-    told = []
-    found = calibrate(dataset, ["registration"], lambda stage, share: told.append((stage, share)))
+    reported = []
+    found = calibrate(dataset, ["registration"], lambda stage, share: reported.append((stage, share)))
     assert [m.name for m in found.models] == ["registration"] and found.main == "registration" and found.calibrated
-    assert [s for s, _ in told] == ["reading", "clocks", "postures", "registration", "done"]
-    assert [x for _, x in told] == sorted(x for _, x in told)
+    assert [s for s, _ in reported] == ["reading", "clocks", "postures", "registration", "done"]
+    assert [x for _, x in reported] == sorted(x for _, x in reported)
     only = calibrate(dataset, ["clocks"])
     assert len(only.clocks) == 2 and only.status == "not_calibrated"
 
 
-def test_an_unknown_stage_is_told_with_those_that_exist(dataset):
+def test_an_unknown_stage_is_reported_with_those_that_exist(dataset):
     with pytest.raises(NoSuchElement, match=r"'magic'.*clocks.*geometry.*registration"):
         calibrate(dataset, ["magic"])
 
@@ -120,7 +120,7 @@ def test_three_postures_are_refused_and_nothing_is_exported(folder, tmp_path):
     assert not (tmp_path / "out" / "calibrated.urdf").exists()
 
 
-def test_a_truncated_recording_is_told_by_file(folder, tmp_path):
+def test_a_truncated_recording_is_reported_by_file(folder, tmp_path):
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     path = copy / "trials" / "sweep1.nc"
     path.write_bytes(path.read_bytes()[:2000])
@@ -143,7 +143,7 @@ def test_a_truncated_recording_is_told_by_file(folder, tmp_path):
         (lambda d: (d / "trials" / "xyz.nc").unlink(), r"missing.*xyz\.nc"),
     ],
 )
-def test_a_damaged_dataset_is_told_with_its_place(folder, tmp_path, damage, said):
+def test_a_damaged_dataset_is_reported_with_its_place(folder, tmp_path, damage, said):
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     damage(copy)
     with pytest.raises(InputError, match=said):

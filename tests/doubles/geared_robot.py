@@ -1,4 +1,4 @@
-"""A robot whose links hang behind loaded gears, quasi-static, without a simulator: what a clock must be told from.
+"""A robot whose links hang behind loaded gears, quasi-static, without a simulator: what a clock must not take for lag.
 
     motor - link = h sgn(tau) + tau / k,   tau = tau_gravity(q) + c dq/dt + f,   |f| <= coulomb friction
 

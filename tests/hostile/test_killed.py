@@ -87,14 +87,14 @@ def test_killed_at_random_moments_a_run_is_old_or_new(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
-def test_the_second_of_two_commands_is_told(tmp_path):
+def test_the_second_of_two_commands_is_reported(tmp_path):
     for out in (tmp_path / "there", tmp_path / "new"):
         if out.name == "there":
             out.mkdir()
         with replacing(out, RUN) as new:
             (new / "scenario.yaml").write_text("first")
             with pytest.raises(ScenarioError, match="another command is writing it"), replacing(out, RUN):
-                pytest.fail("must be told")
+                pytest.fail("must be reported")
         assert (out / "scenario.yaml").read_text() == "first"
 
 

@@ -1,4 +1,4 @@
-"""Columns of joints swapped, reversed or in degrees, beside the hand's markers: told by name, nothing written."""
+"""Columns of joints swapped, reversed or in degrees, beside the hand's markers: reported by name, nothing written."""
 
 from dataclasses import replace
 from functools import cache
@@ -72,7 +72,7 @@ def files(folder: Path) -> list[Path]:
 
 
 @pytest.mark.parametrize("name", SOME_WRONG)
-def test_wrong_columns_of_csv_files_are_told_by_name(tmp_path, capsys, name):
+def test_wrong_columns_of_csv_files_are_reported_by_name(tmp_path, capsys, name):
     change, words = WRONG[name]
     source, csv = rigid_robot.write(tmp_path / "source", with_readings(change)), tmp_path / "csv"
     assert run("export", "csv", source, "--out", csv) == 0
@@ -82,7 +82,7 @@ def test_wrong_columns_of_csv_files_are_told_by_name(tmp_path, capsys, name):
 
 
 @pytest.mark.parametrize("name", SOME_WRONG)
-def test_wrong_columns_of_bags_added_to_c3d_files_are_told_by_name(tmp_path, capsys, name):
+def test_wrong_columns_of_bags_added_to_c3d_files_are_reported_by_name(tmp_path, capsys, name):
     change, words = WRONG[name]
     source = rigid_robot.write(tmp_path / "source", with_readings(change))
     for kind in ("c3d", "bag"):
@@ -154,7 +154,7 @@ def test_a_joint_that_hardly_moves_and_a_trial_without_markers_are_no_alarm():
     (_, _, _, swing), (_, _, _, sweep) = trials()
     still = swing.q_motor.copy()
     none = replace(sweep, marker=(), marker_body=(), marker_position=np.zeros((len(sweep.t_mocap), 0, 3)))
-    check_columns(D, CHAIN, [("sweep", sweep)])  # one joint only: the frames are not told
+    check_columns(D, CHAIN, [("sweep", sweep)])  # one joint only: the frames are not reported
     check_columns(D, CHAIN, [("swing", replace(swing, q_motor=still)), ("none", none)])
     check_columns(D, CHAIN, [("none", none)])
 

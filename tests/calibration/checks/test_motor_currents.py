@@ -1,4 +1,4 @@
-"""Motor currents swapped or reversed, told by gravity; none where friction, few postures or no load tell nothing."""
+"""Motor currents swapped or reversed, named by gravity; none where friction, few postures or no load show nothing."""
 
 from dataclasses import replace
 from functools import cache
@@ -41,7 +41,7 @@ def changed(trial: Trial, order: dict[int, int], turned: tuple[int, ...] = ()) -
     ({ARM[1]: ARM[3], ARM[3]: ARM[1]}, (), "joint arm_2_joint: .* torque of arm_4_joint .*; joint arm_4_joint: "),
     ({ARM[6]: ARM[4], ARM[4]: ARM[6]}, (), "joint arm_7_joint: its motor current follows .* of arm_5_joint"),
 ])  # fmt: skip
-def test_wrong_currents_are_told_by_name(order, turned, words):
+def test_wrong_currents_are_reported_by_name(order, turned, words):
     with pytest.raises(InputError, match=f"^here: .*{words}"):
         check_currents(CHAIN, [("here", changed(postures(), order, turned)), ("there", postures())])
     halves = [(name, changed(postures(n), order, turned)) for name, n in (("one", 11), ("two", 10))]

@@ -29,8 +29,8 @@ EXPECTED = 1.0  # of the random errors that are expected: 2 mrad a joint, 0.5 mm
 
 def named(said) -> list[set[int]]:
     """Numbers of the postures that were left out, by each row that left any out."""
-    told = (v.message for v in said if "contradict the others" in v.message)
-    return [set(map(int, re.findall(r"day1 (\d+)", text))) for text in told]
+    reported = (v.message for v in said if "contradict the others" in v.message)
+    return [set(map(int, re.findall(r"day1 (\d+)", text))) for text in reported]
 
 
 def real_draw(folder, table, mapping, kind, seed):
@@ -59,12 +59,12 @@ def test_four_wrong_rows_of_a_real_file_are_named_and_change_nothing(tmp_path, s
     change, missed = [], []
     for seed in range(DRAWS):
         try:
-            by, wrong, told = real_draw(tmp_path, table, mapping, kind, seed)
+            by, wrong, reported = real_draw(tmp_path, table, mapping, kind, seed)
         except NotCalibrated as refused:
             print(f"draw {seed}: {refused}")
-            by, wrong, told = [np.inf, np.inf], set(), []
+            by, wrong, reported = [np.inf, np.inf], set(), []
         change.append(by)
-        missed.append(not told or any(not wrong <= one for one in told))
+        missed.append(not reported or any(not wrong <= one for one in reported))
     keep(claim, f"real, {seen}, {kind}", change, missed)
     assert (np.median(change, axis=0) <= CHANGE).all()
     # 20 mm of one marker is nine times what `full` leaves, but 31 points are three equations a parameter: a size

@@ -51,33 +51,33 @@ def test_a_nuisance_moves_the_hand_as_the_robot_would(z):
 
 
 @pytest.fixture(scope="module")
-def told():
+def reported():
     noise = prospect(HAND, PARAMETERS, DESCRIBED, np.maximum(PLAY, 1e-4), Q[:30], Q[30:])
     return departing(noise, HAND, DESCRIBED, np.maximum(PLAY, 1e-4), DEPARTURES, Q[30:])
 
 
-def test_the_pull_is_that_of_the_fit(told):
+def test_the_pull_is_that_of_the_fit(reported):
     """Ridge regression of data that hold one nuisance and no noise leaves the hand off by P C m z - Z z."""
     chosen, z = np.arange(25), np.random.default_rng(1).normal(size=8)
-    B, y = told.B[chosen].reshape(150, -1), told.H[chosen].reshape(150, -1) @ z
+    B, y = reported.B[chosen].reshape(150, -1), reported.H[chosen].reshape(150, -1) @ z
     x = np.linalg.lstsq(np.vstack([B, np.eye(B.shape[1])]), np.append(y, np.zeros(B.shape[1])), rcond=None)[0]
-    C, m = told.after(chosen), told.pulled(chosen)
-    np.testing.assert_allclose(told.P @ x, told.P @ (C @ m @ z), atol=1e-10)
-    squared = told.hand(C, m) ** 2 - told.hand(C) ** 2
-    each = np.stack([told.P @ (C @ m[:, k]) - told.Z[:, :, k] for k in range(8)])
+    C, m = reported.after(chosen), reported.pulled(chosen)
+    np.testing.assert_allclose(reported.P @ x, reported.P @ (C @ m @ z), atol=1e-10)
+    squared = reported.hand(C, m) ** 2 - reported.hand(C) ** 2
+    each = np.stack([reported.P @ (C @ m[:, k]) - reported.Z[:, :, k] for k in range(8)])
     np.testing.assert_allclose(squared, (each**2).sum(axis=(0, 2)), rtol=1e-9)
 
 
 @pytest.mark.parametrize("criterion", ["D", "G"])
-def test_each_candidate_is_worth_what_the_criterion_says_with_it(told, criterion):
+def test_each_candidate_is_worth_what_the_criterion_says_with_it(reported, criterion):
     rule, taken = _RULES[criterion], np.arange(12)
-    C, m = told.after(taken), told.pulled(taken)
-    BC = told.B @ C
-    K = BC @ np.swapaxes(told.B, 1, 2) + np.eye(6)
+    C, m = reported.after(taken), reported.pulled(taken)
+    BC = reported.B @ C
+    K = BC @ np.swapaxes(reported.B, 1, 2) + np.eye(6)
     inverse = np.linalg.inv(np.linalg.cholesky(K))
-    values = rule.values(told, _Steps(C, m, K, inverse @ BC, inverse @ (told.H - BC @ m)))
+    values = rule.values(reported, _Steps(C, m, K, inverse @ BC, inverse @ (reported.H - BC @ m)))
     sets = [np.append(taken, k) for k in range(30)]
-    direct = np.array([rule.value(told, told.after(some), told.pulled(some)) for some in sets])
+    direct = np.array([rule.value(reported, reported.after(some), reported.pulled(some)) for some in sets])
     if criterion == "D":
         np.testing.assert_allclose(values - values[0], direct - direct[0], atol=1e-8)
     else:

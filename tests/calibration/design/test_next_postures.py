@@ -100,8 +100,8 @@ def test_a_fit_that_must_not_be_used_ends_with_postures_too(chain, n, widest):
     """Their sigmas are those of the recorded errors; at the datasheet's play, which is not there, up to nine times."""
     postures = recorded(rigid_robot.near_postures(np.random.default_rng(0), n), 1)
     model, _ = calibrate_geometry(chain, DESCRIBED, postures)
-    remedy, told = record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, True)
-    assert f"{13 - n} distinct postures are missing" in told[0].message
+    remedy, reported = record_next(mjcf.urdf(), chain, DESCRIBED, postures, model, True)
+    assert f"{13 - n} distinct postures are missing" in reported[0].message
     assert len(remedy.postures) == max(N, 13 - n) and remedy.sigma[0].after < 0.6 * remedy.sigma[0].before
     more = recorded(np.array([p.q for p in remedy.postures]) - TRUTH.offset, 2)
     after, said = calibrate_geometry(chain, DESCRIBED, postures.joined(more))
@@ -141,8 +141,8 @@ def test_what_is_predicted_of_a_dwell_is_its_derivative(chain):
     exact = replace(rigid_robot.postures(rigid_robot.Truth(), q), covariance=dwell_noise(hand.poses(q), DESCRIBED))
     J = linearised(hand, parameters.nominal, exact, parameters.names).J
     W = np.linalg.inv(np.linalg.cholesky(exact.covariance))
-    told = prospect(hand, parameters, DESCRIBED, np.zeros(8), q, q[:1], np.eye(len(parameters)))
-    np.testing.assert_allclose(told.B, W @ J * parameters.scale, rtol=1e-6, atol=1e-5)
+    reported = prospect(hand, parameters, DESCRIBED, np.zeros(8), q, q[:1], np.eye(len(parameters)))
+    np.testing.assert_allclose(reported.B, W @ J * parameters.scale, rtol=1e-6, atol=1e-5)
 
 
 def test_a_missing_drive_is_asked_for_and_tells_what_it_should(chain):
@@ -231,7 +231,7 @@ def test_elements_that_scatter_ask_for_as_many_swings_as_would_tell_them():
     remedy, said = swings_next(scattering(slip=False))
     (motion,), (sigma,) = remedy.motions, remedy.sigma
     assert sigma.name == "suspension.K.12" and sigma.before == 4e4
-    assert sigma.after < KNOWN * 1e5  # told, as the stage counts it
+    assert sigma.after < KNOWN * 1e5  # reported, as the stage counts it
     assert sigma.before * np.sqrt(6 / (6 + motion.repeats - 2)) > KNOWN * 1e5  # and no more than needed
     assert f"{motion.repeats} more swings" in said[0].message
 

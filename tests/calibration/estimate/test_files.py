@@ -82,7 +82,7 @@ def test_what_pals_publisher_adds_to_the_origins_is_the_same_robot(estimate, cha
 
 
 @pytest.mark.parametrize("text", ["- joint: a\n  offset: none", "- [1, 2", "- joint: a\n  ofset: 1.0", "3"])
-def test_zeros_that_are_none_are_told(tmp_path, text):
+def test_zeros_that_are_none_are_reported(tmp_path, text):
     (tmp_path / "zeros.yaml").write_text(text)
     with pytest.raises(InputError):
         read_zeros(tmp_path / "zeros.yaml")
@@ -191,7 +191,7 @@ def test_a_bare_urdf_is_an_estimate(estimate, tmp_path, chain):
         ("nothing.json", None, "no such file"),
     ],
 )
-def test_a_damaged_estimate_is_told_with_its_place(tmp_path, name, text, said):
+def test_a_damaged_estimate_is_reported_with_its_place(tmp_path, name, text, said):
     if text is not None:
         (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=said):

@@ -54,8 +54,8 @@ def test_why_moving_the_base_helps_or_does_not_is_said_in_figures(share, against
     found = list(comparisons([trace(*r) for r in (*rows, ("model_1", "plate", hand + (1.0 - share) * base))]))
     assert (found[0].finding, len(found)) == (finding, 1)
     assert said in found[0].reason
-    told = [v.message for v in no_better(found)]
+    reported = [v.message for v in no_better(found)]
     worse = f"model_1 (plate) is worse than nominal by {found[0].difference_mm:.2f} mm: {found[0].reason}"
-    assert told == ([worse] if finding == "worse" else [])
+    assert reported == ([worse] if finding == "worse" else [])
     without = list(comparisons([trace(*rows[0]), trace("model_1", "plate", hand)]))
     assert without[0].reason == ""

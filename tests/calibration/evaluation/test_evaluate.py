@@ -173,7 +173,9 @@ def test_a_held_out_trial_in_which_the_base_was_moved_is_named(estimate, evaluat
 
     found = evaluate(estimate, load(rewritten(folder, tmp_path / "copy", {"xyz": push})))
     found.save(tmp_path)
-    told = json.loads((tmp_path / "evaluation.json").read_text())["verdicts"]
-    assert [(v["stage"], v["verdict"]) for v in told] == [("evaluation", "warning")]
-    assert "base moved during xyz by 20.0 mm, 0 mrad" in told[0]["message"] and "others" not in told[0]["message"]
+    reported = json.loads((tmp_path / "evaluation.json").read_text())["verdicts"]
+    assert [(v["stage"], v["verdict"]) for v in reported] == [("evaluation", "warning")]
+    assert (
+        "base moved during xyz by 20.0 mm, 0 mrad" in reported[0]["message"] and "others" not in reported[0]["message"]
+    )
     assert evaluation.verdicts == ()

@@ -119,7 +119,7 @@ def test_link_readings_on_their_own_stamps_are_interpolated_and_nan_outside(tmp_
     assert np.isnan(found.q_link[0]).all()
 
 
-def test_the_wrist_s_reaction_is_turned_into_its_action_and_must_be_told(tmp_path):
+def test_the_wrist_s_reaction_is_turned_into_its_action_and_must_be_declared(tmp_path):
     true = trial()
     true.wrist_wrench[:3] = np.nan  # the sensor's driver started late
     write_bag(tmp_path / "log.bag", true)
@@ -181,7 +181,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_a_bad_bag_is_told_with_topic_and_remedy(lab, capsys, name):
+def test_a_bad_bag_is_reported_with_topic_and_remedy(lab, capsys, name):
     change, words = BAD[name]
     changed = rows()
     change(changed)
@@ -194,7 +194,7 @@ def test_a_bad_bag_is_told_with_topic_and_remedy(lab, capsys, name):
 
 @pytest.mark.parametrize("size", [0, 10, 5000, -100])
 @pytest.mark.parametrize("ros", [1, 2])
-def test_a_truncated_bag_is_told(lab, capsys, size, ros):
+def test_a_truncated_bag_is_reported(lab, capsys, size, ros):
     described = described_robot(trials=[{"id": "log", "role": "calibration", "kind": "swing"}])
     described["bag"] = LAYOUT.model_dump()
     path = lab.folder / ("log.bag" if ros == 1 else "log")
@@ -204,13 +204,13 @@ def test_a_truncated_bag_is_told(lab, capsys, size, ros):
     assert f"{path}: cannot be read as a ROS bag" in lab.refused(capsys, described, path, kind="bag")
 
 
-def test_a_topic_that_is_not_there_is_told(tmp_path):
+def test_a_topic_that_is_not_there_is_reported(tmp_path):
     write_bag(tmp_path / "log.bag", trial())
     with pytest.raises(InputError, match=r"no messages on \['/states'\]; the bag has \['/introspection_data/names'"):
         read_bag([tmp_path / "log.bag"], layout(motor="/states"))
 
 
-def test_values_without_their_names_are_told(tmp_path):
+def test_values_without_their_names_are_reported(tmp_path):
     from rosbags.rosbag1 import Writer
 
     store, path = typestore(1), tmp_path / "log.bag"

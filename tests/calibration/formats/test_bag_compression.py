@@ -1,4 +1,4 @@
-"""Compressed bags: what rosbags can undo is read back bit for bit, what it cannot is told with what to do."""
+"""Compressed bags: what rosbags can undo is read back bit for bit, what it cannot is reported with what to do."""
 
 from pathlib import Path
 
@@ -65,7 +65,7 @@ def test_readings_of_a_compressed_bag_come_back_bit_for_bit(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("name", [n for n in WRITTEN if any(word in n for word in SMALLER)])
-def test_a_truncated_compressed_bag_is_told(tmp_path, monkeypatch, name):
+def test_a_truncated_compressed_bag_is_reported(tmp_path, monkeypatch, name):
     path = written(tmp_path, monkeypatch, name)
     file = data_file(path)
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
@@ -74,7 +74,7 @@ def test_a_truncated_compressed_bag_is_told(tmp_path, monkeypatch, name):
 
 
 @pytest.mark.parametrize("name", ["ROS 1 lz4", "ROS 2 file, sqlite3", "ROS 2 chunks, mcap"])
-def test_a_compression_nobody_here_can_undo_is_told_with_the_command_that_does(tmp_path, monkeypatch, name):
+def test_a_compression_nobody_here_can_undo_is_reported_with_the_command_that_does(tmp_path, monkeypatch, name):
     path = written(tmp_path, monkeypatch, name)
     file = path / "metadata.yaml" if "file" in name else data_file(path)
     old, new = (b"compression=lz4", b"compression=xz4") if "lz4" in name else (b"zstd", b"zzzd")
@@ -83,19 +83,19 @@ def test_a_compression_nobody_here_can_undo_is_told_with_the_command_that_does(t
     text = file.read_bytes()
     assert old in text
     file.write_bytes(text.replace(old, new))
-    with pytest.raises(InputError, match="compress.*rosbag decompress.*ros2 bag convert") as told:
+    with pytest.raises(InputError, match="compress.*rosbag decompress.*ros2 bag convert") as caught:
         read_bag([path], layout(**WRIST))
-    assert str(path) in str(told.value) and "truncated" not in str(told.value)
+    assert str(path) in str(caught.value) and "truncated" not in str(caught.value)
 
 
-def test_a_compressed_file_out_of_its_folder_is_told(tmp_path, monkeypatch):
+def test_a_compressed_file_out_of_its_folder_is_reported(tmp_path, monkeypatch):
     path = written(tmp_path, monkeypatch, "ROS 2 file, mcap")
     with pytest.raises(InputError, match="log.mcap.zstd: cannot be read as a ROS bag"):
         read_bag([data_file(path)], layout(**WRIST))
 
 
 @pytest.mark.parametrize("name", [n for n in WRITTEN if any(word in n for word in SMALLER) and "message" not in n])
-def test_a_compressed_bag_with_wrong_bytes_is_told(tmp_path, monkeypatch, name):
+def test_a_compressed_bag_with_wrong_bytes_is_reported(tmp_path, monkeypatch, name):
     path = written(tmp_path, monkeypatch, name)
     file = data_file(path)
     content = bytearray(file.read_bytes())

@@ -313,7 +313,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_a_bad_file_is_told_with_channel_and_remedy(lab, capsys, file, name):
+def test_a_bad_file_is_reported_with_channel_and_remedy(lab, capsys, file, name):
     change, words = BAD[name]
     described_ = mapping()
     if name == "metres":
@@ -332,7 +332,7 @@ def test_action_for_reaction_is_seen_by_the_robots_weight(lab, capsys, file, con
 
 
 @pytest.mark.parametrize("size", [0, 100, 700, -1, -2000])
-def test_a_truncated_file_is_told(lab, capsys, file, size):
+def test_a_truncated_file_is_reported(lab, capsys, file, size):
     whole = file.read_bytes()
     data_end = checked_header(file).data_start + checked_header(file).data_bytes
     file.write_bytes(whole[: size if size >= 0 else data_end + size])
@@ -340,7 +340,7 @@ def test_a_truncated_file_is_told(lab, capsys, file, size):
     assert f"{file}: " in said and ("truncated" in said or "is no C3D file" in said)
 
 
-def test_a_rate_that_was_renamed_is_told(lab, capsys, file):
+def test_a_rate_that_was_renamed_is_reported(lab, capsys, file):
     raw = bytearray(file.read_bytes())
     at = raw.index(b"\x04\x02RATE", raw.index(b"ANALOG")) if b"\x04\x02RATE" in raw else None
     if at is None:
@@ -353,7 +353,7 @@ def test_a_rate_that_was_renamed_is_told(lab, capsys, file):
     assert "ANALOG:RATE 1003 Hz is not 10 times POINT:RATE 100 Hz" in said
 
 
-def test_more_frames_than_c3d_counts_are_told(tmp_path):
+def test_more_frames_than_c3d_counts_are_reported(tmp_path):
     path, n = tmp_path / "long.c3d", 70000
     c3d = ezc3d.c3d()
     c3d["parameters"]["POINT"]["RATE"]["value"] = [100.0]
@@ -364,7 +364,7 @@ def test_more_frames_than_c3d_counts_are_told(tmp_path):
         checked_header(path)
 
 
-def test_a_file_of_another_machine_is_told(tmp_path, file):
+def test_a_file_of_another_machine_is_reported(tmp_path, file):
     raw = bytearray(file.read_bytes())
     raw[515] = 85
     file.write_bytes(bytes(raw))

@@ -1,4 +1,4 @@
-"""CSV in: static postures and samples, what is read, what is refused and how it is told."""
+"""CSV in: static postures and samples, what is read, what is refused and how it is reported."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -104,7 +104,7 @@ def test_undrawn_markers_get_their_shape_and_a_place_near_the_true_one(lab):
     for i in range(4):
         np.testing.assert_allclose(*(np.linalg.norm(x - x[i], axis=1) for x in (shape, true)), atol=1e-9)
     T = rigid_robot.se3(np.array(body.placement))
-    # the drawing is not told; what remains is the robot's own defects, some millimetres at the hand
+    # the drawing is not reported; what remains is the robot's own defects, some millimetres at the hand
     np.testing.assert_allclose(shape @ T[:3, :3].T + T[:3, 3], true, atol=0.03)
 
 
@@ -183,7 +183,7 @@ def series_cases():
 
 
 @pytest.mark.parametrize("name", series_cases())
-def test_bad_samples_are_told_by_file_column_and_remedy(lab, capsys, name):
+def test_bad_samples_are_reported_by_file_column_and_remedy(lab, capsys, name):
     columns, table, words = series_cases()[name]
     said = lab.refused(capsys, series_mapping(**table), write_csv(lab.folder / "log.csv", columns))
     for word in words:
@@ -258,7 +258,7 @@ def static_cases():
 
 
 @pytest.mark.parametrize("name", static_cases())
-def test_bad_postures_are_told_by_file_column_and_remedy(lab, capsys, name):
+def test_bad_postures_are_reported_by_file_column_and_remedy(lab, capsys, name):
     columns, words = static_cases()[name]
     said = lab.refused(capsys, static_mapping(), write_csv(lab.folder / "postures.csv", columns))
     for word in ("postures.csv", *words):
@@ -275,12 +275,12 @@ def test_bad_postures_are_told_by_file_column_and_remedy(lab, capsys, name):
         ("a,b\n1.0,\x00\n", "postures.csv"),
     ],
 )
-def test_a_broken_file_is_told_by_line(lab, capsys, text, words):
+def test_a_broken_file_is_reported_by_line(lab, capsys, text, words):
     (lab.folder / "postures.csv").write_text(text)
     assert words in lab.refused(capsys, static_mapping(), lab.folder / "postures.csv")
 
 
-def test_text_in_a_cell_is_told_by_line_and_column(lab, capsys):
+def test_text_in_a_cell_is_reported_by_line_and_column(lab, capsys):
     path = write_csv(lab.folder / "postures.csv", postures())
     lines = path.read_text().splitlines()
     lines[3] = lines[3].replace(lines[3].split(",")[1], "n/a")
@@ -303,7 +303,7 @@ def test_text_in_a_cell_is_told_by_line_and_column(lab, capsys):
         (lambda m: m.update(csv=[]), "csv: missing"),
     ],
 )  # fmt: skip
-def test_a_mapping_that_does_not_fit_is_told(lab, capsys, change, words):
+def test_a_mapping_that_does_not_fit_is_reported(lab, capsys, change, words):
     described = static_mapping()
     change(described)
     assert words in lab.refused(capsys, described, write_csv(lab.folder / "postures.csv", postures()))
@@ -325,7 +325,7 @@ def test_the_wrist_s_reaction_is_read_as_its_action(lab):
     assert not any("not used" in note for note in notes)
 
 
-def test_a_wrist_without_joints_beside_it_is_told(lab, capsys):
+def test_a_wrist_without_joints_beside_it_is_reported(lab, capsys):
     described = robot_mapping()
     described["csv"][0]["joints"] = {}
     said = lab.refused(capsys, described, write_csv(lab.folder / "log.csv", series()))
@@ -349,7 +349,7 @@ def test_readings_off_by_a_wrong_zero_are_not_called_degrees(lab, capsys):
         (lambda j: j.update(arm_9_joint=j.pop("arm_7_joint")), "['arm_7_joint'] of the setup are not mapped, ['arm_9_"),
     ],
 )
-def test_joints_of_samples_that_do_not_fit_the_setup_are_told(lab, capsys, change, words):
+def test_joints_of_samples_that_do_not_fit_the_setup_are_reported(lab, capsys, change, words):
     described = robot_mapping()
     described["csv"][0]["joints"] = dict(JOINTS)
     change(described["csv"][0]["joints"])

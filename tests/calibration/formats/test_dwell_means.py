@@ -54,5 +54,5 @@ def test_a_hand_with_one_marker_is_refused_in_motion_and_with_too_few_rests(lab,
         (one_marker(dwells, "swing"), "a hand of 1 markers is used at rest only"),
         (one_marker(None), "2 postures show the hand; 6 are needed"),
     ):
-        told = " ".join(lab.refused(capsys, described, file).split())
-        assert why in told
+        reported = " ".join(lab.refused(capsys, described, file).split())
+        assert why in reported

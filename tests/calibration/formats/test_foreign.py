@@ -1,4 +1,4 @@
-"""Files of other formats are told by name, with the export or the command that is read."""
+"""Files of other formats are reported by name, with the export or the command that is read."""
 
 import pytest
 
@@ -18,14 +18,14 @@ SAID = [
 
 
 @pytest.mark.parametrize(("kind", "name", "words"), SAID, ids=[f"{k} {n}" for k, n, _ in SAID])
-def test_a_file_of_another_format_is_told_with_what_to_do(lab, capsys, kind, name, words):
+def test_a_file_of_another_format_is_reported_with_what_to_do(lab, capsys, kind, name, words):
     (lab.folder / name).write_text("x\n1\n")
     said = lab.refused(capsys, static_mapping(), lab.folder / name, kind=kind)
     for word in (f"{name}: ", *words):
         assert word in said
 
 
-def test_all_foreign_files_are_told_at_once(lab, capsys):
+def test_all_foreign_files_are_reported_at_once(lab, capsys):
     paths = [lab.folder / n for n in ("a.tsv", "b.trc")]
     for path in paths:
         path.write_text("x\n")

@@ -51,7 +51,7 @@ def test_an_exchanged_label_of_a_body_is_no_motion():
     assert len(rests(T, x, np.zeros(4, dtype=int))) == 1 and len(rests(T, x)) > 1
 
 
-def test_clocks_are_told_apart_by_rests_of_all_trials():
+def test_clocks_are_distinguished_by_rests_of_all_trials():
     a = [np.array([[4.0, 6.0], [8.0, 10.0], [12.5, 14.0]]), np.array([[31.0, 33.0]])]
     assert offset_between(a, [x - 3.9 for x in a]) == pytest.approx(3.9)
     assert np.isnan(offset_between([np.zeros((0, 2))], [a[0]]))

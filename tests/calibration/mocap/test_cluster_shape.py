@@ -39,7 +39,7 @@ def test_a_rigid_body_keeps_its_shape_however_it_was_drawn(m):
 
 
 @pytest.mark.parametrize("m", [3, 4])
-def test_two_markers_that_part_are_told_with_their_size_wherever_the_body_turns(m):
+def test_two_markers_that_part_are_reported_with_their_size_wherever_the_body_turns(m):
     line = (DRAWN[1] - DRAWN[0]) / np.linalg.norm(DRAWN[1] - DRAWN[0])
     places = np.tile(DRAWN[:m], (len(T), 1, 1))
     places[T > 5.0, 0] -= 1e-4 * line
@@ -63,7 +63,7 @@ def test_errors_of_all_markers_have_their_size_by_coordinate(m):
     assert np.sqrt(np.mean(found)) == pytest.approx(1e-4, rel=0.05)
 
 
-def test_too_few_markers_or_samples_are_told():
+def test_too_few_markers_or_samples_are_reported():
     with pytest.raises(NotEnoughData, match="needs 3 markers"):
         of(seen(np.tile(DRAWN[:2], (len(T), 1, 1))))
     with pytest.raises(NotEnoughData, match="less than one second"):

@@ -1,4 +1,4 @@
-"""Exchanges of labels that keep a body's shape: told by the jump, set right or masked, frames counted."""
+"""Exchanges of labels that keep a body's shape: reported by the jump, set right or masked, frames counted."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def test_an_exchange_that_keeps_the_shape_is_set_right(xyz, order, rows):
     np.testing.assert_array_equal(without_jumps(xyz, T, exchanged(p, rows, order)), p)
 
 
-def test_frames_are_counted_and_told(truth, caplog):
+def test_frames_are_counted_and_reported(truth, caplog):
     trial = rigid_robot.record(truth, rigid_robot.sweep(3, seconds=2.0), 12.0, np.random.default_rng(0), plate=False)
     body = Body(
         name="base", link="base_footprint", markers=[Marker(name=f"base{i}", xyz=p) for i, p in enumerate(SQUARE)]

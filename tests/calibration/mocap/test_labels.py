@@ -36,7 +36,7 @@ def test_a_right_recording_is_left_alone(trial, bodies):
 
 
 @pytest.mark.parametrize("pair", [(0, 1), (2, 3), (4, 5), (5, 7)])
-def test_exchanged_labels_are_set_right_and_told(trial, bodies, pair, caplog):
+def test_exchanged_labels_are_set_right_and_reported(trial, bodies, pair, caplog):
     found, done = with_right_labels(bodies, swapped(trial, np.arange(100, 130), *pair))
     np.testing.assert_array_equal(found.marker_position, trial.marker_position)
     name = "base" if pair[0] < 4 else "gripper"

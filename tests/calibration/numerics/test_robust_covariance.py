@@ -51,7 +51,7 @@ def test_intervals_cover_whatever_the_autocorrelation(a, n, trials, p):
     assert p > 3 or found.correlation == pytest.approx((1.0 + a) / (1.0 - a), rel=0.25)
 
 
-def test_few_blocks_are_told_and_their_intervals_are_student_s():
+def test_few_blocks_are_reported_and_their_intervals_are_student_s():
     by_block, _, found = covered(0.95, 150, 8, 1, 300)
     assert found.blocks == 8 < ENOUGH
     assert 0.92 < by_block < 0.98

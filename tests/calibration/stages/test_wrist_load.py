@@ -1,4 +1,4 @@
-"""The wrist's sensor weighs what hangs on it: exact without noise, within its interval with it; a load is told."""
+"""The wrist's sensor weighs what hangs on it: exact without noise, within its interval with it; a load is reported."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -113,7 +113,7 @@ def recorded(undeclared: float):
     (0.8, "warning", "declare the other 0.8"),
     (-0.6, "warning", "is the declared payload in the hand"),
 ])  # fmt: skip
-def test_a_load_nobody_declared_is_told_with_what_to_declare(undeclared, verdict, words):
+def test_a_load_nobody_declared_is_reported_with_what_to_declare(undeclared, verdict, words):
     description, trial, hand = recorded(undeclared)
     (said,) = weighed(
         Laboratory(mjcf.urdf(), description),

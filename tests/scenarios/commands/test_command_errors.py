@@ -157,15 +157,15 @@ def test_broken_data_end_with_2_and_leave_nothing(tmp_path, monkeypatch, tiago_t
 
 
 @pytest.mark.parametrize("command", [["simulate", "short", "--out", "x"], ["calibrate", "nowhere", "--out", "x"]])
-def test_an_engine_that_cannot_be_imported_is_told_in_a_line(tmp_path, command):
+def test_an_engine_that_cannot_be_imported_is_reported_in_a_line(tmp_path, command):
     code = f"from scenarios.commands.main import main; main({command})"
     surroundings = {**os.environ, "MUJOCO_GL": "bogus", "PYTHONPATH": str(Path(__file__).parents[3])}
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, env=surroundings, capture_output=True, text=True, check=False
     )
-    told = [line for line in done.stderr.splitlines() if line != "calibrate"]
-    assert len(told) == 1 and not list(tmp_path.iterdir())
+    reported = [line for line in done.stderr.splitlines() if line != "calibrate"]
+    assert len(reported) == 1 and not list(tmp_path.iterdir())
     if command[0] == "calibrate":  # needs no engine, and tells what is wrong
-        assert done.returncode == 2 and told[0].startswith("nowhere: no such folder")
+        assert done.returncode == 2 and reported[0].startswith("nowhere: no such folder")
     else:
-        assert done.returncode == 1 and "MUJOCO_GL='bogus'; unset it" in told[0]
+        assert done.returncode == 1 and "MUJOCO_GL='bogus'; unset it" in reported[0]

@@ -27,7 +27,7 @@ def exit_code(*arguments):
     return left.value.code
 
 
-def test_it_must_be_told_what_to_write(run_folder, capsys):
+def test_it_must_be_given_what_to_write(run_folder, capsys):
     assert exit_code(run_folder) == 2
     assert "name a file: --clip FILE.gif, --still FILE.png" in capsys.readouterr().err
 
@@ -40,7 +40,7 @@ def test_what_is_written_has_the_ending_of_its_format(run_folder, tmp_path, caps
     assert not list(tmp_path.glob("x*"))
 
 
-def test_a_folder_that_is_no_simulated_run_is_told(tmp_path, capsys):
+def test_a_folder_that_is_no_simulated_run_is_reported(tmp_path, capsys):
     assert exit_code(tmp_path, "--still", tmp_path / "a.png") == 2
     assert "contains no scenario.yaml; pictures need a run simulated here" in capsys.readouterr().err
 

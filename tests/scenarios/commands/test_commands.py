@@ -1,4 +1,4 @@
-"""The command line: what it runs and what it tells. The engines are replaced by small fakes."""
+"""The command line: what it runs and what it prints. The engines are replaced by small fakes."""
 
 import subprocess
 import sys
@@ -74,7 +74,7 @@ def test_engines_work_with_one_blas_thread_and_nobody_else_is_limited(engines, t
         assert set(blas_threads()) == {2}
 
 
-def test_progress_is_told_on_stderr_without_a_terminal(engines, tiago_twin):
+def test_progress_is_reported_on_stderr_without_a_terminal(engines, tiago_twin):
     code, out, err = tiago_twin("run", "small")
     assert [line.split()[0] for line in err.splitlines()] == ["simulate", "calibrate", "evaluate", "score", "report"]
     assert "simulate" not in out
@@ -99,7 +99,7 @@ def test_simulate_writes_dataset_and_truth(engines, tiago_twin):
     assert {path.name for path in Path("x").iterdir()} == {"scenario.yaml", "dataset", "truth", "figures"}
 
 
-def test_the_calibration_is_told_what_the_scenario_or_the_command_line_chose(engines, tiago_twin):
+def test_the_calibration_gets_what_the_scenario_or_the_command_line_chose(engines, tiago_twin):
     tiago_twin("run", "small", "--out", "x")
     assert engines.calls["options"] == (Options(terms="tensor"),)
     tiago_twin("calibrate", "x/dataset", "--out", "x/estimate", "--terms", "printed", "--suspension", "full")

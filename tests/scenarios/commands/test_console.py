@@ -85,7 +85,7 @@ def test_steps_are_bars_on_a_terminal(fails):
     assert last == {"simulate": "100", "calibrate": "25" if fails else "100"}
 
 
-def test_what_an_evaluation_says_is_told(tmp_path):
+def test_what_an_evaluation_says_is_reported(tmp_path):
     moved = [{"stage": "evaluation", "verdict": "warning", "message": "base moved during xyz"}]
     (tmp_path / "evaluation.json").write_text(json.dumps({"rows": [], "verdicts": moved}))
     assert console.remarks(tmp_path) == ["base moved during xyz"]

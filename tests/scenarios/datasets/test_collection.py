@@ -227,7 +227,7 @@ def test_two_commands_do_not_write_one_folder(tmp_path):
     assert [row.status for row in made(tmp_path / "c", 1, produce)] == ["ok"]
 
 
-def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
+def test_a_scheduler_that_is_not_there_is_reported(tmp_path, monkeypatch):
     from scenarios.datasets import workers as engine
 
     monkeypatch.setattr(engine, "_PATIENCE", "1s")

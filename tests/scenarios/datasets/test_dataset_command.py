@@ -1,4 +1,4 @@
-"""The command `dataset`: whole robots unless told otherwise, and trials on one clock."""
+"""The command `dataset`: whole robots by default, and trials on one clock."""
 
 import netCDF4
 import numpy as np

@@ -84,7 +84,7 @@ def test_a_file_that_extends_itself_in_the_end_is_refused(tmp_path):
     assert line.startswith("first.yaml:2:10: extends: second.yaml extends first.yaml extends second.yaml;")
 
 
-def test_what_is_extended_must_exist_and_is_told_where_it_does_not(tmp_path):
+def test_what_is_extended_must_exist_and_is_reported_where_it_does_not(tmp_path):
     (line,) = refused(written(tmp_path, "mine", "humanoids2023", "seed: 1"))
     assert line.startswith("mine.yaml:2:10: extends: humanoids2023: ") and "did you mean humanoids2024" in line
 

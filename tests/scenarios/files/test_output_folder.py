@@ -125,7 +125,7 @@ def test_a_file_and_the_current_folder_are_refused(tmp_path, monkeypatch):
         pytest.fail("must be refused before any work")
 
 
-def test_a_place_below_a_file_is_told(tmp_path):
+def test_a_place_below_a_file_is_reported(tmp_path):
     (tmp_path / "file").write_text("mine")
     with pytest.raises(ScenarioError, match="cannot be written"), replacing(tmp_path / "file" / "run", RUN):
         pytest.fail("must be refused before any work")

@@ -64,8 +64,8 @@ def test_an_unknown_field_is_refused_wherever_it_stands(name):
     overrides = [".".join((*path, "unheard_of")) + "=1" for path in mappings(raw(name))]
     with pytest.raises(ScenarioError) as info:
         steps.load(name, overrides)
-    told = {line.split()[1].rstrip(":") for line in str(info.value).splitlines()}
-    assert {override.removesuffix("=1") for override in overrides} <= told
+    reported = {line.split()[1].rstrip(":") for line in str(info.value).splitlines()}
+    assert {override.removesuffix("=1") for override in overrides} <= reported
 
 
 def test_the_script_and_its_scenario_have_one_name():

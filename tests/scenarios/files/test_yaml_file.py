@@ -117,7 +117,7 @@ def test_a_missing_field_is_placed_where_it_should_stand(tmp_path):
         ("type: tyre", "type: wheel", None),
     ],
 )
-def test_a_wrong_value_is_told_with_its_place_and_itself(tmp_path, good, bad, finding):
+def test_a_wrong_value_is_reported_with_its_place_and_itself(tmp_path, good, bad, finding):
     assert good in GOOD
     (line,) = refused(tmp_path, GOOD.replace(good, bad))
     if finding:
@@ -153,12 +153,12 @@ def test_all_findings_come_at_once_in_the_order_of_the_file(tmp_path):
         ("hello", "s.yaml:1:1: ", "single value 'hello'"),
     ],
 )
-def test_what_is_no_mapping_of_fields_is_told_once(tmp_path, text, start, words):
+def test_what_is_no_mapping_of_fields_is_reported_once(tmp_path, text, start, words):
     (line,) = refused(tmp_path, text)
     assert line.startswith(start) and words in line
 
 
-def test_unreadable_files_are_told(tmp_path):
+def test_unreadable_files_are_reported(tmp_path):
     (tmp_path / "binary.yaml").write_bytes(b"name: \xff\xfe")
     for path, words in (("missing.yaml", "no such file"), ("binary.yaml", "UTF-8"), ("", "is a folder")):
         with pytest.raises(ScenarioError, match=words):
@@ -192,7 +192,7 @@ def test_an_override_within_a_default_keeps_the_rest_of_that_default(tmp_path):
         ("seed=[1", "--set seed:1:3: not YAML"),
     ],
 )
-def test_a_wrong_override_is_told_as_an_override(tmp_path, override, finding):
+def test_a_wrong_override_is_reported_as_an_override(tmp_path, override, finding):
     (line,) = refused(tmp_path, GOOD, override)
     assert line.startswith("--set ") and finding in line
 
@@ -241,7 +241,7 @@ def test_a_pydantic_dataclass_is_read_like_a_model(tmp_path):
     assert yaml_file.read(tmp_path / "g.yaml", Gear) == Gear("gear", "arm_1", 0.01)
 
 
-def test_an_unknown_scenario_is_told_with_the_known_ones(monkeypatch, tmp_path):
+def test_an_unknown_scenario_is_reported_with_the_known_ones(monkeypatch, tmp_path):
     (tmp_path / "humanoids2024.yaml").write_text("name: humanoids2024\n")
     monkeypatch.setattr(registry, "HERE", tmp_path)
     assert registry.find("humanoids2024") == tmp_path / "humanoids2024.yaml"

@@ -68,7 +68,7 @@ def test_a_picture_a_trial_and_what_it_holds_in_words(folder, tmp_path, capsys):
         assert words in said
 
 
-def test_a_marker_that_moves_on_its_body_is_told(tmp_path):
+def test_a_marker_that_moves_on_its_body_is_reported(tmp_path):
     trial = rigid_robot.record(
         rigid_robot.defects(2), rigid_robot.sweep(3, seconds=3.0), 12.0, np.random.default_rng(2)
     )
@@ -96,7 +96,7 @@ def test_nothing_is_drawn_where_messages_were_lost(panels):
     assert ax.get_ylabel() == "[mrad]"
 
 
-def test_a_joint_without_a_link_encoder_is_told(panels):
+def test_a_joint_without_a_link_encoder_is_reported(panels):
     (text,) = panels["torso_lift_joint: link - motor"].texts
     assert text.get_text() == "no link encoder"
 
@@ -121,7 +121,7 @@ def test_posture_means_have_a_picture_too(tmp_path):
     assert "12 static postures as means" in found.findings[0] and len(list((tmp_path / "out").iterdir())) == 1
 
 
-def test_an_unknown_trial_and_a_folder_that_is_none_are_told_and_nothing_is_written(folder, tmp_path, capsys):
+def test_an_unknown_trial_and_a_folder_that_is_none_are_reported_and_nothing_is_written(folder, tmp_path, capsys):
     assert run(folder, "--trial", "swing", "--out", tmp_path / "out") == 2
     assert "no trial 'swing'; its trials are sweep" in capsys.readouterr().err
     assert run(tmp_path / "nothing", "--out", tmp_path / "out") == 2
@@ -142,7 +142,7 @@ def test_a_plate_that_carries_next_to_nothing_has_no_centre_of_pressure():
     np.testing.assert_allclose(centre_of_pressure(-wrench, np.array([0.9, 0.45, 0.1]))[0], found[0])
 
 
-def test_the_weight_at_both_ends_the_motors_and_the_wrist_are_told(tmp_path):
+def test_the_weight_at_both_ends_the_motors_and_the_wrist_are_reported(tmp_path):
     rng, names = np.random.default_rng(0), rigid_robot.JOINTS
     trial = rigid_robot.record(rigid_robot.defects(2), rigid_robot.sweep(3, seconds=3.0), 12.0, rng)
     wrench, effort = trial.plate_wrench.copy(), np.zeros_like(trial.effort)

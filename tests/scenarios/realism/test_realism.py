@@ -59,7 +59,7 @@ def test_figures_are_those_of_the_motion():
     assert set(LOG) == {field.name for field in fields(Figures)}
 
 
-def test_yaw_that_slips_is_poorly_told_by_a_line_and_well_by_play():
+def test_yaw_that_slips_is_poorly_described_by_a_line_and_well_by_play():
     moment = 10.0 * np.sin(2 * np.pi * 0.2 * T) * (1.0 + 0.3 * np.sin(2 * np.pi * 0.05 * T))
     slipping = 1e-3 * play(moment[:, None], np.array([4.0]))[:, 0]
     straight = yaw_from_moment(1e-3 * moment, moment)
@@ -141,7 +141,7 @@ def test_markers_err_upwards_as_they_do_sideways():
     assert 0.5 < up / sideways < 1.0 and sideways == pytest.approx(0.073e-3, rel=0.1)
 
 
-def test_a_dataset_without_a_plate_is_told(log):
+def test_a_dataset_without_a_plate_is_reported(log):
     dataset = load_dataset(log)
     without = replace(dataset, description=dataset.description.model_copy(update={"trials": ()}))
     with pytest.raises(NotEnoughData, match="record both while the arm moves"):

@@ -82,7 +82,7 @@ def test_both_directions_of_a_joint_have_dots_and_the_model_its_lines(ax):
     np.testing.assert_array_equal(model.get_ydata(), [2.0, 2.1, 2.2, np.nan, 3.0, 3.1])
 
 
-def test_a_line_ends_where_time_jumps_or_starts_anew():
+def test_a_line_ends_where_time_jumps_or_starts_again():
     t, x = np.array([0.0, 0.1, 0.5, 0.6, 0.0]), np.arange(5.0)
     np.testing.assert_array_equal(strokes(t, x)[0], [0.0, 1.0, np.nan, 2.0, 3.0, np.nan, 4.0])
 
@@ -113,7 +113,7 @@ def test_thinning_keeps_every_extreme_and_the_gaps():
     np.testing.assert_array_equal(thinned(t[:150], values[:150], 100)[0], t[:150])
 
 
-def test_intervals_that_miss_the_truth_are_told_apart(ax):
+def test_intervals_that_miss_the_truth_are_distinguished(ax):
     found = [Interval("arm_1 rx", 0.1, 1.0), Interval("arm_2 offset  + 2", 3.0, 1.0)]
     assert [i.covers for i in found] == [True, False]
     assert intervals(found, "estimate − truth [mrad]", True, ax) is ax

@@ -237,7 +237,7 @@ def test_a_calibration_that_does_not_help_is_said_to_be_one(run, plain):
     assert "not calibrated" in text
 
 
-def test_intervals_that_are_too_narrow_are_told(run, plain):
+def test_intervals_that_are_too_narrow_are_reported(run, plain):
     score = json.loads((run / "score.json").read_text())
     for parameter in score["parameters"][:20]:
         parameter["estimate"] += 0.1

@@ -201,7 +201,7 @@ def test_the_base_is_judged_by_the_truth_where_there_is_one(run):
 
 
 @pytest.mark.parametrize(("rho", "shown"), [(50.0, "50.0"), (2.0, "≤ 2.00"), (1000.0, "≥ 1000")])
-def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, shown):
+def test_a_rho_at_its_limit_is_reported_as_a_limit(run, rho, shown):
     model, none = known_joint()
     shutil.rmtree(run / "estimate")
     save_estimate(known_estimate(joint_models=(replace(model, rho=rho), none)), run / "estimate")
@@ -210,7 +210,7 @@ def test_a_rho_at_its_limit_is_told_as_a_limit(run, rho, shown):
     assert row_of(run, "The published joint model", PLAIN)[1] == "–"
 
 
-def test_yaw_is_told_with_what_stays(whole):
+def test_yaw_is_reported_with_what_stays(whole):
     found, _ = base_motion.trial_motion(read(whole))
     left = np.sqrt(((found.measured - found.predicted[0].x)[found.scored, 5] ** 2).mean())
     assert f"it is not predicted here, residual {fixed(left, 1)} mrad rms" in text_of(whole)
@@ -246,7 +246,7 @@ def test_damping_stands_beside_the_truth_even_where_nothing_gives(run):
     assert [row_of(run, of, "z, z")[3] for of in (table, "Stiffness K")] == ["–", "–"]
 
 
-def test_wheels_are_told_as_combinations_with_the_rank_of_one_wrench(whole):
+def test_wheels_are_reported_as_combinations_with_the_rank_of_one_wrench(whole):
     text = text_of(whole)
     assert "36 stiffnesses leave 14 combinations" in text
     assert "36 stiffnesses leave 11 combinations" in text
@@ -275,7 +275,7 @@ def test_loops_hold_what_the_encoders_said_and_the_model_says(whole, recording):
     assert "arm_3: 1.00 mrad, not corrected" in (whole / "figures/loops.svg").read_text()
 
 
-def test_regimes_are_told_joint_by_joint_and_in_sentences(whole):
+def test_regimes_are_reported_joint_by_joint_and_in_sentences(whole):
     assert row_of(whole, "regime by regime", JOINT) == ["2.00", "0.30", "85", "0.50", "10", "3"]
     assert row_of(whole, "regime by regime", PLAIN) == ["2.00", "0.18", "91", "0.50", "10", "3"]
     text = text_of(whole)

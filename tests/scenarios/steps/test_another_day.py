@@ -65,7 +65,7 @@ def test_a_fit_without_a_trial_kept_aside_has_a_report(days):
     assert exit.value.code in (0, None) and (days / "lab/estimate/report.html").is_file()
 
 
-def test_markers_put_on_anew_are_registered_with_a_few_postures(days, undrawn):
+def test_markers_put_back_are_registered_with_a_few_postures(days, undrawn):
     assert predicted(days, "remounted")[0] > 2.0
     error, _, out = predicted(days, "remounted", "--register", "6")
     assert error < 0.4

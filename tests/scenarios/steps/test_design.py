@@ -215,7 +215,7 @@ def test_the_file_reads_back(found, tmp_path):
         "{schema: 1, joints: [a], remedies: [{stage: s, why: w, postures: [{q: [1, 2], approach: [0]}]}]}",
     ],
 )
-def test_a_file_that_is_none_is_told(tmp_path, text):
+def test_a_file_that_is_none_is_reported(tmp_path, text):
     (tmp_path / "d.yaml").write_text(text)
     with pytest.raises(InputError):
         read_plans(tmp_path / "d.yaml")

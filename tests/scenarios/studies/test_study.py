@@ -67,7 +67,7 @@ def test_parameters_are_judged_over_the_runs(tmp_path):
 
 
 @pytest.mark.parametrize("vary", ["twin.campaign.calibration_postures", "twin.campaign.calibration_postures=12,,20"])
-def test_a_wrong_vary_is_told(tmp_path, vary):
+def test_a_wrong_vary_is_reported(tmp_path, vary):
     command = ["study", "power", "short", "-n", "2", "--out", str(tmp_path / "s"), "--vary", vary]
     assert isinstance(CliRunner().invoke(app, command).exception, ScenarioError)
     assert not (tmp_path / "s").exists()

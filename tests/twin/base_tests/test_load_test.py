@@ -104,7 +104,7 @@ def test_the_springs_and_dampers_of_random_bases_whose_casters_turn_are_found(no
     assert errors[1] < 0.05
 
 
-def test_a_wheel_that_slips_under_the_test_is_told(nominal):
+def test_a_wheel_that_slips_under_the_test_is_reported(nominal):
     twin, _ = standing(nominal, "twin.base.caster_back.friction=0.005")
     with pytest.raises(LoadTestFailed, match="a wheel slips or lifts under"):
         load_test(twin)
@@ -188,7 +188,7 @@ def test_a_base_that_a_small_load_does_not_tell_is_refused(nominal, setting, wor
         load_test(twin)
 
 
-def test_numbers_that_run_away_on_the_bench_are_told(nominal):
+def test_numbers_that_run_away_on_the_bench_are_reported(nominal):
     twin, _ = standing(nominal)
     twin.model.body_mass[twin.model.body("torso_lift_link").id] = np.nan
     with pytest.raises(LoadTestFailed, match="not a number"):

@@ -69,7 +69,7 @@ def test_the_robots_body_stays_and_what_is_mounted_on_it_changes(lab, later):
     assert 0.005 < np.abs(step[:2, 3]).max() < 0.12 and step[2, 3] == 0.0
 
 
-def test_homing_anew_has_the_width_it_is_given(config, lab):
+def test_homing_again_has_the_width_it_is_given(config, lab):
     wide = replace(lab, config=replace(config, session=replace(config.session, encoder_zero=1e-3)))
     shifts = []
     for seed in range(60):

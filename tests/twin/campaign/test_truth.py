@@ -61,7 +61,7 @@ def full():
 
 
 @pytest.fixture(scope="module")
-def told(full, tmp_path_factory):
+def reported(full, tmp_path_factory):
     """What truth.json says of a configuration, robots drawn but not compiled."""
     folder = tmp_path_factory.mktemp("truth")
 
@@ -75,8 +75,8 @@ def told(full, tmp_path_factory):
 
 
 @pytest.mark.parametrize("part", ["arm", "torso", "base", "payload", "instruments", "friction_held"])
-def test_every_number_of_the_scenario_shows_in_the_truth(full, told, part):
-    before = told(full.config)
+def test_every_number_of_the_scenario_shows_in_the_truth(full, reported, part):
+    before = reported(full.config)
     silent = []
     for leaf in leaves(getattr(full.config, part)):
         place = ".".join(map(str, leaf))
@@ -84,22 +84,22 @@ def test_every_number_of_the_scenario_shows_in_the_truth(full, told, part):
             continue
         if leaf[0] in (*DECLARED, DERIVED) or place in ABSENT or "markers" in leaf:
             continue
-        if told(changed(full.config, (part, *leaf))) == before:
+        if reported(changed(full.config, (part, *leaf))) == before:
             silent.append(place)
     assert silent == []
 
 
-def test_a_robot_that_drives_tells_how_its_wheels_roll(full, told):
+def test_a_robot_that_drives_tells_how_its_wheels_roll(full, reported):
     campaign = replace(full.config.campaign, driving=replace(full.config.campaign.driving, forms=("wheels",)))
-    true = {p.name: p for p in told(replace(full.config, campaign=campaign))}
+    true = {p.name: p for p in reported(replace(full.config, campaign=campaign))}
     assert true["rolling.wheel_left.servo_stiffness"].value == 2000.0
     assert true["rolling.caster_front_left.swivel_friction"].unit == "N.m"
     assert sum(name.startswith("rolling.") for name in true) == 2 * 3 + 4 * 6
-    assert not any(p.name.startswith("rolling.") for p in told(full.config))
+    assert not any(p.name.startswith("rolling.") for p in reported(full.config))
 
 
-def test_names_are_there_once_and_lengths_are_lengths(full, told):
-    true = told(full.config)
+def test_names_are_there_once_and_lengths_are_lengths(full, reported):
+    true = reported(full.config)
     assert len({p.name for p in true}) == len(true)
     units = {p.name: p.unit for p in true}
     assert units["encoder.torso_lift_joint.motor.offset"] == "m"

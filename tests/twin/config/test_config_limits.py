@@ -14,7 +14,7 @@ def refused(*overrides: str) -> list[str]:
     return str(info.value).splitlines()
 
 
-def test_postures_beyond_the_joints_limits_are_told_by_joint_value_and_limits():
+def test_postures_beyond_the_joints_limits_are_reported_by_joint_value_and_limits():
     lift, wrist = [0.36, *AT_REST[1:]], [*AT_REST[:6], 2.0, 0.0]
     first, second = refused(f"twin.campaign.given_postures={[AT_REST, lift, wrist]}")
     assert first == "--set twin.campaign.given_postures.1.0: torso_lift_joint goes from 0.0 to 0.35 (got 0.36)"

@@ -53,13 +53,13 @@ def test_the_names_are_those_of_the_nominal_robot():
         ("instruments.bodies.base.link", "nosuch_link", "no link named nosuch_link; did you mean base_link?"),
     ],
 )
-def test_an_unknown_name_is_told_where_it_stands_with_the_known_ones(tmp_path, where, value, finding):
+def test_an_unknown_name_is_reported_where_it_stands_with_the_known_ones(tmp_path, where, value, finding):
     (line,) = refused(tmp_path, f"twin.{where}: {value}")
     column = 3 if value.startswith("{") else len(f"  twin.{where}: ") + 1
     assert line.startswith(f"mine.yaml:5:{column}: twin.{where}: {finding}") and "(known here: " in line
 
 
-def test_unknown_names_are_told_at_once_within_their_mapping(tmp_path):
+def test_unknown_names_are_reported_at_once_within_their_mapping(tmp_path):
     lines = refused(tmp_path, "twin.departures:", f"  bending: {{arm_8_link: {BEND}}}", f"  cables: {{arm_8: {CABLE}}}")
     assert [line.split(": ")[0] for line in lines] == ["mine.yaml:6:15", "mine.yaml:7:14"]
 

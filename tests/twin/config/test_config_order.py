@@ -58,7 +58,7 @@ def test_the_recording_is_the_same(laboratories):
         np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name), field.name)
 
 
-def test_an_arm_without_one_of_its_joints_is_told(tmp_path):
+def test_an_arm_without_one_of_its_joints_is_reported(tmp_path):
     path = tmp_path / "scenario.yaml"
     yaml_file.write(path, load("humanoids2024"))
     values = yaml.safe_load(path.read_text())

@@ -81,7 +81,7 @@ def test_distributions_outlive_a_written_file_and_a_changed_field(tmp_path):
         ("{uniform: [0.02, 0.2]}", "less than or equal to 0.1 .got 0.2"),
     ],
 )
-def test_a_wrong_distribution_is_told_with_its_place(value, message):
+def test_a_wrong_distribution_is_reported_with_its_place(value, message):
     with pytest.raises(ScenarioError, match=f"{GAP}: .*{message}"):
         scenario(f"{GAP}={value}")
 

@@ -130,7 +130,7 @@ def test_a_loose_marker_hangs_by_its_sag_from_its_time_on(departed, config):
     assert not moved.any()
 
 
-def test_a_marker_that_is_not_there_is_told_with_those_that_are():
+def test_a_marker_that_is_not_there_is_reported_with_those_that_are():
     with pytest.raises(UnknownElement, match="no marker named 'nose'.*base1"):
         LooseMarker("nose", 1e-3, 0.0).moved(np.zeros(1), ("base1",), np.zeros((1, 1, 3)))
 

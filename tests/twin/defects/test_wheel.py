@@ -62,12 +62,12 @@ def test_wheels_without_guides_have_no_friction_in_them(ground):
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "reported"),
     [
         ("caster_back.contact_damping=0", "contact_damping: Input should be greater than 0"),
         ("drive.torsion_damping=[0, 0, 1]", "needs torsional stiffness about the same axis"),
     ],
 )
-def test_what_a_step_cannot_do_without_is_asked_for(setting, told):
-    with pytest.raises(ScenarioError, match=told):
+def test_what_a_step_cannot_do_without_is_asked_for(setting, reported):
+    with pytest.raises(ScenarioError, match=reported):
         load("humanoids2024", [f"twin.base.{setting}"])

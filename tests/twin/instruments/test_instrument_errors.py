@@ -93,7 +93,7 @@ def test_lost_messages_leave_holes_and_the_rest_as_it_was(plain, recorded):
     np.testing.assert_array_equal(trial.q_motor, plain[0].q_motor[np.isin(plain[0].t_robot, trial.t_robot)])
 
 
-def test_late_frames_are_stamped_later_and_everything_is_told_against_them(lab, plain, recorded):
+def test_late_frames_are_stamped_later_and_everything_is_relative_to_them(lab, plain, recorded):
     errors = MocapErrors(latency=8e-3)
     late, true = recorded(mocap=errors)
     assert late.t_mocap[0] == pytest.approx(START + 8e-3, abs=0.01)

@@ -49,7 +49,7 @@ def test_no_validation_posture_is_a_calibration_posture(config, nominal):
     assert nearest > 0.05
 
 
-def test_postures_that_do_not_exist_are_told(nominal, monkeypatch):
+def test_postures_that_do_not_exist_are_reported(nominal, monkeypatch):
     monkeypatch.setattr(postures, "_admissible", lambda *a: False)
     with pytest.raises(Unreachable, match="found 0 of 3 postures"):
         sample_postures(nominal, 3, np.random.default_rng(0))

@@ -43,7 +43,7 @@ def test_a_still_is_a_png(lab, trial, tmp_path):
     assert Image.open(tmp_path / "a.part").format == "PNG"
 
 
-def test_time_outside_the_trial_is_told(lab, trial, tmp_path):
+def test_time_outside_the_trial_is_reported(lab, trial, tmp_path):
     with pytest.raises(NothingToShow, match=r"lasts 3\.\d s; there is nothing from 99 s on"):
         clip(lab, trial, tmp_path / "a.gif", replace(SMALL, start=99.0))
     assert not list(tmp_path.iterdir())

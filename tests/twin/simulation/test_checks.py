@@ -44,9 +44,9 @@ def feed(model):
 @pytest.mark.parametrize(("edit", "joint"), [(lock_up, r"[\w.]+"), (harden, "arm_7_joint"), (feed, "arm_4_joint.*")])
 def test_what_runs_away_is_named_with_trial_time_and_joint(lab, sweep, edit, joint, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(Diverged, match=rf"trial 's' diverged at -?\d+\.\d+ s in joint '{joint}'") as told:
+    with pytest.raises(Diverged, match=rf"trial 's' diverged at -?\d+\.\d+ s in joint '{joint}'") as caught:
         simulate(edited(lab.twin, edit), sweep, lab.T_lab_base)
-    assert -2.0 <= told.value.time < sweep.duration
+    assert -2.0 <= caught.value.time < sweep.duration
     assert not list(tmp_path.iterdir())  # no log of MuJoCo's
 
 
@@ -59,7 +59,7 @@ def test_a_campaign_that_runs_away_records_nothing(tmp_path):
     assert not [p for p in tmp_path.rglob("*") if p.is_file()]
 
 
-def test_tipping_is_told(lab, sweep):
+def test_tipping_is_reported(lab, sweep):
     def soften(model):
         for wheel in lab.robot.wheels:
             model.jnt_stiffness[model.joint(f"{wheel.name}.z").id] = 200.0
@@ -69,7 +69,7 @@ def test_tipping_is_told(lab, sweep):
 
 
 @pytest.mark.parametrize("ground", ["contact", "anchored"])
-def test_a_wheel_off_the_plate_is_told(sweep, ground):
+def test_a_wheel_off_the_plate_is_reported(sweep, ground):
     lab = laboratory(load("humanoids2024", [f"twin.base.wheels={ground}"]).quick().twin, 0)
     beyond = exp6(np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])) @ lab.T_lab_base
     with pytest.raises(RobotFell, match=r"'s': (caster|wheel)_\w+ is off the plate at -2\.00 s"):
@@ -112,12 +112,12 @@ def test_a_base_rests_before_its_trial(sweep, ground):
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "reported"),
     [
         ("drive.contact_damping=3000", "damping 3000 .* makes the base heavier .* at most 1[67].. N.s/m"),
         ("caster_back.contact_stiffness=2.5e7", r"stiffness 2\.5e\+07 .* makes the wheel hop"),
     ],
 )
-def test_contacts_that_one_rigid_base_cannot_follow_are_refused(setting, told):
-    with pytest.raises(ContactTooStiff, match=told):
+def test_contacts_that_one_rigid_base_cannot_follow_are_refused(setting, reported):
+    with pytest.raises(ContactTooStiff, match=reported):
         laboratory(load("humanoids2024", ["twin.base.wheels=rigid", f"twin.base.{setting}"]).twin, 0)

@@ -64,7 +64,7 @@ def test_bounces_in_the_play_gain_speed_beyond_the_limit_alone(delta):
 
 @pytest.mark.parametrize("form", ["dead_zone", "friction_held"])
 @pytest.mark.parametrize("coupled", [False, True])
-def test_the_limit_is_told_as_the_scenario_gives_it(config, form, coupled):
+def test_the_limit_is_reported_as_the_scenario_gives_it(config, form, coupled):
     config = replace(config, gear_form=form, coupled_wrist=coupled)
 
     def of(**changes):
@@ -78,7 +78,7 @@ def test_the_limit_is_told_as_the_scenario_gives_it(config, form, coupled):
         laboratory(of(stiffness=1.01 * refused.value.most), 0)
 
 
-def test_too_much_damping_is_told_as_such(config):
+def test_too_much_damping_is_reported_as_such(config):
     with pytest.raises(GearTooStiff, match="mesh damping 30 N.m.s/rad of 'arm_7_joint'.* use at most 10 N.m.s/rad"):
         laboratory(
             replace(config, arm=config.arm | {"arm_7_joint": replace(config.arm["arm_7_joint"], damping=30.0)}), 0

@@ -83,7 +83,7 @@ def test_gains_act_in_the_plate_s_axes():
     np.testing.assert_allclose(seen, np.tile(along * np.repeat([1.5, 1.0], 3), (100, 1)), atol=1e-12)
 
 
-def test_a_wheel_off_a_turned_plate_is_told_though_it_would_be_on_the_nominal_one(config, motion):
+def test_a_wheel_off_a_turned_plate_is_reported_though_it_would_be_on_the_nominal_one(config, motion):
     """A robot near the right corner of the square: turned by 45 deg the square ends before it."""
     corner = replace(config, base=replace(config.base, pose=(1.1, 0.65, -1.6)))
     on = laboratory(laid(corner, PlatePlace()), 0)

@@ -61,7 +61,7 @@ def test_a_swing_feels_like_to_mujoco_s_own_sensor(lab, swing, states, monkeypat
     assert (off < 2e-3 * span).all()
 
 
-def test_a_push_on_the_hand_is_felt(lab, config):
+def test_a_push_on_the_hand_loads_the_arm(lab, config):
     pushed = simulate(lab.twin, motion.pushed("push", "validation", 20.0, config.campaign), lab.T_lab_base)
     data, model = mujoco.MjData(lab.twin.model), lab.twin.model
     mujoco.mj_kinematics(model, data)

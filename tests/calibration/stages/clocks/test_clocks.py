@@ -32,7 +32,7 @@ def pair(y, x, z=None, u=None):
     return Pair(y, x, nothing[0] if z is None else z, nothing[1] if u is None else u)
 
 
-def test_the_plate_clock_is_told_by_masses_that_move(dataset, truth):
+def test_the_plate_clock_is_found_by_masses_that_move(dataset, truth):
     trials = [trial for _, trial in dataset.trials("calibration")]
     clocks, verdicts = synchronise(Laboratory(dataset.urdf, dataset.description), trials)
     assert [c.instrument for c in clocks] == ["robot", "plate"]
@@ -113,12 +113,12 @@ def test_backlash_shifts_a_lag_by_its_formula_unless_its_term_is_there():
     link = play(q, np.array([gap]))
     x, y = (low_passed(signal(t, np.gradient(a, 1.0 / RATE, axis=0)), 6.0) for a in (q, link))
     lost = low_passed(signal(t, np.gradient(link - q, 1.0 / RATE, axis=0)), 6.0).x[:, None]
-    plain, told = fit_lag(pair(y, x), 0.0).value, fit_lag(pair(y, x, lost), 0.0).value
+    plain, reported = fit_lag(pair(y, x), 0.0).value, fit_lag(pair(y, x, lost), 0.0).value
     assert plain == pytest.approx(4.0 * gap / (np.pi * amplitude * 2.0 * np.pi * f), rel=0.1)
-    assert abs(told) < 1e-6
+    assert abs(reported) < 1e-6
 
 
-def test_what_goes_on_at_the_instants_of_y_is_told_from_the_lag():
+def test_what_goes_on_at_the_instants_of_y_is_distinguished_from_the_lag():
     t = np.arange(0.0, 20.0, 1.0 / RATE)
     x = signal(t, motion(t))
     y = signal(t + 0.5, motion(t) + 0.3 * np.roll(motion(t), 30))

@@ -70,8 +70,8 @@ def test_friction_that_winds_the_gears_is_found_and_not_where_there_is_none():
         drives = replace(drives, coulomb=friction * drives.coulomb, viscous=0.0 * drives.viscous)
         trial = geared_robot.record(truth, drives, geared_robot.swing(rng, 20.0), 12.0, rng)
         model = provisional(chain, description, [trial], CLOCK)
-        (told,) = refined_lags(model, description, [trial], CLOCK)
-        found.append(told.wound)
-        unseen = told.unseen
+        (reported,) = refined_lags(model, description, [trial], CLOCK)
+        found.append(reported.wound)
+        unseen = reported.unseen
     assert found[1] - found[0] > 1e-4 > abs(found[0])
     assert 0.0 < unseen < 1e-4  # 0.1 mrad at 0.3 rad/s are 0.3 ms, most of which the fit tells from the lag

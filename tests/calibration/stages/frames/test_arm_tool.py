@@ -203,7 +203,7 @@ def test_the_models_covariance_is_that_of_its_errors(chain, q, base_frame):
     assert 0.90 < covered < 0.98
 
 
-def test_an_arm_that_is_not_the_factorys_is_told(chain, q, base_frame):
+def test_an_arm_that_is_not_the_factorys_is_reported(chain, q, base_frame):
     data = postures(chain, q)
     bent = postures(chain, q + 2e-3 * np.random.default_rng(0).normal(size=q.shape))
     model, said = locate_arm(LAB, replace(bent, q=data.q), base_frame)

@@ -22,7 +22,7 @@ LAB = rigid_robot.se3(np.array([0.9, 0.5, 0.1, 0.02, -0.01, 1.2]))
 
 
 def markers(truth, q, sigma, seed=0, xyz=X):
-    """Marker positions (n, m, 3) [m] in a laboratory nobody has told about, at joint angles q."""
+    """Marker positions (n, m, 3) [m] in a laboratory nobody has declared, at joint angles q."""
     T = LAB @ rigid_robot.hand_in_base(truth, q)
     p = np.einsum("nij,mj->nmi", T[:, :3, :3], xyz) + T[:, None, :3, 3]
     return p + sigma * np.random.default_rng(seed).normal(size=p.shape)
@@ -94,9 +94,9 @@ def test_four_wrong_postures_of_forty_are_named_and_change_nothing(good, kind):
 
 
 def reasons(*arguments, **named) -> str:
-    with pytest.raises(NotCalibrated) as told:
+    with pytest.raises(NotCalibrated) as caught:
         fitted(*arguments, **named)
-    return " | ".join(told.value.reasons)
+    return " | ".join(caught.value.reasons)
 
 
 @pytest.mark.parametrize("m", [4, 1])

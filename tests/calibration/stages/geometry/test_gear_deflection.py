@@ -1,4 +1,4 @@
-"""Row `full` of static postures: play that gravity holds is asked for where it is there, and told."""
+"""Row `full` of static postures: backlash preloaded by gravity is estimated where it is there, and reported."""
 
 from dataclasses import replace
 

@@ -13,7 +13,7 @@ from tests.doubles import rigid_robot
 N_PARAMETERS = 60
 
 
-def told(q, tool="gripper_grasping_frame", hand=(0.02, -0.03, 0.1, 0.1, 0.2, 0.0), components=6):
+def reported(q, tool="gripper_grasping_frame", hand=(0.02, -0.03, 0.1, 0.1, 0.2, 0.0), components=6):
     chain = chain_of_frames(mjcf.urdf(), rigid_robot.JOINTS, "base_footprint", tool)
     model = nominal_hand(chain, np.r_[0.1, -0.2, 0.3, 0.02, 0.01, -0.5, hand])
     J = model.poses_and_derivatives(q).J[:, :components, :N_PARAMETERS]
@@ -41,7 +41,7 @@ def test_the_rank_is_that_of_the_model_for_any_postures_in_any_order(torso, comp
     found = []
     for seed in range(3):
         q = rigid_robot.random_angles(np.random.default_rng(seed), 60, torso)
-        found += [told(rows, components=components, **where) for rows in (q, q[::-1], q[np.argsort(q[:, 3])])]
+        found += [reported(rows, components=components, **where) for rows in (q, q[::-1], q[np.argsort(q[:, 3])])]
     assert {(known.rank, known.clear) for known in found} == {(rank, True)}
     assert len({known.base for known in found[:3]}) == len({known.status for known in found[:3]}) == 1
 
@@ -55,7 +55,7 @@ def test_off_the_axis_of_arm_7_two_more_are_seen_in_proportion_to_the_distance_n
     """
     q, weak = rigid_robot.random_angles(np.random.default_rng(0), 60, torso), []
     for distance in (1e-4, 1e-3):
-        known = told(q, tool="arm_7_link", hand=np.r_[distance, 0.0, 0.1, np.zeros(3)], components=3)
+        known = reported(q, tool="arm_7_link", hand=np.r_[distance, 0.0, 0.1, np.zeros(3)], components=3)
         assert known.rank == on_the_axis + 2 and known.clear
         weak.append(known.singular_values[on_the_axis : on_the_axis + 2] / known.singular_values[0])
         assert known.singular_values[on_the_axis - 1] > 10.0 * known.singular_values[on_the_axis]

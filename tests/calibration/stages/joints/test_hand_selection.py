@@ -85,7 +85,7 @@ def test_play_is_explained_in_motion_and_not_at_rest(monkeypatch: pytest.MonkeyP
     assert found["unseen_motion"].before == pytest.approx(GAP, rel=0.1)
 
 
-def test_a_start_is_no_repetition_and_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_start_is_no_repetition_and_is_distinguished(monkeypatch: pytest.MonkeyPatch) -> None:
     """The gear is thrown from flank to flank for a second after each start, by nothing the model is asked with."""
     monkeypatch.setattr(repetitions, "RICHEST", 1)
     data = []
@@ -108,9 +108,9 @@ def test_a_start_is_no_repetition_and_is_told_apart(monkeypatch: pytest.MonkeyPa
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(("change", "told"), [("nothing", True), ("one way", False), ("no play", False)])
+@pytest.mark.parametrize(("change", "reported"), [("nothing", True), ("one way", False), ("no play", False)])
 def test_a_joint_is_excited_on_both_flanks_and_above_the_noise(
-    monkeypatch: pytest.MonkeyPatch, change: str, told: bool
+    monkeypatch: pytest.MonkeyPatch, change: str, reported: bool
 ) -> None:
     monkeypatch.setattr(repetitions, "RICHEST", 1)
     data = []
@@ -121,7 +121,7 @@ def test_a_joint_is_excited_on_both_flanks_and_above_the_noise(
         data.append(joint_data.recorded(f"t{k}", q, y))
     models = JointModels(joint_data.inputs(), joint_data.ZERO, ())
     found = [x.joint for x in on_repetitions(models, data, "total") if x.regime == "repetition"]
-    assert ("arm_6_joint" in found) == told
+    assert ("arm_6_joint" in found) == reported
 
 
 def lost_in_play(q: np.ndarray) -> np.ndarray:
@@ -138,9 +138,9 @@ def test_regimes_leave_out_joints_that_are_not_excited(monkeypatch: pytest.Monke
         q[:, ARM_7] = 0.1
         still.append(replace(trial, q_motor=q, q_link=q - joint_data.ZERO))
     models, _ = fit_joint_models(joint_data.LAB, still, ROBOT, joint_data.hand())
-    told = {x.joint for x in (*on_repetitions(models, still, "total"), *on_validation(models, still, ROBOT))}
-    assert "arm_7_joint" not in told
-    assert "torso_lift_joint" not in told
+    reported = {x.joint for x in (*on_repetitions(models, still, "total"), *on_validation(models, still, ROBOT))}
+    assert "arm_7_joint" not in reported
+    assert "torso_lift_joint" not in reported
 
 
 def test_samples_that_are_passed_end_where_the_trial_does():

@@ -76,10 +76,10 @@ def test_a_rho_at_its_limit_is_not_identifiable(
     of_rho = found.pop("sigmoid.arm_6_joint.rho")
     assert np.linalg.eigvalsh(model.covariance).min() > -1e-9
     assert {p.status for p in found.values()} == statuses
-    told = [v.message for v in said if v.verdict == "warning"]
-    assert len(told) == bool(verdict)
+    reported = [v.message for v in said if v.verdict == "warning"]
+    assert len(reported) == bool(verdict)
     if verdict:
-        assert verdict in told[0] and "arm_6_joint" in told[0]
+        assert verdict in reported[0] and "arm_6_joint" in reported[0]
         assert of_rho.status == "not_identifiable"
         assert of_rho.sigma == pytest.approx((RHO[1] - RHO[0]) / np.sqrt(12.0))
     else:

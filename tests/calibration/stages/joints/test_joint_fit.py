@@ -135,7 +135,7 @@ def test_a_joint_that_never_moves_has_no_degree_to_try() -> None:
     assert worthwhile(candidates(samples, "total")) == ()  # type: ignore[arg-type]
 
 
-def test_joints_that_never_move_are_told_and_not_corrected() -> None:
+def test_joints_that_never_move_are_reported_and_not_corrected() -> None:
     data = []
     for t in joint_data.made([joint_data.truth("arm_3_joint", "total", 1, 30.0, 1)]):
         q, still = t.q_motor.copy(), t.q_link.copy()
@@ -177,7 +177,7 @@ def test_link_readings_that_are_not_the_joint_s_are_refused_by_name(trials: list
     assert trials[0].id in message and trials[-1].id not in message
 
 
-def test_joints_without_a_link_encoder_are_told(trials: list[Trial]) -> None:
+def test_joints_without_a_link_encoder_are_reported(trials: list[Trial]) -> None:
     without = []
     for trial in trials:
         link = trial.q_link.copy()

@@ -52,7 +52,7 @@ def test_printed_combinations_come_back_exactly(point):
         assert c.value == pytest.approx(c.coefficients[5:] @ p, rel=1e-6)
 
 
-def test_the_compliance_comes_back_and_gravity_is_told_apart():
+def test_the_compliance_comes_back_and_gravity_is_distinguished():
     rng = np.random.default_rng(1)
     wheels = wheel_model(WHEELS, "contact")
     K, C = matrices(wheels, values(rng))
@@ -227,7 +227,7 @@ def test_a_frame_that_is_off_counts_in_the_uncertainty():
     assert sigma[2, 2] == 0.0
 
 
-def test_a_fit_that_is_singular_without_one_trial_is_told():
+def test_a_fit_that_is_singular_without_one_trial_is_reported():
     good, singular = np.eye(6), np.diag([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     sigmas = (np.zeros((6, 6)), np.zeros((6, 6)))
     whole = Springs(good, good, ((good, good), (good, good)), sigmas, np.ones((6, 6), dtype=bool))

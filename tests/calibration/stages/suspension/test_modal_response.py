@@ -42,7 +42,7 @@ def test_springs_without_dampers_answer_at_once(damping):
     np.testing.assert_allclose(x, np.linalg.solve(K, w.T).T, atol=1e-5 * np.abs(x).max())
 
 
-def test_a_mode_that_does_not_settle_is_told():
+def test_a_mode_that_does_not_settle_is_reported():
     K, C = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.01]), np.eye(6)
     assert modes_of(K, C, NONE).settling == pytest.approx(100.0)
     K[5, 5] = -1.0

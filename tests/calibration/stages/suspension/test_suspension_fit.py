@@ -123,7 +123,7 @@ def test_without_a_plate_the_dynamics_take_its_place(trials):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         (lambda w: -w, "plate sign: Fz"),
         (lambda w: w * [1, 1, 1, -1, 1, 1], "Mx mirror"),
@@ -133,10 +133,10 @@ def test_without_a_plate_the_dynamics_take_its_place(trials):
     ],
     ids=["sign", "one axis", "Fy", "rotated", "unit"],
 )
-def test_a_wrong_plate_is_refused_by_name(trials, change, told):
+def test_a_wrong_plate_is_refused_by_name(trials, change, reported):
     suspension, verdicts = fit([plated(t, change(t.plate_wrench[:, 0])) for t in trials])
     assert suspension is None
-    assert told in said(verdicts, "refused")
+    assert reported in said(verdicts, "refused")
 
 
 def turned(trial, degrees):
@@ -145,7 +145,7 @@ def turned(trial, degrees):
     return plated(trial, np.hstack([trial.plate_wrench[:, 0, :3] @ R.T, trial.plate_wrench[:, 0, 3:] @ R.T]))
 
 
-def test_a_slightly_turned_plate_is_told(trials):
+def test_a_slightly_turned_plate_is_reported(trials):
     for degrees in (5.0, 8.0):
         assert f"rotated by {degrees:.0f}" in said(fit([turned(t, degrees) for t in trials])[1], "warning")
 
@@ -170,7 +170,7 @@ def test_a_base_that_slips_about_the_vertical_in_one_trial_is_no_turned_plate(tr
     assert "rotated" not in said(fit(some)[1], "warning")
 
 
-def test_a_base_that_was_pushed_is_told_and_left_out(trials, fitted):
+def test_a_base_that_was_pushed_is_reported_and_left_out(trials, fitted):
     late = trials[0].t_mocap > trials[0].t_mocap[-1] - 2.0
     position = trials[0].marker_position.copy()
     position[late] += [0.02, 0.01, 0.0]
@@ -180,7 +180,7 @@ def test_a_base_that_was_pushed_is_told_and_left_out(trials, fitted):
     assert {len(h.error) for _, h in suspension.held_out} == {len(trials) - 1}
 
 
-def test_too_little_is_told(trials):
+def test_too_little_is_reported(trials):
     suspension, verdicts = fit(trials[:1])
     assert suspension is None
     assert "two trials" in said(verdicts, "missing")
