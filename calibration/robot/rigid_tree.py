@@ -3,8 +3,8 @@
     A_i = A_parent + S_i ddq_i + V_parent x S_i dq_i     f_i = I_i A_i + V_i x* I_i V_i + sum_children f_c
     tau_i = S_i' f_i,   M_ii = S_i' I^c_i S_i            I^c_i what joint i carries, f_0 the wrench on the root
 
-Twists and wrenches are about the root's origin. A_0 is the root's proper acceleration, gravity taken off. The regressor
-is how tau changes with masses and first moments of the bodies, second moments left alone.
+Twists and wrenches are about the root's origin. A_0 is the root's proper acceleration, gravity taken off. What pushes
+the last body from outside is taken off its f. The regressor is how tau changes with masses and first moments of the bodies, second moments left alone.
 Reference: Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 5 and 6.
 """
 
@@ -84,7 +84,8 @@ def dynamics_along(
 ) -> TreeDynamics:
     """Dynamics at positions [rad, m], velocities and accelerations (n, k) in the columns of the tree.
 
-    `root` (n, 12) or (1, 12): twist of the root and its proper acceleration, linear first, in its axes.
+    `root` (n, 12) or (1, 12): twist of the root and its proper acceleration, linear first, in its axes; (n, 18): and the
+    wrench from outside on the last body, in that body's axes about its origin.
     """
     found, (q, v, a) = room(len(q), q.shape[1], regressors), np.array([q, v, a], dtype=float)
     sample(tree, q, v, a, np.array(root, dtype=float, order="C"), scratch(tree), found)
@@ -93,6 +94,7 @@ def dynamics_along(
 
 # columns of `work`; as numpy's integers, not literals, for each of which numba would compile a function
 _R, _P, _S, _V, _A, _F, _X, _I, _ROW = np.array([0, 9, 12, 18, 24, 30, 36, 42, 78])
+_PUSH = 12  # first column of a root's push
 
 
 def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
@@ -213,6 +215,17 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def _pushed(me: np.ndarray, push: np.ndarray) -> None:
+    """Take a wrench (6,) in a body's axes about its origin off the wrench that moves the body."""
+    off = np.zeros(6)
+    _turned(me, -push[:3], off, _R)
+    _turned(me, -push[3:], off, _R + 3)
+    _cross(me, _P, off, _R, off, _R + 3)
+    for c in range(6):
+        me[_F + c] += off[c]
+
+
+@njit(cache=True, error_model="numpy")
 def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
     """Wrenches (4, 6) about the root's origin by unit mass and first moments of a body that moves: a(r) = a + B r."""
     B, axis, w, square = np.zeros((3, 3)), np.empty(3), me[_V + 3 : _A], 0.0
@@ -271,6 +284,8 @@ def sample(
                 _place(tree, b - 1, q[i, column], up, me)
                 _move(me, up, v[i, column], a[i, column])
             _weigh(tree, b, work[b])
+        if root.shape[1] > _PUSH:
+            _pushed(work[k], root[i, _PUSH:])
         if out.regressor.shape[2]:
             _regress(tree, work, out.regressor[i])
         for j in range(k - 1, -1, -1):

@@ -16,7 +16,7 @@ What the wrist's sensor says hangs on it, compared with the nominal links and th
 Angles behind gears would not do: a hand that sags by 10 mrad always sags with gravity, and weighs 1 % less.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.robot.laboratory import Laboratory
+from calibration.robot.wrist_sensor import hangs, hung_bodies
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.verdict import Verdict
@@ -139,8 +140,8 @@ def expected_load(lab: Laboratory, link: str) -> Hanging:
     data, sensor = model.createData(), model.getFrameId(link)
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     tolerance, payload = description.tolerances, description.payload
-    parts = [(b.mass, p, tolerance.link_mass * b.mass, tolerance.link_com) for b, p in _bodies(model, data, sensor)]
-    if payload is not None and _hangs(model, model.getFrameId(payload.link), sensor):
+    parts = [(b.mass, b.lever, tolerance.link_mass * b.mass, tolerance.link_com) for b in hung_bodies(model, data, sensor)]
+    if payload is not None and hangs(model, model.getFrameId(payload.link), sensor):
         at = data.oMf[model.getFrameId(payload.link)].act(np.array(payload.com))
         parts.append((payload.mass, at, payload.tolerance, 0.0))
     masses, widths, off = (np.array([part[k] for part in parts]) for k in (0, 2, 3))
@@ -149,25 +150,6 @@ def expected_load(lab: Laboratory, link: str) -> Hanging:
     covariance = J.T @ (widths[:, None] ** 2 * J)
     covariance[1:, 1:] += np.eye(3) * float(((masses * off) ** 2).sum())
     return Hanging(float(masses.sum()), masses @ c, covariance)
-
-
-def _hangs(model: pin.Model, frame: int, sensor: int) -> bool:
-    """Whether a frame is the sensor's or hangs on it."""
-    while frame not in (0, sensor):
-        frame = model.frames[frame].parentFrame
-    return frame == sensor
-
-
-def _bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[tuple[pin.Inertia, np.ndarray]]:
-    """Inertia and centre in the world of everything beyond the sensor: rigid parts, and those behind further joints."""
-    for k, frame in enumerate(model.frames):
-        if k == sensor or not _hangs(model, k, sensor):
-            continue
-        if frame.type == pin.FrameType.JOINT:
-            inertia = model.inertias[frame.parentJoint]
-            yield inertia, data.oMi[frame.parentJoint].act(inertia.lever)
-        elif frame.parentJoint == model.frames[sensor].parentJoint:
-            yield frame.inertia, data.oMf[k].act(frame.inertia.lever)
 
 
 def weighed(

@@ -1,6 +1,7 @@
 """What moves the links in a trial: motor positions, velocities, accelerations, torques and inertias of all joints.
 
-    tau = M(q) a + C(q, v) v + g(q)        nominal inverse dynamics with the trial's payload       [N.m, N]
+    tau = M(q) a + C(q, v) v + g(q) - J' p        nominal inverse dynamics with the trial's payload       [N.m, N]
+                                           p what pushes the hand, by the wrist's sensor
     tau + R(q, v, a) dphi                  of other masses and first moments (m, m c) by body [kg, kg.m], a tilt of the
                                            base about x and y [rad], and bending of the first joint's column [rad/(N.m)]
 
@@ -82,16 +83,23 @@ class Dynamics:
         """The model made ready for its dynamics."""
         return tree_of(self.model, self.joints)
 
-    def loads(self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None = None) -> LinkLoads:
-        """Loads at motor readings q (n, k) taken at t (n,) [s], without NaN; `base` (n, 6) as `base_acceleration`."""
+    def loads(
+        self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None = None, push: np.ndarray | None = None
+    ) -> LinkLoads:
+        """Loads at motor readings q (n, k) taken at t (n,) [s], without NaN.
+
+        `base` (n, 6) as `base_acceleration` has it, `push` (n, 6) on the hand as `WristSensor.push` has it.
+        """
         smooth, v, a = derivatives(t, q, CUTOFF)
-        return LinkLoads(trial_id, t, q, smooth - self.offset, v, a, *self.evaluated(smooth, v, a, base))
+        return LinkLoads(trial_id, t, q, smooth - self.offset, v, a, *self.evaluated(smooth, v, a, base, push))
 
     def evaluated(
-        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None
+        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Torques and inertias (n, k), regressors (n, k, p), moments (n, 2) at readings and derivatives (n, k)."""
         root = self.root(base)
+        if push is not None:
+            root = np.concatenate([np.broadcast_to(root, (len(push), 12)), push], axis=1)
         found = dynamics_along(self.tree, q - self.offset, v, a, root, True)
         push, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
         tilt = np.stack(

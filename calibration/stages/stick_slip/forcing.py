@@ -19,6 +19,7 @@ from calibration.numerics.signals import RATE, Signal, even, low_passed
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
+from calibration.robot.wrist_sensor import push_of
 from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STEPS
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load, root_in_base
@@ -105,15 +106,24 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wr
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
     if sources.robot is None or not len(trial.t_robot):
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)))
-    t = sources.robot.to_mocap(trial.t_robot)
-    return replace(wrenches_along(sources.lab, t, trial.q_motor, plate, T_lab_0), trial_id=trial.id, start=start)
+    push, known = push_of(sources.lab.urdf, sources.lab.description, trial), np.isfinite(trial.q_motor).all(axis=1)
+    t, q = sources.robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
+    return replace(wrenches_along(sources.lab, t, q, plate, T_lab_0, push), trial_id=trial.id, start=start)
 
 
-def wrenches_along(
-    lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, plate: Load | None, T_lab_0: np.ndarray
+def wrenches_along(  # noqa: PLR0913  what the instruments show
+    lab: Laboratory,
+    t: np.ndarray,
+    q_motor: np.ndarray,
+    plate: Load | None,
+    T_lab_0: np.ndarray,
+    push: np.ndarray | None = None,
 ) -> Wrenches:
-    """The wrench of the plate, and that of readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock]."""
-    dynamics = motion_load(lab, t, q_motor, T_lab_0, CUTOFF)
+    """The wrench of the plate, and that of readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock].
+
+    `push` (n, 6) on the hand as `WristSensor.push` has it.
+    """
+    dynamics = motion_load(lab, t, q_motor, T_lab_0, CUTOFF, push)
     return Wrenches("readings", float(t[0]), plate, dynamics, *composite_inertia(lab, t, q_motor, T_lab_0))
 
 

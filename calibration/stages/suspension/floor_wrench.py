@@ -18,7 +18,7 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from calibration.numerics.lie import compose, inverse
-from calibration.numerics.signals import CUTOFF, Signal, even, low_passed
+from calibration.numerics.signals import CUTOFF, Signal, even, interpolate_columns, low_passed
 from calibration.numerics.wrench import in_frame
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -64,12 +64,23 @@ def floor_load(t: np.ndarray, w: np.ndarray, T_lab_0: np.ndarray, centre: np.nda
     return Load(low_passed(even(t, w), cutoff), np.zeros((6, 6)), 0.0, np.zeros(3), T_0_plate)
 
 
-def motion_load(lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np.ndarray, cutoff: float) -> Load:
-    """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock]."""
+def motion_load(
+    lab: Laboratory,
+    t: np.ndarray,
+    q_motor: np.ndarray,
+    T_lab_0: np.ndarray,
+    cutoff: float,
+    push: np.ndarray | None = None,
+) -> Load:
+    """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock], the hand pushed by (n, 6)."""
     description = lab.description
     q = low_passed(even(t, q_motor), cutoff)
     spline, T_0_root = CubicSpline(q.t, q.x), root_in_base(lab.floating, description)
-    along = dynamics_along(lab.tree, q.x, spline(q.t, 1), spline(q.t, 2), root_at_rest(lab, T_lab_0))
+    root = root_at_rest(lab, T_lab_0)
+    if push is not None:
+        pushed = interpolate_columns(q.t, t, push)
+        root = np.concatenate([np.broadcast_to(root, (len(pushed), 12)), pushed], axis=1)
+    along = dynamics_along(lab.tree, q.x, spline(q.t, 1), spline(q.t, 2), root)
     w = along.root @ T_0_root.dualAction.T
     rows = np.linspace(0, len(q.t) - 1, _MASS_SAMPLES).astype(int)
     M = T_0_root.dualAction @ along.composite[rows].mean(axis=0) @ T_0_root.inverse().action

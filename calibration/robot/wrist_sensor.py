@@ -1,0 +1,141 @@
+"""The wrist's force-torque sensor: what hangs on it, and what pushes the hand from outside.
+
+    p = f + w - w_0        f = I A + V x* I V
+
+w: reading, the hand's action on the sensor; f: wrench that moves what hangs on it, the nominal links beyond the sensor
+and the declared payload, of weight W, along the readings; w_0: mean of f + w in the trial's first second, in which
+nothing pushes. Zeros of encoders, tolerances of masses and a base that shakes leave up to a sixth of W: the hand is
+pushed in trials in which p's force, averaged over 0.4 s, exceeds 0.3 W.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+from scipy.ndimage import uniform_filter1d
+
+from calibration.errors import NotEnoughData
+from calibration.numerics.signals import RATE, even, interpolate_columns, low_passed
+from calibration.recording.schema import Description
+from calibration.recording.trial import REST, Trial
+from calibration.robot.chain import Chain
+from calibration.robot.laboratory import Laboratory
+from calibration.robot.rigid_tree import RigidTree, dynamics_along
+
+_CUTOFF = 20.0  # [Hz]
+_AVERAGE = 0.4  # [s]
+_SHARE = 0.3  # of the weight: less is no push [-]
+_STRIDE = 4  # samples from one to the next where a push is looked for
+
+
+def hung_bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[pin.Inertia]:
+    """Inertia, in world axes, of all beyond a sensor's frame: rigid parts, and bodies behind further joints."""
+    for k, frame in enumerate(model.frames):
+        if k == sensor or not hangs(model, k, sensor):
+            continue
+        if frame.type == pin.FrameType.JOINT:
+            yield data.oMi[frame.parentJoint].act(model.inertias[frame.parentJoint])
+        elif frame.parentJoint == model.frames[sensor].parentJoint:
+            yield data.oMf[k].act(frame.inertia)
+
+
+def hangs(model: pin.Model, frame: int, sensor: int) -> bool:
+    """Whether a frame is the sensor's or hangs on it."""
+    while frame not in (0, sensor):
+        frame = model.frames[frame].parentFrame
+    return frame == sensor
+
+
+@dataclass(frozen=True)
+class WristSensor:
+    """The sensor of a robot with the payload in its hand.
+
+    Attributes:
+        tree: The robot of which only what hangs on the sensor has mass.
+        chain: To the sensor.
+        link: Its frame.
+        root: (4, 4) the base frame in the tree's root.
+        body: (4, 4) the sensor's frame in the last body of the tree.
+        at_rest: (1, 12) twist and proper acceleration of a root at rest.
+    """
+
+    tree: RigidTree
+    chain: Chain
+    link: str
+    root: np.ndarray
+    body: np.ndarray
+    at_rest: np.ndarray
+
+    def push(self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> np.ndarray | None:
+        """Wrench (n, 6) on the hand at t (n,) [s], axes and origin of the tree's last body [N, N.m]; None: no push.
+
+        Args:
+            t: Times.
+            q: (n, k) motor readings [rad, m].
+            wrench: (n, 6) readings.
+        """
+        try:
+            found = low_passed(even(t, np.hstack([q, wrench])), _CUTOFF)
+        except NotEnoughData:
+            return None
+        k, limit = q.shape[1], _SHARE * float(self.tree.mass[-1] * np.linalg.norm(self.at_rest[0, 6:9]))
+        v = np.gradient(found.x[:, :k], 1.0 / RATE, axis=0)
+        moving = np.stack([found.x[:, :k], v, np.gradient(v, 1.0 / RATE, axis=0)])
+
+        def outside(stride: int) -> np.ndarray:
+            p = self._moved(*moving[:, ::stride]) + found.x[::stride, k:]
+            return np.asarray(p - p[found.t[::stride] <= found.t[0] + REST].mean(axis=0))
+
+        force = uniform_filter1d(outside(_STRIDE)[:, :3], int(_AVERAGE * RATE / _STRIDE), axis=0)
+        if np.linalg.norm(force, axis=1).max() <= limit:
+            return None
+        p = outside(1)
+        return interpolate_columns(t, found.t, p @ pin.SE3(self.body).dualAction.T)
+
+    def _moved(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """f (n, 6) in the sensor's axes about its origin."""
+        f = dynamics_along(self.tree, q, v, a, self.at_rest).root
+        T = self.root @ self.chain.poses(q[:, self.chain.columns], self.link)
+        R, moment = T[:, :3, :3], f[:, 3:] - np.cross(T[:, :3, 3], f[:, :3])
+        return np.concatenate([(f[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]], axis=1)
+
+
+@lru_cache(maxsize=8)
+def wrist_sensor(urdf: str, description: Description) -> WristSensor | None:
+    """The sensor of a robot with its payload; None where no frame is declared for one, or the last joint moves it not."""
+    link, lab = description.wrist_link, Laboratory(urdf, description)
+    if link is None:
+        return None
+    reduced, whole = lab.floating, pin.buildModelFromXML(urdf)
+    frame, data, sensor = reduced.frames[reduced.getFrameId(link)], whole.createData(), whole.getFrameId(link)
+    if frame.parentJoint != reduced.njoints - 1:
+        return None
+    pin.framesForwardKinematics(whole, data, pin.neutral(whole))
+    hung = pin.Inertia.Zero()
+    for part in hung_bodies(whole, data, sensor):
+        hung += part
+    payload = description.payload
+    if payload is not None and hangs(whole, whole.getFrameId(payload.link), sensor):
+        box = pin.Inertia(payload.mass, np.array(payload.com), np.zeros((3, 3)))
+        hung += data.oMf[whole.getFrameId(payload.link)].act(box)
+    hung = frame.placement.act(data.oMf[sensor].actInv(hung))
+    tree = lab.tree._replace(**{n: np.zeros_like(getattr(lab.tree, n)) for n in ("mass", "moment", "inertia")})
+    tree.mass[-1], tree.moment[-1], tree.inertia[-1] = hung.mass, hung.mass * hung.lever, hung.matrix()[3:, 3:]
+    base = reduced.frames[reduced.getFrameId(description.base_frame)].placement
+    gravity = base.rotation @ np.array(description.gravity)
+    at_rest = np.concatenate([np.zeros(6), -gravity, np.zeros(3)])[None]
+    return WristSensor(tree, lab.chain, link, base.homogeneous, frame.placement.homogeneous, at_rest)
+
+
+def push_of(urdf: str, description: Description, trial: Trial) -> np.ndarray | None:
+    """What pushes the hand in a trial, (n, 6) at those of its readings that are complete; None where nothing does."""
+    if not np.isfinite(trial.wrist_wrench).any():
+        return None
+    entry = next((t for t in description.trials if t.id == trial.id), None)
+    sensor = wrist_sensor(urdf, description if entry is None else description.carrying(entry.payload))
+    known = np.isfinite(trial.q_motor).all(axis=1)
+    if sensor is None:
+        return None
+    return sensor.push(trial.t_robot[known], trial.q_motor[known], trial.wrist_wrench[known])
