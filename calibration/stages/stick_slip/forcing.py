@@ -16,11 +16,13 @@ from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE, Signal, even, low_passed
+from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
 from calibration.robot.wrist_sensor import push_of
 from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STEPS
+from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load, root_in_base
 from calibration.stages.suspension.modal_response import predicted
@@ -105,6 +107,7 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wr
     if sources.plate is not None and len(trial.t_plate):
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
     if sources.robot is None or not len(trial.t_robot):
+        plate = None if plate is None else borne(sources.lab.description, sources.lab.urdf, plate)
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)))
     push, known = push_of(sources.lab.urdf, sources.lab.description, trial), np.isfinite(trial.q_motor).all(axis=1)
     t, q = sources.robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
@@ -123,8 +126,17 @@ def wrenches_along(  # noqa: PLR0913  what the instruments show
 
     `push` (n, 6) on the hand as `WristSensor.push` has it.
     """
-    dynamics = motion_load(lab, t, q_motor, T_lab_0, CUTOFF, push)
+    plate, dynamics = (
+        None if load is None else borne(lab.description, lab.urdf, load)
+        for load in (plate, motion_load(lab, t, q_motor, T_lab_0, CUTOFF, push))
+    )
     return Wrenches("readings", float(t[0]), plate, dynamics, *composite_inertia(lab, t, q_motor, T_lab_0))
+
+
+def borne(description: Description, urdf: str, load: Load) -> Load:
+    """The load as `WheelSet.borne` has it."""
+    wheels = wheel_set(urdf, description.wheels, float(np.linalg.norm(description.gravity)))
+    return replace(load, signal=replace(load.signal, x=wheels.borne(load.signal.x)))
 
 
 def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> PlanarForcing:

@@ -4,12 +4,12 @@
     N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i, y_i) = (-Fz, My, -Mx)        k_i 1; load share of a drive
 
 A wheel carries its own weight n_i, of the nominal robot; the base's weight is shared as by vertical springs under a
-rigid base. Casters are front or back of the axle of the drives. Priors are log-normal and wide: nothing here is of a
+rigid base, and a wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors are log-normal and wide: nothing here is of a
 particular robot.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -24,6 +24,8 @@ PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0
 PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.15])
 PRELOADS = 8  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
+_LOAD, _SIGN = [2, 4, 3], np.array([-1.0, 1.0, -1.0])  # of a wrench: (-Fz, My, -Mx)
+_LEGS = 3  # wheels that a base stands on
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
 
 
@@ -102,6 +104,27 @@ class WheelSet:
         G = share[:, None] * (A @ np.linalg.pinv(A.T @ (share[:, None] * A)))
         return self.weight - G @ (A.T @ self.weight), G
 
+    def borne(self, wrench: np.ndarray) -> np.ndarray:
+        """Wrenches (n, 6) on the floor [N, N.m, frame 0] as if wheels could pull, for those of wheels that lift off.
+
+        With -Fz, My, -Mx so that sum_i max(N_i, 0) (1, x_i, y_i) is what they were: N_i of all that stay on the floor
+        and, the springs being linear, heave and tilt are those of the wheels in contact.
+        """
+        n, G = self.loads(1.0)
+        A, found = np.column_stack([np.ones(len(n)), self.position]), wrench.copy()
+        loads = wrench[:, _LOAD] * _SIGN
+        for row in np.flatnonzero((n + loads @ G.T).min(axis=1) < 0.0):
+            load = loads[row]
+            for _ in range(len(n)):
+                on = n + G @ load > 0.0
+                if on.sum() < _LEGS:
+                    break
+                load, before = np.linalg.solve(A[on].T @ G[on], loads[row] - A[on].T @ n[on]), load
+                if np.array_equal(on, n + G @ load > 0.0) or np.array_equal(load, before):
+                    break
+            found[row, _LOAD] = load * _SIGN
+        return found
+
     def stiffness(self, p: SlipParameters) -> np.ndarray:
         """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""
         K = np.zeros((3, 3))
@@ -111,7 +134,8 @@ class WheelSet:
         return K
 
 
-def wheel_set(urdf: str, wheels: Sequence[Wheel], gravity: float) -> WheelSet:
+@lru_cache(maxsize=8)
+def wheel_set(urdf: str, wheels: tuple[Wheel, ...], gravity: float) -> WheelSet:
     """The declared wheels; their masses where the nominal robot has a joint at their hub."""
     model = pin.buildModelFromXML(urdf)
     data = model.createData()
