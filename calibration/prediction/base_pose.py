@@ -14,6 +14,7 @@ Where the base's markers are in a trial, predicted: its first second and a wrenc
 T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     x from the plate's wrench or from inverse dynamics along q_motor
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -87,11 +88,18 @@ class LoadedBase:
             return state
         return state._replace(moved=self.in_lab((state.x * self.suspension.moves("plate"))[None]))
 
-    def sprung(self, t: float, wrench: np.ndarray, before: "BaseState | None") -> "BaseState":
-        """The same as the springs alone have it; `moved` is left as it was."""
+    def sprung(
+        self,
+        t: float,
+        wrench: np.ndarray,
+        before: "BaseState | None",
+        borne: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> "BaseState":
+        """The same as the springs alone have it; `moved` is left as it was. `borne` as `WheelSet` has it."""
         if wrench.shape != (6,):
             raise ShapeError("wrench", wrench.shape, (6,))
         w = self._action @ wrench
+        w = w if borne is None else borne(w[None])[0]
         if before is None:
             none = np.zeros(len(self.suspension.modes.tau), dtype=complex)
             return BaseState(t, t, w, w, 1, none, none, np.zeros(6), np.eye(4)[None])

@@ -81,8 +81,11 @@ class BundledArm:
         q_motor: np.ndarray,
         velocity: np.ndarray | None = None,
         T_lab_base: np.ndarray | None = None,
+        push: np.ndarray | None = None,
     ) -> ArmPositions:
-        """Of readings q_motor (n, k) [rad, m] at t (n,) [s]; velocity (n, k) and the base (n, 4, 4) where known.
+        """Of readings q_motor (n, k) [rad, m] at t (n,) [s].
+
+        Velocity (n, k), the base (n, 4, 4) and what pushes the hand (n, 6) where known.
 
         Raises:
             NotEnoughData: Less than a second of readings and no velocity.
@@ -90,10 +93,10 @@ class BundledArm:
         robot = self.trains.dynamics
         base = None if T_lab_base is None else self.trains.base_acceleration(t, T_lab_base, t)
         if velocity is None:
-            loads = robot.loads("", t, q_motor, base)
+            loads = robot.loads("", t, q_motor, base, push)
         else:
             a = np.gradient(velocity, t, axis=0) if len(t) > 1 else np.zeros_like(velocity)
-            found = robot.evaluated(q_motor, velocity, a, base)
+            found = robot.evaluated(q_motor, velocity, a, base, push)
             loads = LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
         angles = self.trains.of_loads(loads)
         return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < _RESTS)

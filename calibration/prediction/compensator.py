@@ -121,8 +121,7 @@ class Compensator:
             inputs = input_model(Laboratory(estimate.urdf, laboratory.carrying(payload)), hand)
             joints = JointModels(inputs, np.array(estimate.link_zero), estimate.joint_models)
         found = cls(hand, *uncertain(hand, model), play, model.hand_error, joints, estimate.suspension, laboratory)
-        found = replace(found, clocks=estimate.clocks)
-        return found._bundled(estimate, payload)
+        return replace(found, clocks=estimate.clocks)._bundled(estimate, payload)
 
     def _bundled(self, estimate: Estimate, payload: float | None) -> "Compensator":
         """With drive trains and base of row `full`, where it is the main one and has them."""
@@ -136,7 +135,7 @@ class Compensator:
             slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)), source)
         return replace(self, joints=None, arm=arm, slipping=slipping)
 
-    def predict(
+    def predict(  # noqa: PLR0913  what the instruments show
         self,
         t: np.ndarray,
         q_motor: np.ndarray,
@@ -144,6 +143,7 @@ class Compensator:
         T_lab_base_start: np.ndarray | None = None,
         velocity: np.ndarray | None = None,
         t_wrench: np.ndarray | None = None,
+        wrist: np.ndarray | None = None,
     ) -> HandPose:
         """Hand poses at readings q_motor (n, n_joints) [rad, m], taken at t (n,) [s].
 
@@ -157,6 +157,7 @@ class Compensator:
             T_lab_base_start: (4, 4) pose of the base frame at the start; identity where not given.
             velocity: (n, n_joints) of the motor side [rad/s, m/s], where it is known.
             t_wrench: Times (m,) [s, plate's clock] of a wrench (m, 6) that was not taken at t, then the robot's clock.
+            wrist: (n, 6) of the wrist's force-torque sensor at t: a push at the hand loads drive trains and base.
 
         Raises:
             NotEnoughData: A wrench without a suspension or for less than a second, or without its clock.
@@ -166,7 +167,8 @@ class Compensator:
         if q.ndim != 2 or len(t) != len(q):
             raise ShapeError("q_motor", q.shape, (len(t), "n_joints"))
         self._refuse_impossible(q)
-        base, moved, variance = self._base(T_lab_base_start), None, None
+        base, moved, spread = self._base(T_lab_base_start), None, None
+        push = None if self.arm is None or wrist is None else self.arm.trains.push(t, q, wrist)
         if wrench is not None:
             w, there = np.asarray(wrench, dtype=float), needed(base)
             if t_wrench is not None:
@@ -174,19 +176,17 @@ class Compensator:
             if self.slipping is None or self.slipping.source != "plate":
                 moved = there.moved(t, w)
             else:
-                moved, spread = self.slipping.moved(there, t, q, w)
-                variance = partial(np.asarray, spread)
+                moved, spread = self.slipping.moved(there, t, q, w, push)
         elif base is not None and self.slipping is not None and self.slipping.source != "plate" and continuous(t):
-            moved, spread = self.slipping.moved(base, t, q, None)
-            variance = partial(np.asarray, spread)
+            moved, spread = self.slipping.moved(base, t, q, None, push)
         known = velocity is not None or continuous(t)
         if self.arm is not None:
             T = placed(T_lab_base_start, moved, len(t))
-            along = self.arm.along(t, q, velocity, T) if known else self.arm.at_rest(q, T_lab_base_start)
+            along = self.arm.along(t, q, velocity, T, push) if known else self.arm.at_rest(q, T_lab_base_start)
             found = self._on_links(along)
         else:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
-        return in_lab(found, base, moved, T_lab_base_start, variance)
+        return in_lab(found, base, moved, T_lab_base_start, None if spread is None else partial(np.asarray, spread))
 
     def base_from_markers(self, markers: np.ndarray) -> np.ndarray:
         """T_lab_base (4, 4) of the estimated base frame, for `predict`, from its markers at rest.

@@ -41,18 +41,23 @@ class SlippingBase:
     source: Source
 
     def moved(
-        self, at: LoadedBase, t: np.ndarray, q_motor: np.ndarray, wrench: np.ndarray | None
+        self,
+        at: LoadedBase,
+        t: np.ndarray,
+        q_motor: np.ndarray,
+        wrench: np.ndarray | None,
+        push: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """How the base moved in the lab (n, 4, 4) and variances (n, 6) of its displacement in frame 0.
 
-        Without a plate's wrench inverse dynamics move it.
+        Without a plate's wrench inverse dynamics move it; the hand may be pushed by (n, 6).
 
         Raises:
             NotEnoughData: Less than a second, or nothing says what point the wrench is about.
         """
         load = None if wrench is None else at.load(t, wrench, CUTOFF)
         forcing = planar_forcing(
-            wrenches_along(self.lab, t, q_motor, load, at.T_lab_0), self.model.tilting, self.source
+            wrenches_along(self.lab, t, q_motor, load, at.T_lab_0, push), self.model.tilting, self.source
         )
         x, variance = (interpolate_columns(t, forcing.t, found) for found in self.model.displacement(forcing))
         return at.in_lab(x), variance
@@ -64,7 +69,7 @@ class SlippingBase:
 
         `moving` are motor readings, velocities and accelerations [rad, m, s].
         """
-        state = at.sprung(t, wrench, before)
+        state = at.sprung(t, wrench, before, self.model.wheels.borne)
         driving = None if moving is None else self._driven(at.gravity, moving)
         slip = self._stream.stepped(
             Sample(t, state.wrench, state.x[3:5], driving), None if before is None else before.slip

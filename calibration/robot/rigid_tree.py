@@ -4,7 +4,8 @@
     tau_i = S_i' f_i,   M_ii = S_i' I^c_i S_i            I^c_i what joint i carries, f_0 the wrench on the root
 
 Twists and wrenches are about the root's origin. A_0 is the root's proper acceleration, gravity taken off. What pushes
-the last body from outside is taken off its f. The regressor is how tau changes with masses and first moments of the bodies, second moments left alone.
+the last body from outside is taken off its f. The regressor is how tau changes with masses and first moments of the
+bodies, second moments left alone.
 Reference: Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 5 and 6.
 """
 
@@ -84,8 +85,8 @@ def dynamics_along(
 ) -> TreeDynamics:
     """Dynamics at positions [rad, m], velocities and accelerations (n, k) in the columns of the tree.
 
-    `root` (n, 12) or (1, 12): twist of the root and its proper acceleration, linear first, in its axes; (n, 18): and the
-    wrench from outside on the last body, in that body's axes about its origin.
+    `root` (n, 12) or (1, 12): twist of the root and its proper acceleration, linear first, in its axes; (n, 18): and what
+    pushes the last body, in that body's axes about its origin.
     """
     found, (q, v, a) = room(len(q), q.shape[1], regressors), np.array([q, v, a], dtype=float)
     sample(tree, q, v, a, np.array(root, dtype=float, order="C"), scratch(tree), found)
@@ -94,7 +95,6 @@ def dynamics_along(
 
 # columns of `work`; as numpy's integers, not literals, for each of which numba would compile a function
 _R, _P, _S, _V, _A, _F, _X, _I, _ROW = np.array([0, 9, 12, 18, 24, 30, 36, 42, 78])
-_PUSH = 12  # first column of a root's push
 
 
 def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
@@ -149,8 +149,7 @@ def _dot(x: np.ndarray, i: int, y: np.ndarray, j: int) -> float:
 def _place(tree: RigidTree, j: int, angle: float, up: np.ndarray, me: np.ndarray) -> None:
     """Orientation, origin and unit twist of joint j at an angle, from the body `up` that carries it."""
     fixed, axis, w = tree.fixed[j], tree.axis[j], np.empty(3)
-    for i in range(_V):
-        me[i] = 0.0
+    me[:_V] = 0.0
     for i in range(3):
         for c in range(3):
             for r in range(3):
@@ -176,8 +175,7 @@ def _place(tree: RigidTree, j: int, angle: float, up: np.ndarray, me: np.ndarray
 @njit(cache=True, error_model="numpy")
 def _move(me: np.ndarray, up: np.ndarray, v: float, a: float) -> None:
     """Twist and acceleration of a body from those of the one that carries it."""
-    for i in range(6):
-        me[_X + i] = 0.0
+    me[_X:_I] = 0.0
     _cross(up, _V + 3, me, _S, me, _X)
     _cross(up, _V, me, _S + 3, me, _X)
     _cross(up, _V + 3, me, _S + 3, me, _X + 3)
@@ -192,8 +190,7 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
     m, inertia, h = tree.mass[b], tree.inertia[b], np.zeros(3)
     _turned(me, tree.moment[b], h, _R)
     p, I, square = me[_P:_S], me[_I:_ROW].reshape(6, 6), 0.0
-    for i in range(_I, _ROW):
-        me[i] = 0.0
+    me[_I:_ROW] = 0.0
     for i in range(3):
         square += p[i] * (2.0 * h[i] + m * p[i])
         I[i, i] = m
@@ -215,25 +212,13 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _pushed(me: np.ndarray, push: np.ndarray) -> None:
-    """Take a wrench (6,) in a body's axes about its origin off the wrench that moves the body."""
-    off = np.zeros(6)
-    _turned(me, -push[:3], off, _R)
-    _turned(me, -push[3:], off, _R + 3)
-    _cross(me, _P, off, _R, off, _R + 3)
-    for c in range(6):
-        me[_F + c] += off[c]
-
-
-@njit(cache=True, error_model="numpy")
 def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
     """Wrenches (4, 6) about the root's origin by unit mass and first moments of a body that moves: a(r) = a + B r."""
     B, axis, w, square = np.zeros((3, 3)), np.empty(3), me[_V + 3 : _A], 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         square += w[i] ** 2
-        for r in range(4):
-            out[r, i] = out[r, 3 + i] = 0.0
+        out[:, i] = out[:, 3 + i] = 0.0
         B[k, j], B[j, k] = me[_A + 3 + i], -me[_A + 3 + i]
     for i in range(3):
         B[i, i] -= square
@@ -276,16 +261,19 @@ def sample(
     k = len(tree.parent)
     work[0, 0] = work[0, 4] = work[0, 8] = 1.0
     for i in range(len(q)):
-        for c in range(12):
-            work[0, _V + c] = root[min(i, len(root) - 1), c]
+        work[0, _V:_F] = root[min(i, len(root) - 1), :12]
         for b in range(k + 1):
             if b > 0:
                 me, up, column = work[b], work[tree.parent[b - 1]], tree.column[b - 1]
                 _place(tree, b - 1, q[i, column], up, me)
                 _move(me, up, v[i, column], a[i, column])
             _weigh(tree, b, work[b])
-        if root.shape[1] > _PUSH:
-            _pushed(work[k], root[i, _PUSH:])
+        if root.shape[1] > 12:
+            push = np.zeros(6)
+            _turned(work[k], root[i, 12:15], push, _R)
+            _turned(work[k], root[i, 15:], push, _R + 3)
+            _cross(work[k], _P, push, _R, push, _R + 3)
+            work[k, _F:_X] -= push
         if out.regressor.shape[2]:
             _regress(tree, work, out.regressor[i])
         for j in range(k - 1, -1, -1):
@@ -293,10 +281,8 @@ def sample(
             out.torque[i, column] = _dot(me, _S, me, _F)
             _times(me, _S, me, _X)
             out.inertia[i, column] = _dot(me, _S, me, _X)
-            for c in range(3):
-                out.coupling[i, column, c] = me[_X + c]
-            for c in range(_F, _ROW):  # the twist between is scratch
-                up[c] += me[c]
+            out.coupling[i, column] = me[_X : _X + 3]
+            up[_F:] += me[_F:]  # the twist between is scratch
         _borne(work, out, i)
 
 
@@ -305,10 +291,9 @@ def _borne(work: np.ndarray, out: TreeDynamics, i: int) -> None:
     """What the root and the first joint bear."""
     first, bears = work[min(1, len(work) - 1)], np.zeros(3)
     _cross(first, _F, first, _P, bears, _R)
+    out.root[i] = work[0, _F:_X]
     for r in range(6):
-        out.root[i, r] = work[0, _F + r]
-        for c in range(6):
-            out.composite[i, r, c] = work[0, _I + 6 * r + c]
+        out.composite[i, r] = work[0, _I + 6 * r : _I + 6 * r + 6]
     for c in range(2):
         out.moment[i, c] = 0.0
         for r in range(3):

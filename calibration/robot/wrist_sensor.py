@@ -19,7 +19,7 @@ from scipy.ndimage import uniform_filter1d
 from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE, even, interpolate_columns, low_passed
 from calibration.recording.schema import Description
-from calibration.recording.trial import REST, Trial
+from calibration.recording.trial import REST
 from calibration.robot.chain import Chain
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, dynamics_along
@@ -104,7 +104,7 @@ class WristSensor:
 
 @lru_cache(maxsize=8)
 def wrist_sensor(urdf: str, description: Description) -> WristSensor | None:
-    """The sensor of a robot with its payload; None where no frame is declared for one, or the last joint moves it not."""
+    """The sensor of a robot with its payload; None where no frame of the last body is declared for one."""
     link, lab = description.wrist_link, Laboratory(urdf, description)
     if link is None:
         return None
@@ -129,13 +129,9 @@ def wrist_sensor(urdf: str, description: Description) -> WristSensor | None:
     return WristSensor(tree, lab.chain, link, base.homogeneous, frame.placement.homogeneous, at_rest)
 
 
-def push_of(urdf: str, description: Description, trial: Trial) -> np.ndarray | None:
-    """What pushes the hand in a trial, (n, 6) at those of its readings that are complete; None where nothing does."""
-    if not np.isfinite(trial.wrist_wrench).any():
-        return None
-    entry = next((t for t in description.trials if t.id == trial.id), None)
-    sensor = wrist_sensor(urdf, description if entry is None else description.carrying(entry.payload))
-    known = np.isfinite(trial.q_motor).all(axis=1)
-    if sensor is None:
-        return None
-    return sensor.push(trial.t_robot[known], trial.q_motor[known], trial.wrist_wrench[known])
+def hand_push(
+    urdf: str, description: Description, t: np.ndarray, q: np.ndarray, wrench: np.ndarray
+) -> np.ndarray | None:
+    """`WristSensor.push` of a robot with its payload; None without readings or a sensor, or where nothing pushes."""
+    sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
+    return None if sensor is None else sensor.push(t, q, wrench)

@@ -140,7 +140,9 @@ def expected_load(lab: Laboratory, link: str) -> Hanging:
     data, sensor = model.createData(), model.getFrameId(link)
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     tolerance, payload = description.tolerances, description.payload
-    parts = [(b.mass, b.lever, tolerance.link_mass * b.mass, tolerance.link_com) for b in hung_bodies(model, data, sensor)]
+    parts = [
+        (b.mass, b.lever, tolerance.link_mass * b.mass, tolerance.link_com) for b in hung_bodies(model, data, sensor)
+    ]
     if payload is not None and hangs(model, model.getFrameId(payload.link), sensor):
         at = data.oMf[model.getFrameId(payload.link)].act(np.array(payload.com))
         parts.append((payload.mass, at, payload.tolerance, 0.0))

@@ -21,6 +21,7 @@ from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
+from calibration.robot.wrist_sensor import hand_push
 from calibration.stages.drive_trains import link_motion
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Drives
@@ -101,7 +102,7 @@ class DriveTrains:
             return self
         model = floating_model(self.urdf, loaded)
         model.gravity = self.dynamics.model.gravity
-        return replace(self, dynamics=replace(self.dynamics, model=model))
+        return replace(self, dynamics=replace(self.dynamics, model=model), description=loaded)
 
     def with_offset(self, offset: np.ndarray) -> "DriveTrains":
         """The same with other zeros (k,) of the motor readings."""
@@ -111,6 +112,10 @@ class DriveTrains:
         """`torques.base_acceleration` by poses (m, 4, 4) of the base frame."""
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
         return base_acceleration(self.dynamics.gravity, t, T_lab_root, at)
+
+    def push(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> np.ndarray | None:
+        """What pushes the hand (n, 6), see `hand_push`; None where nothing does."""
+        return hand_push(self.urdf, self.description, t, q, wrist)
 
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""

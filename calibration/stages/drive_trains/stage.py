@@ -17,7 +17,6 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
-from calibration.robot.wrist_sensor import push_of
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.identification import identify, load_modes
@@ -82,8 +81,8 @@ def loads_of_trial(
     if T_lab_B is not None and description.marker_frame == "lab":
         T_lab_base = T_lab_B @ inverse(from_vector(hand.base))
         base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t))
-    push = push_of(trains.urdf, description, trial)
-    return trains.of_trial(trial.id).dynamics.loads(trial.id, t, trial.q_motor[rows], base, push)
+    own, q = trains.of_trial(trial.id), trial.q_motor[rows]
+    return own.dynamics.loads(trial.id, t, q, base, own.push(t, q, trial.wrist_wrench[rows]))
 
 
 def _dynamics(urdf: str, description: Description, hand: HandModel) -> Dynamics:

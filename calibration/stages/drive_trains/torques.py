@@ -84,7 +84,12 @@ class Dynamics:
         return tree_of(self.model, self.joints)
 
     def loads(
-        self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None = None, push: np.ndarray | None = None
+        self,
+        trial_id: str,
+        t: np.ndarray,
+        q: np.ndarray,
+        base: np.ndarray | None = None,
+        push: np.ndarray | None = None,
     ) -> LinkLoads:
         """Loads at motor readings q (n, k) taken at t (n,) [s], without NaN.
 

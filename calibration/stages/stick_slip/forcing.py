@@ -20,7 +20,7 @@ from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
-from calibration.robot.wrist_sensor import push_of
+from calibration.robot.wrist_sensor import hand_push
 from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STEPS
 from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
@@ -109,8 +109,9 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wr
     if sources.robot is None or not len(trial.t_robot):
         plate = None if plate is None else borne(sources.lab.description, sources.lab.urdf, plate)
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)))
-    push, known = push_of(sources.lab.urdf, sources.lab.description, trial), np.isfinite(trial.q_motor).all(axis=1)
+    lab, known = sources.lab, np.isfinite(trial.q_motor).all(axis=1)
     t, q = sources.robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
+    push = hand_push(lab.urdf, lab.description, t, q, trial.wrist_wrench[known])
     return replace(wrenches_along(sources.lab, t, q, plate, T_lab_0, push), trial_id=trial.id, start=start)
 
 

@@ -4,8 +4,8 @@
     N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i, y_i) = (-Fz, My, -Mx)        k_i 1; load share of a drive
 
 A wheel carries its own weight n_i, of the nominal robot; the base's weight is shared as by vertical springs under a
-rigid base, and a wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors are log-normal and wide: nothing here is of a
-particular robot.
+rigid base, and a wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors
+are log-normal and wide: nothing here is of a particular robot.
 """
 
 from dataclasses import dataclass

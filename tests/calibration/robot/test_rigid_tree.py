@@ -30,7 +30,7 @@ def test_dynamics_are_pinocchio_s(arm):
     rng = np.random.default_rng(1)
     joints = tuple(rng.permutation([f"joint_{i}" for i in range(K)]))
     q, v, a = rng.normal(size=(3, N, K))
-    root, data = rng.normal(size=(N, 12)), arm.createData()
+    root, data = rng.normal(size=(N, 18)), arm.createData()
     found, columns = (
         dynamics_along(tree_of(arm, joints), q, v, a, root, regressors=True),
         [arm.joints[arm.getJointId(name)].idx_v for name in joints],
@@ -39,9 +39,10 @@ def test_dynamics_are_pinocchio_s(arm):
     for i in range(N):
         step, rate, push = np.zeros((3, arm.nv))
         step[columns], rate[columns], push[columns] = q[i], v[i], a[i]
-        rate[:6], push[:6] = root[i, :6], root[i, 6:]
+        rate[:6], push[:6] = root[i, :6], root[i, 6:12]
+        outside = [pin.Force.Zero()] * (arm.njoints - 1) + [pin.Force(root[i, 12:])]
         at = pin.integrate(arm, pin.neutral(arm), step)
-        torque = pin.rnea(arm, data, at, rate, push)
+        torque = pin.rnea(arm, data, at, rate, push, outside)
         expected = [torque[columns], torque[:6], data.f[2].angular[:2].copy()]
         H = np.triu(pin.crba(arm, data, at))
         H += np.triu(H, 1).T

@@ -44,3 +44,16 @@ def test_a_wheel_weighs_what_the_nominal_robot_says():
     drives = found.weight[[kind == "drive" for kind in found.types]]
     np.testing.assert_allclose(drives, 4.4 * 9.81)
     assert np.all(found.weight[[kind != "drive" for kind in found.types]] < 2.0)
+
+
+def test_wheels_that_would_pull_lift_off_and_the_others_bear_the_load():
+    n, G = WHEELS.loads(1.0)
+    light, tipped = np.array([730.0, 20.0, 3.0]), np.array([730.0, 75.0, 20.0])
+    wrenches = np.zeros((2, 6))
+    wrenches[:, (2, 4, 3)] = np.array([light, tipped]) * [-1.0, 1.0, -1.0]
+    found = WHEELS.borne(wrenches)
+    np.testing.assert_array_equal(found[0], wrenches[0])
+    assert (n + G @ tipped).min() < -20.0
+    N = np.maximum(n + G @ (found[1, [2, 4, 3]] * [-1.0, 1.0, -1.0]), 0.0)
+    np.testing.assert_allclose([N.sum(), N @ POSITION[:, 0], N @ POSITION[:, 1]], tipped, rtol=1e-9)
+    assert (N == 0.0).any()

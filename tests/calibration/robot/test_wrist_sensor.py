@@ -1,0 +1,52 @@
+"""What the wrist's sensor shows of a push at the hand, and what it does to the joints."""
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration.robot.laboratory import Laboratory
+from calibration.robot.wrist_sensor import hand_push
+from calibration.stages.drive_trains.torques import dynamics
+from calibration.stages.wrist_load import expected_load
+from tests.doubles import rigid_robot
+
+LINK = "wrist_ft_link"
+T = np.arange(0.0, 4.0, 0.01)
+HUNG = rigid_robot.described(wrist_link=LINK)
+LAB = Laboratory(mjcf.urdf(), HUNG)
+Q = np.array([0.1, 0.4, -0.3, 0.2, 1.1, 0.3, -0.4, 0.2])
+
+
+def readings(force):
+    """The arm at Q, the sensor pushed by a force (3,) [N, its axes] from 2 to 3 s at 0.1 m from its origin."""
+    q = np.tile(Q, (len(T), 1))
+    load = expected_load(LAB, LINK)
+    weight = load.mass * LAB.chain.poses(q, LINK)[:, :3, :3].swapaxes(1, 2) @ np.array(HUNG.gravity)
+    w = np.concatenate([weight, np.cross(load.centre, weight)], axis=1) + [3.0, -1.0, 2.0, 0.1, 0.2, 0.0]
+    outside = np.where(
+        ((T >= 2.0) & (T < 3.0))[:, None], np.concatenate([force, np.cross([0.0, 0.0, 0.1], force)]), 0.0
+    )
+    return q, w + outside, outside
+
+
+def test_a_push_is_the_reading_less_the_weight_and_loads_the_joints_by_its_power():
+    q, w, outside = readings(np.array([5.0, -18.0, 7.0]))
+    push = hand_push(LAB.urdf, HUNG, T, q, w)
+    robot = dynamics(LAB.urdf, HUNG, np.zeros(8))
+    bare, loaded = (robot.loads("", T, q, push=p).torque for p in (None, push))
+    h, sensor = 1e-6, LAB.chain.poses(q[:1], LINK)[0]
+    for j in range(8):
+        step = np.zeros(8)
+        step[j] = h
+        there = np.linalg.inv(sensor) @ LAB.chain.poses(q[:1] + step, LINK)[0]
+        turn = np.array([there[2, 1], there[0, 2], there[1, 0]])
+        power = outside[250] @ np.concatenate([there[:3, 3], turn]) / h
+        assert loaded[250, j] - bare[250, j] == pytest.approx(-power, abs=2e-3)
+    np.testing.assert_allclose(push[:150], 0.0, atol=1e-6)
+
+
+def test_a_small_force_is_no_push_and_without_a_sensor_there_is_none():
+    q, w, _ = readings(np.array([0.0, 0.0, 1.0]))
+    assert hand_push(LAB.urdf, HUNG, T, q, w) is None
+    assert hand_push(LAB.urdf, HUNG.model_copy(update={"wrist_link": None}), T, q, 10.0 * w) is None
+    assert hand_push(LAB.urdf, HUNG, T, q, np.full_like(w, np.nan)) is None
