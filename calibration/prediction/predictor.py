@@ -11,8 +11,8 @@ q, readings the geometry is evaluated at:      motor      q_motor by the robot's
 Row `full` has link angles behind its drive trains, the column bent, and the base that sticks and slips in place of the
 suspension, where those were identified.
 
-The base's motion from the same source loads the drive trains. Of a trial nothing else is read: encoders, plate, base
-markers of its first second (throughout where the base is `measured`), never hand or shoulder.
+The base's motion from the same source loads the drive trains. Of a trial nothing else is read: encoders, plate, wrist
+sensor, base markers of its first second (throughout where the base is `measured`), never hand or shoulder.
 """
 
 from collections.abc import Callable, Iterator

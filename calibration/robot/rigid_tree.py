@@ -85,8 +85,8 @@ def dynamics_along(
 ) -> TreeDynamics:
     """Dynamics at positions [rad, m], velocities and accelerations (n, k) in the columns of the tree.
 
-    `root` (n, 12) or (1, 12): twist of the root and its proper acceleration, linear first, in its axes; (n, 18): and what
-    pushes the last body, in that body's axes about its origin.
+    `root` (n, 12) or (1, 12): twist of the root and its proper acceleration, linear first, in its axes; (n, 18): and
+    what pushes the last body, in that body's axes about its origin.
     """
     found, (q, v, a) = room(len(q), q.shape[1], regressors), np.array([q, v, a], dtype=float)
     sample(tree, q, v, a, np.array(root, dtype=float, order="C"), scratch(tree), found)

@@ -27,10 +27,24 @@ def test_a_declared_payload_is_known_to_both(trials):
         assert dynamics < 1.25 * plate
 
 
-PUSHED = pytest.mark.xfail(reason="a push is in no joint's load: docs/limits.md", strict=True)
+LOADED = pytest.mark.xfail(reason="a drive wheel near its friction, which no calibration trial showed: docs/limits.md")
 
 
-@pytest.mark.parametrize("trial", ["xyz_0kg", "xyz_2kg", pytest.param("push", marks=PUSHED)])
-def test_drive_trains_know_what_loads_them(trials, trial):
-    errors = {name: trials[name, "full", "measured", "motor"] for name in ("xyz", trial)}
+@pytest.mark.parametrize(
+    ("trial", "base"),
+    [
+        ("xyz_0kg", "measured"),
+        ("xyz_2kg", "measured"),
+        ("push", "measured"),
+        ("xyz_0kg", "plate"),
+        pytest.param("xyz_2kg", "plate", marks=LOADED),
+        pytest.param("push", "plate", marks=LOADED),
+    ],
+)
+def test_row_full_knows_what_loads_it(trials, trial, base):
+    errors = {name: trials[name, "full", base, "motor"] for name in ("xyz", trial)}
     assert errors[trial] < 1.3 * errors["xyz"]
+
+
+def test_a_push_is_in_the_joints_loads(trials):
+    assert trials["push", "full", "measured", "motor"] < 0.3 * trials["push", "model_2", "measured", "motor"]
