@@ -117,8 +117,8 @@ class _Evidence:
         """ln p."""
         root = np.sqrt(variance[self.group])
         inner = np.eye(len(root)) + root[:, None] * self.G * root
-        c = root * self.b
-        return float(-0.5 * np.linalg.slogdet(inner)[1] + 0.5 * c @ np.linalg.solve(inner, c))
+        L, c = np.linalg.cholesky(inner), root * self.b
+        return float(0.5 * np.square(np.linalg.solve(L, c)).sum() - np.log(L.diagonal()).sum())
 
     def maximised(self, free: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
         """(g,) variances of highest evidence, from `start` where given, those that are not `free` zero."""

@@ -140,4 +140,7 @@ def _covariances(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndar
         if spread[1] > _FLAT * max(spread[0], np.finfo(float).tiny):
             A = np.concatenate([np.broadcast_to(np.eye(3), (len(x), 3, 3)), -skew(x)], axis=2)
             covariance[k] = np.linalg.inv(np.einsum("mij,mik->jk", A, A))
-    return covariance[which], np.isfinite(covariance[:, 0, 0])[which]
+    usable = np.isfinite(covariance[:, 0, 0])
+    if len(patterns) == 1:
+        return np.broadcast_to(covariance[0], (len(seen), 6, 6)), np.broadcast_to(usable[0], len(seen))
+    return covariance[which], usable[which]

@@ -4,7 +4,7 @@ T_base_hand = T_lab_base^-1 T_lab_hand
 C           = C_hand + Ad(T_hand_base) C_base Ad(T_hand_base)'        local twist, 1 m of noise per axis and marker
 """
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +31,12 @@ class MeasuredTrial(Trial):
         if isinstance(trial, cls):
             return trial
         return cls(**{f.name: getattr(trial, f.name) for f in fields(Trial)}, description=description)
+
+    def with_readings(self, q_motor: np.ndarray) -> "MeasuredTrial":
+        """The trial with other motor readings (n, k) [rad, m]; the poses stay."""
+        other = replace(self, q_motor=q_motor)
+        object.__setattr__(other, "_poses", self._poses)
+        return other
 
     def poses(self, body: Body) -> BodyPoses:
         """Poses of a marker body at `t_mocap`.

@@ -23,6 +23,7 @@ import numpy as np
 from calibration.numerics.robust_covariance import long_run_covariance, widening
 
 _BLOCK = 2.5  # [s] a move, or half a swing
+_ROWS = 2000  # of a QR at a time, at least
 _LEAST = 1e-3  # [-] share of a block's noise that is left in its residuals, at least
 
 
@@ -58,13 +59,20 @@ def without_nuisances(A: np.ndarray, B: np.ndarray, r: np.ndarray, S: np.ndarray
     size, b = np.linalg.norm(A, axis=0), B.shape[1]
     A = A[:, size > 0.0] / size[size > 0.0]
     D = np.block([[A, B], [np.zeros((b, A.shape[1])), np.eye(b)]])
-    U, R = np.linalg.qr(D)
+    U, R = _qr(D)
     turn, values, _ = np.linalg.svd(R)
     if not (kept := values > 1e-8 * values[0]).all():
         U = U @ turn[:, kept]
     y = np.concatenate([np.column_stack([r, S]), np.zeros((b, 1 + S.shape[1]))])
     y = y - U @ (U.T @ y)
     return Reduced(y[:, 0], y[:, 1:], U, t)
+
+
+def _qr(D: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """QR of a tall D, of parts that fit the processor's cache first, then of their R."""
+    Q, R = zip(*(np.linalg.qr(part) for part in np.array_split(D, max(1, len(D) // _ROWS))), strict=True)
+    turn, R_all = np.linalg.qr(np.vstack(R))
+    return np.concatenate([q @ t for q, t in zip(Q, np.split(turn, len(Q)), strict=True)]), R_all
 
 
 def lag_and_drift(x: Reduced) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,6 @@ from calibration.stages.drive_trains.link_motion import (
     HALF_GAP,
     LIGHT,
     Drive,
-    deflection,
     played,
     simulated,
 )
@@ -108,15 +107,11 @@ class DriveTrain:
                 others.append(self.deltas(drive, torque + off, start) - shift)
         return Deflection(likely, np.min(others, axis=0), np.max(others, axis=0))
 
-    def at_rest(self, torque: float) -> tuple[float, float]:
-        """Least and largest delta [rad] at which friction holds the link under a torque [N.m]."""
-        g, c, f = self.values[HALF_GAP], self.values[COMPLIANCE], self.values[COULOMB]
-        return deflection(torque - f, g, c), deflection(torque + f, g, c)
-
     def ends(self, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`at_rest` at torques (m,) [N.m], (m,) each."""
-        low, high = np.array([self.at_rest(float(x)) for x in torque]).reshape(-1, 2).T
-        return low, high
+        """Least and largest delta (m,) [rad] at which friction holds the link under torques (m,) [N.m]."""
+        g, c, f = self.values[HALF_GAP], self.values[COMPLIANCE], self.values[COULOMB]
+        low, high = torque - f, torque + f
+        return c * low + g * np.sign(low), c * high + g * np.sign(high)
 
     def flanks(self, drive: "DriveMotion") -> tuple[np.ndarray, np.ndarray]:
         """delta (n,) [rad] on the lower and on the upper side of the gap, in contact."""

@@ -178,10 +178,8 @@ class Stream:
         root = self.at_rest if base is None else robot.root(base[None])
         link_motion.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
         for i, (train, torque) in enumerate(zip(self.trains.trains, state.samples[TORQUE], strict=True)):
-            low, high = train.at_rest(float(torque))
-            starts = [low + train.start[0] * (high - low)]
-            for off in drives.offs[i, 1::2]:
-                starts += train.at_rest(float(torque + off))
+            low, high = train.ends(torque + drives.offs[i, ::2])
+            starts = [low[0] + train.start[0] * (high[0] - low[0]), *np.column_stack([low, high])[1:].ravel()]
             states[i, :, 0] = states[i, :, 2] = starts
         link_motion.link_angles(states, state.moving[0], drives, angles)
         return state, LinkAngles(*angles)

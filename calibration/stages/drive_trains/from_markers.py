@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
-from calibration.numerics.lie import adjoint, inverse, log6
+from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.lie import inverse, log6
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -155,11 +155,8 @@ def seen_joint(
     joint: str,
 ) -> SeenJoint:
     """Motor reading less joint angle of a joint as the hand's markers show it, other joints as `trains` has them."""
-    bodies = trains.description.base_body, trains.description.hand_body
-    base, other = (poses_of(body, trial) for body in bodies)
-    T = inverse(base.T) @ other.T
-    Ad = adjoint(inverse(T))
-    C = (other.covariance + Ad @ base.covariance @ np.swapaxes(Ad, 1, 2)) * trains.description.sigmas.marker**2
+    seen = MeasuredTrial.of(trains.description, trial)
+    T, C = seen.T_base_hand, seen.covariance(np.arange(len(trial.t_mocap)))
     q = trains.of_loads(loads).q  # the geometry is of link angles
     s = robot.from_mocap(trial.t_mocap)
     at, moment = (interpolate_columns(s, loads.t, x) for x in (q, loads.moment))

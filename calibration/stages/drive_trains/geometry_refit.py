@@ -17,6 +17,7 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import Postures, dwell_windows, passing_postures, readings_at, static_postures
 from calibration.numerics.lie import inverse
 from calibration.numerics.signals import interpolate_columns
@@ -160,7 +161,7 @@ def corrected_trial(
     angles = trains.of_loads(loads)
     q = np.full(trial.q_motor.shape, np.nan)
     q[np.isfinite(trial.q_motor).all(axis=1)] = angles.q
-    return CorrectedTrial(replace(trial, q_motor=q), loads, angles)
+    return CorrectedTrial(MeasuredTrial.of(trains.description, trial).with_readings(q), loads, angles)
 
 
 def by_link_encoders(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:

@@ -7,6 +7,7 @@ Encoders differ by their zero and by both eccentricities together: the differenc
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -53,7 +54,7 @@ class JointData:
     window: float = WINDOW
     correlated: float = CORRELATED
 
-    @property
+    @cached_property
     def group(self) -> np.ndarray:
         """(k,) windows whose residuals are of one size: those of one regime in one trial."""
         return REGIMES * self.trial + self.regime
@@ -86,8 +87,13 @@ class JointData:
     def started(self, zero: np.ndarray) -> np.ndarray:
         """delta (m,) where each trial starts, as y less `terms @ zero` shows it; NaN where it does not."""
         rest = self.y - self.terms @ zero
+        return np.asarray(rest[self._opening].mean(axis=1))
+
+    @cached_property
+    def _opening(self) -> np.ndarray:
+        """Windows (m, ...) in which each trial starts."""
         begins = np.searchsorted(self.trial, np.arange(len(self.trial_ids)))
-        return np.array([rest[b : b + max(1, round(_START / self.window))].mean() for b in begins])
+        return np.minimum(begins[:, None] + np.arange(max(1, round(_START / self.window))), len(self.trial) - 1)
 
     def without(self, trial: int) -> "JointData":
         """The data with the readings of one trial left out."""
@@ -103,7 +109,7 @@ class JointData:
         """The data in which only the windows of a mask (k,) count."""
         return replace(self, weight=np.where(rows, self.weight, 0.0))
 
-    @property
+    @cached_property
     def known(self) -> np.ndarray:
         """(k,) windows that count."""
         return np.isfinite(self.y) & (self.weight > 0.0)

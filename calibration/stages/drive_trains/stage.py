@@ -11,7 +11,7 @@ import numpy as np
 
 from calibration.checks.joint_readings import wrong_links
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import from_vector, inverse
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -77,7 +77,7 @@ def loads_of_trial(
     t = trial.t_robot[rows]
     if T_lab_B is None:
         with suppress(NotEnoughData):
-            T_lab_B = poses_of(description.base_body, trial).T
+            T_lab_B = MeasuredTrial.of(description, trial).base.T
     if T_lab_B is not None and description.marker_frame == "lab":
         T_lab_base = T_lab_B @ inverse(from_vector(hand.base))
         base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t))

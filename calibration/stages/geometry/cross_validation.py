@@ -10,7 +10,9 @@ An interval over postures says nothing of
 another session.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -190,4 +192,8 @@ def _rms(error: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(error**2)))
 
 
-_FITS = {BASELINE: register, "model_2": calibrate_geometry, "full": calibrate_gears}
+_FITS: Mapping[str, Callable[[Chain, Description, Postures], tuple[Model, tuple[Verdict, ...]]]] = {
+    BASELINE: partial(register, judged=False),
+    "model_2": partial(calibrate_geometry, judged=False),
+    "full": calibrate_gears,
+}

@@ -45,8 +45,10 @@ _STEPS = 20
 _STILL = 1e-10  # [m, rad]
 
 
-def register(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
-    """The two frames, and the verdicts on them."""
+def register(
+    chain: Chain, description: Description, postures: Postures, judged: bool = True
+) -> tuple[Model, tuple[Verdict, ...]]:
+    """The two frames, and the verdicts on them; none, and no errors the residuals show, where it is not `judged`."""
     parameters, tol = registration_parameters(chain, description), description.tolerances
     n_seen = 6 + postures.components  # a point does not show how the hand is turned: that stays as widths
     widths = np.where(np.arange(12) < n_seen, parameters.tolerance, tol.body_rotation)
@@ -54,6 +56,8 @@ def register(chain: Chain, description: Description, postures: Postures) -> tupl
     W = frame_weights(description)[: postures.components, : postures.components]
     found, kept = _without_outliers(nominal_hand(chain, parameters.nominal), parameters, postures, W)
     model = model_of(STAGE, chain, parameters, found)
+    if not judged:
+        return model, ()
     if not found.converged:
         return model, (Verdict(STAGE, "warning", "the fit of the two marker frames did not converge"),)
     if model.rank < n_seen:

@@ -44,8 +44,13 @@ from calibration.verdict import Verdict
 STAGE = "geometry"
 
 
-def calibrate_geometry(chain: Chain, description: Description, postures: Postures) -> tuple[Model, tuple[Verdict, ...]]:
-    """The geometric model; a verdict `refused` says that it must not be used."""
+def calibrate_geometry(
+    chain: Chain, description: Description, postures: Postures, judged: bool = True
+) -> tuple[Model, tuple[Verdict, ...]]:
+    """The geometric model; a verdict `refused` says that it must not be used.
+
+    Where it is not `judged`, what its residuals show is left out of intervals and verdicts.
+    """
     parameters, hand = geometry_parameters(chain, description), hand_model(chain, nominal_frames(chain, description))
     start, floor = reading_sigma(chain, description), reading_floor(chain, description)
     errors = NoiseModel(np.maximum(start, floor), floor, np.zeros(0), stated=True)
@@ -73,6 +78,8 @@ def calibrate_geometry(chain: Chain, description: Description, postures: Posture
     if not oriented:
         message = "a point of the hand was seen: hand orientation is not observable and fixed at nominal"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; put three markers on it"))
+    if not judged:
+        return model_of("model_2", chain, parameters, found), tuple(verdicts)
     used = postures.rows(robust.kept)
     departed = with_departures(hand, parameters, replace(found, covariance=small_sample_covariance(found)), used)
     verdicts += [Verdict(STAGE, "ok", message) for message in departed.shown]

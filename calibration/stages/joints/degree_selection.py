@@ -99,32 +99,28 @@ def _left_out(
 ) -> list[np.ndarray]:
     """Discrepancy (n,) of trial k by the models of the others, one for each set of powers."""
     others = [t for t in range(len(samples)) if t != k]
+    order = list(dict.fromkeys(c for powers in sets for c in _columns(basis, powers)))  # those of lower degrees first
+    ends = [2 * len(powers) for powers in sets]
     best = [(np.inf, 0.0, np.zeros((0, 0)))] * len(sets)
     for rho, of_others in zip(rho_grid(), zip(*(factors[t] for t in others), strict=True), strict=True):
-        R = np.asarray(np.linalg.qr(np.vstack(of_others), mode="r"))
-        for which, powers in enumerate(sets):
-            own = R[:, [*_columns(basis, powers), -1]]
-            best[which] = min(best[which], (_square(own), float(rho), own), key=lambda b: b[0])
+        R = np.asarray(np.linalg.qr(np.vstack(of_others)[:, [*order, -1]], mode="r"))
+        best = [min(b, (_square(R, p), float(rho), R), key=lambda b: b[0]) for b, p in zip(best, ends, strict=True)]
     domain, s = box(pooled([samples[t] for t in others])), samples[k]
     whole = Problem(basis(np.clip(s.theta, *domain[0]), np.clip(s.tau, *domain[1])), s.velocity, s.y)
-    return [
-        whole.design(rho)[:, _columns(basis, powers)] @ _solution(own)
-        for powers, (_, rho, own) in zip(sets, best, strict=True)
-    ]
+    return [whole.design(rho)[:, order[:p]] @ _solution(R, p) for p, (_, rho, R) in zip(ends, best, strict=True)]
 
 
-def _square(own: np.ndarray) -> float:
-    """Least |M x - y|^2 of [M, y]."""
-    R = np.asarray(np.linalg.qr(own, mode="r"))
-    size = np.abs(R.diagonal()[:-1])
-    if len(own) >= own.shape[1] and size.min(initial=np.inf) > _CLEAR * size.max(initial=0.0):
-        return float(np.square(R[-1, -1]))
-    return float(((own[:, -1] - own[:, :-1] @ _solution(own)) ** 2).sum())
+def _square(R: np.ndarray, p: int) -> float:
+    """Least |M x - y|^2 of p columns M, by triangular [M, ..., y]."""
+    size = np.abs(R.diagonal()[:p])
+    if len(R) > p and size.min(initial=np.inf) > _CLEAR * size.max(initial=0.0):
+        return float((R[p:, -1] ** 2).sum())
+    return float(((R[:, -1] - R[:, :p] @ _solution(R, p)) ** 2).sum())
 
 
-def _solution(own: np.ndarray) -> np.ndarray:
-    """The least x of M x = y in least squares, of [M, y]."""
-    return np.asarray(np.linalg.lstsq(own[:, :-1], own[:, -1], rcond=RANK)[0])
+def _solution(R: np.ndarray, p: int) -> np.ndarray:
+    """The least x of M x = y in least squares, of p columns M in [M, ..., y]."""
+    return np.asarray(np.linalg.lstsq(R[:, :p], R[:, -1], rcond=RANK)[0])
 
 
 def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:

@@ -9,10 +9,10 @@ it watches (eccentricity): what its joint's model takes off then adds to the han
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import Postures, passing_postures
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -86,7 +86,7 @@ def _predicted(
             for s, d in zip(samples[joint], candidate.left_out, strict=True):
                 if s.trial_id == trial.id:
                     q[:, trial.joint.index(joint)] -= np.interp(trial.t_robot, s.t, d)
-        less.append(replace(trial, q_motor=q))
+        less.append(MeasuredTrial.of(description, trial).with_readings(q))
     return raw.q - passing_postures(description, less, robot, _SPACING).q
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import poses_of
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import GAP, RATE
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
@@ -46,7 +46,7 @@ def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: P
         NotEnoughData: They are missing in most of the first second.
     """
     body = description.base_body
-    d = rest.displacement(poses_of(body, trial).T)
+    d = rest.displacement(MeasuredTrial.of(description, trial).base.T)
     good = np.isfinite(d).all(axis=1)
     t, n = trial.t_mocap[good], len(forcing.t)
     x = np.stack([np.interp(forcing.t, t, column) for column in d[good].T], axis=1)
