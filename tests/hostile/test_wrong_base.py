@@ -83,7 +83,7 @@ def campaign(tmp_path_factory):
         (reversed_fy, PLATE, "Fy mirror"),
         (off_the_plate, PLATE, "as if caster_front_right stood off the plate"),
         (pushed, PLATE, "base moved during around_x by 22"),
-        (misplaced, BASE, "as if caster_front_right stood"),
+        (misplaced, BASE, "caster_front_right stood"),
     ],
 )
 def test_what_is_wrong_with_the_base_is_named(campaign, mistake, stages, says, tmp_path):

@@ -67,8 +67,10 @@ def slipping_base_poses(model: StickSlip, sources: WrenchSources, trial: Trial, 
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
-    """Share (n, m) of its friction that each wheel needs, by the most likely parameters."""
+    """Share (n, m) of its friction that each wheel needs, by the most likely parameters; 0 where no axis slips."""
     found = model.direction(forcing.source)
+    if not found.slips.any():
+        return np.zeros((len(forcing.t), len(model.wheels.names)))
     rows, base = model.wheels.rows(found.parameters), bases_of(model.wheels, found.logarithms[None], found.corrected)
     e = np.zeros((len(forcing.t), *model.wheels.position.shape))
     for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):

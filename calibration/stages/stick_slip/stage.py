@@ -28,7 +28,7 @@ from calibration.stages.stick_slip.forcing import (
 from calibration.stages.stick_slip.likelihood import Trials, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import Direction, StickSlip
-from calibration.stages.stick_slip.search import displaced
+from calibration.stages.stick_slip.search import descended, displaced, tried
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
@@ -42,7 +42,8 @@ _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _BETTER = 0.8  # mean square over that of the slipping base, below which the compliance takes an axis
 _HALF = 0.5  # mean square over that with the plate's correction, below which the correction harms
 _WORTH, _LESS = 0.8, 0.1  # R2 of yaw; by which that of the plate may be less
-_ELSEWHERE = 0.009  # [m] a wheel may seem off its place
+_ELSEWHERE, _SHOWN = 0.009, 3.0  # [m] a wheel may seem off its place; chi-square of two degrees of freedom
+_ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
 _log = logging.getLogger(__name__)
 
@@ -75,13 +76,13 @@ def fit_stick_slip(
     for source, _, campaign in usable:
         fits.append(fit_direction(source, campaign, fits[0].logarithms if fits else None))
     calm = joined(wheels, [row for row, wild in zip(usable[0][1], fits[0].held_out.wild, strict=True) if not wild])
-    shift, gain = displaced(calm, fits[0].logarithms)
+    shift, chi2 = displaced(calm, descended(calm, tried(calm, [fits[0].logarithms])[0]).logarithms)
     if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
     directions = [_linear(fit, suspension) for fit in fits]
     directions = [replace(d, plain=_plain(d, wheels, rows)) for d, (_, rows, _) in zip(directions, usable, strict=True)]
     model = StickSlip(wheels, tilting, tuple(directions))
-    misplaced = _misplaced(wheels.names, shift, gain) if directions[0].is_of_wheels else ()
+    misplaced = _misplaced(wheels.names, shift, chi2) if directions[0].is_of_wheels else ()
     names = [one.trial.id for one in read]
     findings = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
     return model, findings
@@ -143,15 +144,17 @@ def _plain(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarFo
     return plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
 
 
-def _misplaced(names: Sequence[str], shift: np.ndarray, gain: np.ndarray) -> Iterator[Verdict]:
-    """The wheel that the trials put elsewhere, by shifts (m, 2) [m] and what they gain (m,)."""
-    far = np.abs(shift).max(axis=1) > _ELSEWHERE
+def _misplaced(names: Sequence[str], shift: np.ndarray, chi2: np.ndarray) -> Iterator[Verdict]:
+    """The wheel that the trials put elsewhere, by shifts (m, 2) [m] and their chi-squares (m,); others like it."""
+    far = np.where((np.abs(shift).max(axis=1) > _ELSEWHERE) & (chi2 > _SHOWN), chi2, 0.0)
     if far.any():
-        k = int(np.where(far, gain, -np.inf).argmax())
-        x, y = 1e3 * shift[k]
+        likely = [k for k in np.argsort(-far) if far[k] > _ALIKE * far.max()]
+        places = (
+            f"{names[k]} stood {1e3 * shift[k][0]:+.0f} mm along x, {1e3 * shift[k][1]:+.0f} mm along y" for k in likely
+        )
         message = (
-            f"the base turns and slips as if {names[k]} stood {x:+.0f} mm along x, {y:+.0f} mm along y of its declared "
-            "place: check the wheels' places in dataset.json, and the plate's place and axes"
+            f"the base turns and slips as if {', or '.join(places)} of its declared place: check the wheels' places in "
+            "dataset.json, and the plate's place and axes"
         )
         yield Verdict(STAGE, "warning", message)
 

@@ -147,3 +147,6 @@ def test_a_wheel_that_seems_elsewhere_is_named_with_its_shift():
     (found,) = _misplaced(("left", "right", "front"), shift, gain)
     assert found.verdict == "warning" and "as if right stood +0 mm along x, -20 mm along y" in found.message
     assert not list(_misplaced(("left", "right", "front"), 0.4 * shift, gain))
+    assert not list(_misplaced(("left", "right", "front"), shift, 0.05 * gain))
+    (found,) = _misplaced(("left", "right", "front"), shift, np.array([30.0, 40.0, 3.0]))
+    assert "y, or left stood +12 mm along x" in found.message and "front" not in found.message
