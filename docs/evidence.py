@@ -135,6 +135,27 @@ def prose() -> Iterator[tuple[Path, str, str]]:
     yield limits, r"floor of the instruments [\d.]+ mm", f"floor of the instruments {run['floor']} mm"
     yield limits, r"\d+ of \d+ contain the truth in the default run", f"{inside} contain the truth in the default run"
     yield limits, r"\d+ to \d+ % on twenty", f"{range_} on twenty"
+    *others, worst = sorted(claims["ladder/sampled/full/plate/motor/dynamic"]["figures"])
+    band = 100.0 * min(claims["band/sampled/full/plate/dynamic"]["figures"])
+    far = f"of ten: {worst:.2f} mm, {band:.0f} % of it inside; the other nine up to {others[-1]:.2f} mm"
+    yield limits, r"of ten: [\d.]+ mm, \d+ % of it inside; the other nine up to [\d.]+ mm", far
+    nees = [x for of in ("fixed", "sampled") for x in claims[f"nees/{of}/full"]["figures"]]
+    wide = f"more than twice on {sum(x > 2.0 for x in nees)} of {len(nees)}, up to {max(nees):.1f} times"
+    yield limits, r"more than twice on \d+ of \d+, up to [\d.]+ times", wide
+    points = [of["figures"][0] for name, of in claims.items() if re.fullmatch(r"geometry/real/inside/.* points?", name)]
+    inside = f"{100 * min(points):.0f} to {100 * max(points):.0f} % inside"
+    yield limits, r"\d+ to \d+ % inside", inside
+    peer = json.loads((DOCS / "results" / "peer.json").read_text(encoding="utf-8"))["runs"]
+    times = [ratio for run in peer for ratio in beside(run["lines"])]
+    phrase = f"has {min(times):.1f} to {max(times):.1f} times the error of\n`full`"
+    yield DOCS / "benchmark.md", r"has [\d.]+ to [\d.]+ times the error of\n`full`", phrase
+
+
+def beside(lines: list[dict[str, Any]]) -> Iterator[float]:
+    """The smallest error of FIGAROH's methods over that of row `full`, of postures and motions."""
+    for trials in ("static_mm", "dynamic_mm"):
+        theirs = min(line[trials] for line in lines if line["method"].startswith("figaroh"))
+        yield theirs / next(line[trials] for line in lines if line["method"] == "full")
 
 
 def main(runs: list[Path]) -> int:

@@ -31,8 +31,13 @@ def page(content: dict) -> str:
     return HEAD.format(robots=robots) + table(figures, robots)
 
 
-if __name__ == "__main__":
-    found = json.loads((Path(sys.argv[1]) / "scores.json").read_text(encoding="utf-8"))
+def write(scores: Path) -> None:
+    """Keep a folder's scores; write the page."""
+    found = json.loads((scores / "scores.json").read_text(encoding="utf-8"))
     lines = ",\n".join(json.dumps(figure) for figure in found.pop("figures"))
     KEPT.write_text(json.dumps(found)[:-1] + f', "figures": [\n{lines}]}}\n', encoding="utf-8")
     PAGE.write_text(page(json.loads(KEPT.read_text(encoding="utf-8"))), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))

@@ -13,7 +13,8 @@ ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", *(f"docs/{p}.md" for p in "tutorials python geometry frames commands scale reality".split()))
 ELSEWHERE = {
     "docs/recording.md": "tests/acceptance/test_recording_page.py",
-    "docs/benchmark.md": "tests/scenarios/benchmarks",
+    "docs/benchmark.md": "tests/scenarios/benchmarks/test_benchmark_page.py",
+    "examples/validate_my_calibration/README.md": "tests/scenarios/testing/test_pytest_plugin.py",
     "CONTRIBUTING.md": "tests/project/test_recipes_twin.py",
 }
 FEWER = {  # the same commands on less data
@@ -68,7 +69,11 @@ def blocks(page):
 
 
 def test_every_page_with_code_is_run_by_a_test():
-    found = (p.relative_to(ROOT).as_posix() for pattern in ("*.md", "docs/*.md") for p in ROOT.glob(pattern))
+    found = (
+        p.relative_to(ROOT).as_posix()
+        for pattern in ("*.md", "docs/**/*.md", "examples/**/*.md", "mjcf/*.md")
+        for p in ROOT.glob(pattern)
+    )
     assert {page for page in found if list(blocks(page))} == {*PAGES, *ELSEWHERE}
     assert all((ROOT / test).exists() for test in ELSEWHERE.values())
 

@@ -19,7 +19,6 @@ from scenarios.datasets.reader import Run
 from scenarios.datasets.run_spec import seed_of
 from scenarios.datasets.workers import Workers
 from scenarios.files.errors import ScenarioError
-from tests.bench import bench_page
 from twin.truth import Parameter, read_parameters, read_trial
 
 BY_NAME = {task.name: task for task in TASKS}
@@ -188,10 +187,6 @@ def test_an_entry_must_declare_its_name_and_that_it_did_not_use_the_truth(tmp_pa
     (tmp_path / "entry.json").write_text(json.dumps({"name": "mine", "truth_not_used": True} | about))
     with pytest.raises(ScenarioError, match="truth_not_used"):
         scoring.open_entry(tmp_path)
-
-
-def test_the_page_of_the_baselines_is_the_generated_one():
-    assert bench_page.PAGE.read_text() == bench_page.page(json.loads(bench_page.KEPT.read_text()))
 
 
 @pytest.mark.slow
