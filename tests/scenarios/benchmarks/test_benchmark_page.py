@@ -1,4 +1,4 @@
-"""Every command of docs/benchmark.md is run, in its order, on one robot of one task."""
+"""Every command of docs/benchmark.md is run, in its order, on one robot of task `all`."""
 
 import re
 import shutil
@@ -26,9 +26,11 @@ def lines() -> list[list[str]]:
 @pytest.mark.slow
 def test_every_command_of_the_page_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    if PEER.is_file():
+        (tmp_path / ".venv-peer").symlink_to(PEER.parents[1])
     monkeypatch.setitem(frozen.TIERS, "quick", 1)
     for module in (make, baselines, scoring):
-        monkeypatch.setattr(module, "TASKS", TASKS[:1])
+        monkeypatch.setattr(module, "TASKS", TASKS[-1:])
     monkeypatch.setattr(bench_page, "PAGE", tmp_path / "page.md")
     monkeypatch.setattr(bench_page, "KEPT", tmp_path / "kept.json")
     own, *later = sorted(lines(), key=lambda line: "runs/mine" in line)  # an entry of one's own comes last
@@ -43,4 +45,4 @@ def test_every_command_of_the_page_runs(tmp_path, monkeypatch):
             arguments = [x for x in line[1:] if PEER.is_file() or x != "runs/figaroh"]
             done = CliRunner().invoke(app, arguments, catch_exceptions=False)
             assert done.exit_code == 0, (line, done.output)
-    assert "| geometry |" in bench_page.PAGE.read_text() and Path("runs/scores/scores.md").is_file()
+    assert "| nominal |" in bench_page.PAGE.read_text() and Path("runs/scores/scores.md").is_file()
