@@ -27,9 +27,11 @@ def test_a_declared_payload_is_known_to_both(trials):
         assert dynamics < 1.25 * plate
 
 
-LOADED = pytest.mark.xfail(reason="a drive wheel near its friction, which no calibration trial showed: docs/limits.md")
+LOADED = pytest.mark.xfail(
+    reason="a drive wheel near its friction, which no calibration trial showed: docs/limits.md", strict=True
+)
 
-FREE = pytest.mark.xfail(reason="where arm_1 stops in its gap after a push ends: 1.38 x")
+FREE = pytest.mark.xfail(reason="where arm_1 stops in its gap after a push ends: 1.38 x", strict=True)
 
 
 @pytest.mark.parametrize(
