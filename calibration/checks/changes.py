@@ -7,13 +7,14 @@ of the readings        late by x after a time: the joints' velocities
 of the hand's markers, slipped after a time: a constant twist in the hand, and of the base's markers in the base
 
 e are the errors of the geometry, as large as its fit says; gears' compliance and backlash under gravity are nuisances
-as well, since they follow the angle too. What is left is divided by its own size, and the variance of x sums over
+as well, since they follow the angle too. So is J_j (link - motor) of a joint whose link encoder shows more backlash than
+its datasheet, and whose link is on no other side after a time than it was on before: it crosses. What is left is divided by its own size, and the variance of x sums over
 blocks of time, because gears lag for as long as a motion lasts. The change that explains most is named, where it is
 larger than gears, clocks and mounts explain (their datasheet's tolerances) and than five of its standard deviations.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -184,6 +185,7 @@ def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -
     order = np.argsort(x.t)
     moments = x.t[order[np.linspace(0, len(order) - 1, _TIMES + 2).astype(int)[1:-1]]]
     ago = (x.t - x.t.mean()) / max(float(np.ptp(x.t)), 1.0)
+    crossing = _crossing(left, description)
     for j, name in enumerate(hand.nominal.joints):
         play, unit = _play(left, description, j)
         q = x.q[:, hand.nominal.columns[j]]
@@ -193,8 +195,44 @@ def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -
             moves = (_zero(name),), spread
             yield Change(f"readings of {name} are off in scale", J[:, :, j, None] * centred, limit, "%", 100.0, *moves)
         columns, limit = J[:, :, j, None] * ago[:, None, None], np.array([2.0 * play])
-        yield Change(f"readings of {name} drift", columns, limit, unit, moves=(_zero(name),))
-    yield from _otherwise(left, description, [(_when(x, ids, m), (x.t >= m).astype(float)) for m in moments])
+        yield _beside(
+            crossing, ago > 0, Change(f"readings of {name} drift", columns, limit, unit, moves=(_zero(name),))
+        )
+    for moment in moments:
+        later = x.t >= moment
+        for change in _otherwise(left, description, [(_when(x, ids, moment), later.astype(float))]):
+            yield _beside(crossing, later, change)
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """A joint whose link crosses its backlash: link less motor d (n,), J_j d (n, 6), what its datasheet explains."""
+
+    d: np.ndarray
+    column: np.ndarray
+    play: float
+
+    def on_same_sides(self, later: np.ndarray) -> bool:
+        """Whether what d covers before some time, or after it, lies within the other: readings that slip shift it."""
+        (a, b), (c, d) = (np.percentile(self.d[rows], (5.0, 95.0)) for rows in (~later, later))
+        return bool(min(max(c - a, b - d), max(a - c, d - b)) < self.play)
+
+
+def _crossing(left: Unexplained, description: Description) -> tuple[_Crossing, ...]:
+    """Joints whose link encoder shows more backlash than their datasheet, less than what no gear has."""
+    found = []
+    for j, column in enumerate(left.hand.nominal.columns):
+        d = left.x.link[:, column] - left.x.q[:, column]
+        play, _ = _play(left, description, j)
+        if np.isfinite(d).all() and 2.0 * play < np.ptp(np.percentile(d, (5.0, 95.0))) < 2.0 * _GEAR * play:
+            found.append(_Crossing(d, left.J[:, :, j] * (d - d.mean())[:, None], play))
+    return tuple(found)
+
+
+def _beside(crossing: Sequence[_Crossing], later: np.ndarray, change: Change) -> Change:
+    """A change, beside links that cross their backlash before and after some time (n,)."""
+    others = [c.column[..., None] for c in crossing if c.on_same_sides(later)]
+    return replace(change, columns=np.concatenate([change.columns, *others], axis=2))
 
 
 def _otherwise(

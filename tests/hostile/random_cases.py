@@ -42,9 +42,11 @@ def clean(dataset) -> tuple[str, ...]:
 def tried_robot(seed: int, mistakes: int, place: Path) -> Iterator[Tried]:
     """The clean campaign of a robot (its name empty), then its mistakes."""
     from scenarios.steps import run_steps
+    from twin import record
 
     logging.disable(logging.WARNING)
-    run_steps.simulate(run_steps.load("short", [f"seed={seed}"]).quick(), place / "run")
+    scenario = run_steps.load("short", [f"seed={seed}"]).quick()
+    record(scenario.twin, scenario.seed, place / "run")
     good = load(place / "run/dataset")
     said = clean(good)
     logging.disable(logging.NOTSET)
