@@ -7,10 +7,11 @@ of the readings        late by x after a time: the joints' velocities
 of the hand's markers, slipped after a time: a constant twist in the hand, and of the base's markers in the base
 
 e are the errors of the geometry, as large as its fit says; gears' compliance and backlash under gravity are nuisances
-as well, since they follow the angle too. So is J_j (link - motor) of a joint whose link encoder shows more backlash than
-its datasheet, and whose link is on no other side after a time than it was on before: it crosses. What is left is divided by its own size, and the variance of x sums over
-blocks of time, because gears lag for as long as a motion lasts. The change that explains most is named, where it is
-larger than gears, clocks and mounts explain (their datasheet's tolerances) and than five of its standard deviations.
+as well, since they follow the angle too. So is J_j (link - motor) of a joint whose link encoder shows more backlash
+than its datasheet, on the same sides after a time as before: it crosses its gap, no reading slipped. What is left is
+divided by its own size, and the variance of x sums over blocks of time, because gears lag for as long as a motion
+lasts. The change that explains most is named, where it is larger than gears, clocks and mounts explain (their
+datasheet's tolerances) and than five of its standard deviations.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

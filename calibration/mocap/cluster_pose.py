@@ -64,13 +64,23 @@ def poses_as_seen(xyz: np.ndarray, positions: np.ndarray, every: np.ndarray) -> 
     the markers is the one that all of them would show, however far the drawing is off. Residuals are from the drawing,
     which is the shape where no marker is ever hidden, or too few samples show all.
     """
-    whole = np.flatnonzero(np.isfinite(every).all(axis=(1, 2)))
-    if len(whole) < _WHOLE or len(whole) == len(every):
+    if np.isfinite(every).all():
         return body_poses(xyz, positions)
+    shape = shown_shape(xyz, every)
+    found = body_poses(shape, positions)
+    return replace(found, residual=found.residual + np.einsum("nij,mj->nmi", found.T[:, :3, :3], shape - xyz))
+
+
+def shown_shape(xyz: np.ndarray, every: np.ndarray) -> np.ndarray:
+    """Where samples `every` (k, m, 3) [m, lab] show the markers of a body (m, 3), by medians of those with all of them.
+
+    Drawn xyz (m, 3) [m, body]; the drawing itself where too few samples show all.
+    """
+    whole = np.flatnonzero(np.isfinite(every).all(axis=(1, 2)))
+    if len(whole) < _WHOLE:
+        return xyz
     shown = body_poses(xyz, every[whole[:: max(1, len(whole) // _MANY)]])
-    off = np.median(np.einsum("nji,nmj->nmi", shown.T[:, :3, :3], shown.residual), axis=0)
-    found = body_poses(xyz + off, positions)
-    return replace(found, residual=found.residual + np.einsum("nij,mj->nmi", found.T[:, :3, :3], off))
+    return np.asarray(xyz + np.median(np.einsum("nji,nmj->nmi", shown.T[:, :3, :3], shown.residual), axis=0))
 
 
 def poses_of(body: Body, trial: Trial) -> BodyPoses:

@@ -31,6 +31,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from calibration.mocap.cluster_pose import body_poses
+from calibration.mocap.ghosts import misfit, without_ghosts
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import rotation_vector
 from calibration.numerics.signals import interpolate_columns
@@ -69,16 +70,26 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
             continue
         before = position[:, columns]
         after = without_jumps(xyz, trial.t_mocap, _of_one_shape(xyz, trial.t_mocap, before))
-        rows = np.flatnonzero(((after != before) & ~(np.isnan(after) & np.isnan(before))).any(axis=(1, 2)))
-        if not len(rows):
-            continue
-        position = position.copy()
-        position[:, columns] = after
-        n_masked = int(np.isnan(after[rows]).all(axis=(1, 2)).sum())
-        done.append(Relabelled(body.name, len(rows) - n_masked, n_masked))
-        text = "%s: labels of body %r exchanged: %d frames set right, %d masked"
-        _log.warning(text, trial.id, body.name, len(rows) - n_masked, n_masked)
-    return (replace(trial, marker_position=position) if done else trial), tuple(done)
+        rows = np.flatnonzero(_changed(before, after).any(axis=1))
+        if len(rows):
+            n_masked = int(np.isnan(after[rows]).all(axis=(1, 2)).sum())
+            done.append(Relabelled(body.name, len(rows) - n_masked, n_masked))
+            text = "%s: labels of body %r exchanged: %d frames set right, %d masked"
+            _log.warning(text, trial.id, body.name, len(rows) - n_masked, n_masked)
+        right = without_ghosts(xyz, trial.t_mocap, after)
+        if n := int(_changed(after, right).sum()):
+            _log.warning("%s: body %r: %d positions masked that its shape contradicts", trial.id, body.name, n)
+        if len(rows) or n:
+            position = position.copy()
+            position[:, columns] = right
+    if position is not trial.marker_position:
+        trial = replace(trial, marker_position=position)
+    return trial, tuple(done)
+
+
+def _changed(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Which markers (n, m) of positions (n, m, 3) are elsewhere, or masked."""
+    return np.asarray(((after != before) & ~(np.isnan(after) & np.isnan(before))).any(axis=2))
 
 
 def relabelled_trial(dataset: Dataset, entry: TrialEntry) -> MeasuredTrial:
@@ -103,8 +114,8 @@ def _relabelled(description: Description, trial: Trial) -> MeasuredTrial:
 
 def _of_one_shape(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Markers (n, m, 3) set right or masked where they have not the cluster's shape."""
-    misfit = _misfit(xyz, p)
-    rows = np.flatnonzero(misfit > max(_limit(xyz), _CLEAR * float(np.median(misfit))))
+    found = misfit(xyz, p)
+    rows = np.flatnonzero(found > max(_limit(xyz), _CLEAR * float(np.median(found))))
     if not len(rows):
         return p
     out = p.copy()
@@ -119,13 +130,6 @@ def _columns(body: Body, trial: Trial) -> np.ndarray:
 
 def _limit(xyz: np.ndarray) -> float:
     return _LIMIT * shortest_edge(xyz)
-
-
-def _misfit(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """rms distance (n,) [m] of markers p (n, m, 3) from the rigid cluster; 0 where it has no pose."""
-    r = np.nan_to_num(body_poses(xyz, p).residual)
-    seen = np.maximum(np.isfinite(p).all(axis=2).sum(axis=1), 1)
-    return np.sqrt((r**2).sum(axis=(1, 2)) / seen)
 
 
 def _places(t: np.ndarray, p: np.ndarray, wrong: np.ndarray) -> np.ndarray:
@@ -147,7 +151,7 @@ def _mended(xyz: np.ndarray, p: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Markers (n, m, 3) in the order that fits, or NaN; `places` (n, m, 3) is where they were around."""
     m = p.shape[1]
     orders = np.array(list(permutations(range(m)))) if m <= MOST else np.arange(m)[None]
-    found = np.array([_misfit(xyz, p[:, order]) for order in orders])
+    found = np.array([misfit(xyz, p[:, order]) for order in orders])
     fits = found <= _limit(xyz)
     found[:, np.isfinite(p).all(axis=2).sum(axis=1) < 4] = np.inf  # three say nothing by their shape
     moved = np.where(fits, np.array([_apart(p[:, order], places) for order in orders]), np.inf)
@@ -180,7 +184,7 @@ def _without_one(xyz: np.ndarray, p: np.ndarray, out: np.ndarray) -> np.ndarray:
         rest = p.copy()
         rest[:, k] = np.nan
         enough = np.isfinite(rest).all(axis=2).sum(axis=1) >= 3
-        take = lost & enough & (_misfit(xyz, rest) <= 0.1 * _limit(xyz))
+        take = lost & enough & (misfit(xyz, rest) <= 0.1 * _limit(xyz))
         out[take], lost = rest[take], lost & ~take
     return out
 

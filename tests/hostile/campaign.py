@@ -247,6 +247,22 @@ def hidden(share: float, seconds: float, seed: int = 0) -> Spoil:
     return spoil
 
 
+def ghosts(share: float, size: float, seed: int = 0) -> Spoil:
+    """This share of all positions [m] elsewhere by `size`, each on its own."""
+
+    def spoil(c: Campaign) -> Campaign:
+        rng = np.random.default_rng(seed)
+
+        def of_trial(trial: Trial, name: str) -> Trial:
+            d = rng.normal(size=trial.marker_position.shape)
+            d *= (rng.random(d.shape[:2]) < share)[..., None] * size / np.linalg.norm(d, axis=2, keepdims=True)
+            return replace(trial, marker_position=trial.marker_position + d)
+
+        return c.changed("calibration", of_trial)
+
+    return spoil
+
+
 def gone(body: str, marker: int, share: float) -> Spoil:
     """One marker out of view for a share of each trial."""
 

@@ -19,6 +19,7 @@ from tests.hostile.campaign import (
     exchanged_columns,
     exchanged_sides,
     gain,
+    ghosts,
     gone,
     hidden,
     late,
@@ -109,6 +110,8 @@ TABLE = (
     Mistake("20 % hidden in blocks of 2 s", hidden(0.2, 2.0), "", 1.1),
     Mistake("gripper1 hidden for a third", gone("gripper", 0, 0.33), "", 1.1),
     Mistake("base2 hidden for a third", gone("base", 1, 0.33), "", 1.1),
+    Mistake("1 % of positions 50 mm off", ghosts(0.01, 0.05), "", 1.02),
+    Mistake("3 % of positions 10 mm off", ghosts(0.03, 0.01), "", 1.02),
     Mistake("plate lost for a second", lost_plate(0.5, 1.0), "holes in the readings of the plate", 1.1),
 )
 
@@ -153,6 +156,7 @@ def drawn(rng: np.random.Generator, n: int) -> Iterator[Mistake]:
             Mistake(f"{at} lost {100 * size:.1f} s", lost_readings(joint, share, 100.0 * size), "x"),
             Mistake(f"columns {joint}, {other} exchanged", exchanged_columns(joint, other), "x"),
             Mistake(f"{body}{marker + 1} gone for {share:.2f}", gone(body, marker, min(share, 0.5)), "x"),
+            Mistake(f"{100 * angle:.1f} % ghosts of {1e3 * size:.1f} mm", ghosts(angle, size, joint), "x"),
             Mistake(f"{100 * angle:.1f} % hidden", hidden(3.0 * angle, 20.0 * size, int(rng.integers(1000))), "x"),
         )
         yield kinds[int(rng.integers(len(kinds)))]

@@ -52,6 +52,20 @@ def test_a_foreign_marker_is_masked_alone(trial, bodies):
     assert np.isfinite(np.delete(found.marker_position, 6, axis=1)).all()
 
 
+@pytest.mark.parametrize("size", [0.01, 0.05])
+def test_ghosts_of_a_moment_are_masked_whatever_their_size_and_what_stays_is_not(trial, bodies, size, caplog):
+    position = trial.marker_position.copy()
+    position[np.arange(20, 200, 9), 6] += [size, 0.0, -size]
+    position[np.arange(23, 200, 7), 1] += [0.0, size, 0.0]
+    hit = (position != trial.marker_position).any(axis=2)
+    found, done = with_right_labels(bodies, replace(trial, marker_position=position))
+    assert (np.isnan(found.marker_position).all(axis=2) == hit).all() and "its shape contradicts" in caplog.text
+    moved = trial.marker_position.copy()
+    moved[150:, 6] += [0.0, 0.002, 0.0]
+    found, _ = with_right_labels(bodies, replace(trial, marker_position=moved))
+    np.testing.assert_array_equal(found.marker_position, moved)
+
+
 def square(trial):
     """A base that is alike in four directions, standing still."""
     xyz = [[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]]
