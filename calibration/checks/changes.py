@@ -194,7 +194,10 @@ def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -
         if (spread := float(centred.std())) > 10.0 * play:
             limit = np.array([play / spread])
             moves = (_zero(name),), spread
-            yield Change(f"readings of {name} are off in scale", J[:, :, j, None] * centred, limit, "%", 100.0, *moves)
+            scale = Change(
+                f"readings of {name} are off in scale", J[:, :, j, None] * centred, limit, "%", 100.0, *moves
+            )
+            yield _beside([c for c in crossing if c.joint != j], ago > 0, scale)
         columns, limit = J[:, :, j, None] * ago[:, None, None], np.array([2.0 * play])
         yield _beside(
             crossing, ago > 0, Change(f"readings of {name} drift", columns, limit, unit, moves=(_zero(name),))
@@ -207,8 +210,9 @@ def _possible(left: Unexplained, description: Description, ids: Sequence[str]) -
 
 @dataclass(frozen=True)
 class _Crossing:
-    """A joint whose link crosses its backlash: link less motor d (n,), J_j d (n, 6), what its datasheet explains."""
+    """Joint j whose link crosses its backlash: link less motor d (n,), J_j d (n, 6), what its datasheet explains."""
 
+    joint: int
     d: np.ndarray
     column: np.ndarray
     play: float
@@ -226,7 +230,7 @@ def _crossing(left: Unexplained, description: Description) -> tuple[_Crossing, .
         d = left.x.link[:, column] - left.x.q[:, column]
         play, _ = _play(left, description, j)
         if np.isfinite(d).all() and 2.0 * play < np.ptp(np.percentile(d, (5.0, 95.0))) < 2.0 * _GEAR * play:
-            found.append(_Crossing(d, left.J[:, :, j] * (d - d.mean())[:, None], play))
+            found.append(_Crossing(j, d, left.J[:, :, j] * (d - d.mean())[:, None], play))
     return tuple(found)
 
 
