@@ -97,23 +97,6 @@ def slip(joint: int, by: float, share: float, role: str = "calibration") -> Spoi
     return _readings(lambda q, rows, t: q.__setitem__((rows, joint), q[rows, joint] + by), role, share)
 
 
-def crosses(joint: int, gap: float, share: float, seed: int = 0) -> Spoil:
-    """The motor of a joint a gap [rad] further from one dwell to another, until a share of the recording; no link moves."""
-
-    def spoil(c: Campaign) -> Campaign:
-        rows, rng = c.part("calibration", share, "t_robot"), np.random.default_rng(seed)
-
-        def of_trial(trial: Trial, name: str) -> Trial:
-            q, side = trial.q_motor.copy(), rng.integers(0, 2, len(trial.dwell_stop) + 1)
-            later = np.searchsorted(trial.dwell_stop, trial.t_robot + c.late)
-            q[:, joint] += gap * np.where(rows[name], 1.0, side[later])
-            return replace(trial, q_motor=q)
-
-        return c.changed("calibration", of_trial)
-
-    return spoil
-
-
 def drift(joint: int, by: float, role: str = "calibration") -> Spoil:
     def spoil(c: Campaign) -> Campaign:
         ids = c.ids(role)

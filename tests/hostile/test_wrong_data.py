@@ -73,6 +73,13 @@ def test_a_mistake_of_validation_recordings_is_named(twin, mistake, tmp_path):
     assert any(mistake.says in message for message in found.said), found
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [406, 500])
+def test_backlash_of_30_mrad_that_the_link_crosses_is_no_change_of_its_readings(seed, tmp_path):
+    (clean,) = random_cases.tried_robot(seed, 0, tmp_path)
+    assert not clean.said
+
+
 def test_mistakes_at_random_were_hardly_ever_silently_wrong_and_clean_campaigns_hardly_ever_named():
     every = random_cases.rows()
     spoilt, good = [r for r in every if r[1]], [r for r in every if not r[1]]
