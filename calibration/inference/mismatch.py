@@ -1,13 +1,15 @@
 """Whether the residuals of a fit depend on what its model leaves out: a family of tests, together at 1 %.
 
-    b_g = N~_g' r_g,   N~ = N - J H^-1 J'N,   H = J'J + P             whitened; block g a motion, or one static posture
+    b_g = N~_g' e_g,   N~ = M^1/2 N,   e = M^+1/2 r                   whitened; block g a motion, or one static posture
+    M = 1 - J H^-1 J',   H = J'J + P                                  covariance of the residuals r
     T = b' V^+ b,      b = sum_g b_g,   V = sum_g b_g b_g'
     p = share of random signs of the b_g with a T as large            V does not change with them
 
 N (n, d, m) are the directions of one effect, as of time, load or posture; what the parameters absorb of them is taken
-out. Where nothing is wrong the residuals of a block are as likely with either sign, however they hang together within
-it. An effect is seen where Holm's procedure rejects at 1 % over the family. Its size at the hand is the root mean
-square displacement by its best directions. One that hardly varies beside the parameters is not excited.
+out. e are the residuals brought back to the size of the errors before the fit. Where nothing is wrong those of a block
+are as likely with either sign, however they hang together within it. An effect is seen where Holm's procedure rejects
+at 1 % over the family. Its size at the hand is the root mean square displacement by its best directions. One that
+hardly varies beside the parameters is not excited.
 References: Holm, Scand. J. Statistics 1979; Cameron, Gelbach, Miller, Rev. Econ. Stat. 2008 (signs of blocks).
 """
 
@@ -23,6 +25,7 @@ from calibration.inference.parameters import ParameterSet
 _SIGNS = 8_000
 _SEED = 20261122  # of the signs alone: the same residuals have the same p
 _LEFT = 1e-3  # [-] share of an effect's square that the parameters must leave for it to be excited
+_ABSORBED = 1e-3  # [-] share of an error left by the fit below which nothing is known of it
 _BLOCKS = 1.5  # blocks a direction, at least
 
 
@@ -37,25 +40,33 @@ class Effect:
 def mismatch(fit: Fit, parameters: ParameterSet, effects: Sequence[Effect], block: np.ndarray) -> tuple[Shown, ...]:
     """Test every effect on the residuals of a fit; block (n,) numbers rows that hang together."""
     H = fit.J_white.T @ fit.J_white + np.diag(parameters.prior.precision(fit.widths.prior))
-    return holm([_tested(fit, H, effect, np.unique(block, return_inverse=True)[1]) for effect in effects])
+    U, s, _ = np.linalg.svd(np.linalg.solve(np.linalg.cholesky(H), fit.J_white.T).T, full_matrices=False)
+    rest = np.sqrt(np.maximum(1.0 - s**2, 0.0))
+    larger = np.where(rest > _ABSORBED, 1.0 / np.maximum(rest, _ABSORBED), 0.0)
+    r = fit.r_white.ravel()
+    errors = r + U @ ((larger - 1.0) * (U.T @ r))
+    number = np.unique(block, return_inverse=True)[1]
+    found = []
+    for effect in effects:
+        N = (fit.whitener @ effect.N).reshape(len(r), -1)
+        found.append(_tested(effect, N, N + U @ ((rest - 1.0)[:, None] * (U.T @ N)), errors, number))
+    return holm(found)
 
 
-def _tested(fit: Fit, H: np.ndarray, effect: Effect, block: np.ndarray) -> Shown:
-    n, d = fit.at.r.shape
-    N = (fit.whitener @ effect.N).reshape(n * d, -1)
-    left = N - fit.J_white @ np.linalg.solve(H, fit.J_white.T @ N)
+def _tested(effect: Effect, N: np.ndarray, left: np.ndarray, errors: np.ndarray, block: np.ndarray) -> Shown:
+    n = len(block)
     shown = (left**2).sum(axis=0) > _LEFT * (N**2).sum(axis=0)
     groups = int(block.max()) + 1
     if not shown.any() or groups < _BLOCKS * shown.sum():
         return Shown(effect.name, np.nan)
     left = left[:, shown]
     b = np.zeros((groups, left.shape[1]))
-    np.add.at(b, block, (left.reshape(n, d, -1) * fit.r_white[..., None]).sum(axis=1))
+    np.add.at(b, block, (left * errors[:, None]).reshape(n, -1, left.shape[1]).sum(axis=1))
     scaled = b / np.sqrt((b**2).sum(axis=0))
     root = np.linalg.pinv(scaled.T @ scaled, rcond=1e-9, hermitian=True)
     signs = np.random.default_rng(_SEED).choice([-1.0, 1.0], size=(_SIGNS, groups))
     drawn, own = signs @ scaled, scaled.sum(axis=0)
     as_large = int((((drawn @ root) * drawn).sum(axis=1) >= own @ root @ own * (1.0 - 1e-12)).sum())
-    size = np.linalg.lstsq(left, -fit.r_white.ravel(), rcond=1e-6)[0]
+    size = np.linalg.lstsq(left, -errors, rcond=1e-6)[0]
     moved = effect.N[:, :3, shown] @ size
     return Shown(effect.name, (1 + as_large) / (1 + _SIGNS), size=float(np.sqrt((moved**2).sum(axis=1).mean())))
