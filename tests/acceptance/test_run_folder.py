@@ -213,16 +213,19 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     np.testing.assert_allclose(still.T, rows[row, "fixed"], rtol=0.0, atol=1e-12)
     assert 1e3 * np.abs(found.T - still.T)[:, :3, 3].max() > 1.0
     robot, plate = (estimate.clock(name) for name in ("robot", "plate"))
-    own, known = robot.from_mocap(t), {"t_wrench": plate.from_mocap(t)}
+    own, t_wrench = robot.from_mocap(t), plate.from_mocap(t)
+    clocks = compensator.predict(own, q, w, start, t_wrench=t_wrench)
+    off = np.abs(clocks.T - found.T).max(axis=(1, 2))  # the robot's second is 12 ppm off, so are velocities
     if estimate.main != "full":
-        clocks = compensator.predict(own, q, w, start, **known)
-        assert np.abs(clocks.T - found.T).max() <= 5e-5  # the robot's second is 12 ppm off, so are velocities
+        assert off.max() <= 5e-5
         return
-    # part by part: a base whose accelerations are off by 12 ppm lets a gear cross its gap a moment earlier or later
-    assert np.abs(compensator.predict(own, q, T_lab_base_start=start).T - still.T).max() <= 5e-5
-    at = loaded_base(compensator.suspension, compensator.laboratory, start)
-    read = at_readings(own, compensator.clocks, known["t_wrench"], w)
-    by_clocks, by_mocap = (compensator.slipping.moved(at, *x)[0] for x in ((own, q, read), (t, q, w)))
+    # a gear that is about to cross its gap may stay: then the arm is elsewhere until it crosses, the base is not
+    assert np.quantile(off, 0.98) <= 5e-5
+    at, read = (
+        loaded_base(compensator.suspension, compensator.laboratory, start),
+        (own, compensator.clocks, t_wrench, w),
+    )
+    by_clocks, by_mocap = (compensator.slipping.moved(at, *x)[0] for x in ((own, q, at_readings(*read)), (t, q, w)))
     assert np.abs(by_clocks - by_mocap).max() <= 1e-5
 
 
