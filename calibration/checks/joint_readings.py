@@ -129,7 +129,7 @@ def _limit(motor: np.ndarray, link: np.ndarray) -> str:
     for end in (link.max(), link.min()):
         stays = link == end
         if stays.sum() >= _FEW and np.ptp(motor[stays]) > _APART:
-            return "stands still" if stays.all() else f"does not exceed {end:.3g} rad while its motor does"
+            return "does not move" if stays.all() else f"does not exceed {end:.3g} rad while its motor does"
     return ""
 
 

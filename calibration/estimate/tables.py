@@ -30,7 +30,7 @@ _HEADER = """\
 #     angle = reading - offset        [rad; m for joints that slide]
 """
 _ELASTIC = """\
-#     angle = reading - offset - compliance * torque      compliance [rad/(N.m)], torque: what holds the joint at rest
+#     angle = reading - offset - compliance * torque      compliance [rad/(N.m)], torque: that balances gravity
 """
 _PLAY = """\
 #             - gap / 2 * tanh(torque / 0.3 N.m)          gap [rad], backlash that gravity preloads to one side

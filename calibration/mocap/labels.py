@@ -1,4 +1,4 @@
-"""Labels of markers that a motion capture has exchanged: found by a cluster's residual, set right or masked.
+"""Labels of markers that a motion capture has exchanged: found by a cluster's residual, corrected or masked.
 
     e(P) = rms distance of the markers, labels permuted by P, from their rigid cluster where it fits them best
 
@@ -10,7 +10,7 @@ markers are masked at that instant. A single foreign marker is masked alone wher
 drawing that is off raises the limit to three times the trial's usual misfit. For exchanges that keep the shape see
 `label_jumps`.
 
-Exchanges of labels that keep a body's shape: identified by markers that jump, set right by the order that did not.
+Exchanges of labels that keep a body's shape: identified by markers that jump, corrected by the order that did not.
 
     d(P) = rms |p_k[a] - p_k-1[P(a)]|, labels a          angle(R_P) > w dt,  x_P(a) ~ R_P x_a + c
 
@@ -53,7 +53,7 @@ _SURE = 2.0  # times the frames of any other order [-]
 
 @dataclass(frozen=True)
 class Relabelled:
-    """What was done to one body in one trial: frames set right, and frames masked."""
+    """What was done to one body in one trial: frames corrected, and frames masked."""
 
     body: str
     n_mended: int
@@ -61,7 +61,7 @@ class Relabelled:
 
 
 def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tuple[Relabelled, ...]]:
-    """The trial with exchanged labels set right, and what was done; the trial itself where nothing was wrong."""
+    """The trial with exchanged labels corrected, and what was done; the trial itself where nothing was wrong."""
     position, done = trial.marker_position, []
     for body in bodies:
         columns = _columns(body, trial)
@@ -74,7 +74,7 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
         if len(rows):
             n_masked = int(np.isnan(after[rows]).all(axis=(1, 2)).sum())
             done.append(Relabelled(body.name, len(rows) - n_masked, n_masked))
-            text = "%s: labels of body %r exchanged: %d frames set right, %d masked"
+            text = "%s: labels of body %r exchanged: %d frames corrected, %d masked"
             _log.warning(text, trial.id, body.name, len(rows) - n_masked, n_masked)
         right = without_ghosts(xyz, trial.t_mocap, after)
         if n := int(_changed(after, right).sum()):
@@ -113,7 +113,7 @@ def _relabelled(description: Description, trial: Trial) -> MeasuredTrial:
 
 
 def _of_one_shape(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Markers (n, m, 3) set right or masked where they have not the cluster's shape."""
+    """Markers (n, m, 3) corrected or masked where they have not the cluster's shape."""
     found = misfit(xyz, p)
     rows = np.flatnonzero(found > max(_limit(xyz), _CLEAR * float(np.median(found))))
     if not len(rows):

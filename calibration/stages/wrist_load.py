@@ -211,7 +211,7 @@ def _means(trials: Sequence[Trial], robot: Clock) -> dict[str, np.ndarray]:
 
 def _judged(found: Hanging, expected: Hanging, link: str, n: int) -> Verdict:
     message = (
-        f"wrist: {found.mass:.3f} +- {found.sigma[0]:.1g} kg hang on {link}, centre {_millimetres(found.centre)} mm "
+        f"wrist: {found.mass:.3f} +- {found.sigma[0]:.1g} kg on {link}, centre {_millimetres(found.centre)} mm "
         f"+- {_millimetres(found.centre_sigma, 1)}, "
         f"{n} postures; nominal links and declared payload: {expected.mass:.3f} +- {expected.sigma[0]:.3f} kg"
     )

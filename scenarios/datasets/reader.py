@@ -90,6 +90,6 @@ def open_collection(folder: Path | str) -> Collection:
     folder = Path(folder)
     for name in ("collection.json", "index.csv"):
         if not (folder / name).is_file():
-            raise ScenarioError(f"{folder / name}: no such file; give the command `dataset` that makes it once more")
+            raise ScenarioError(f"{folder / name}: no such file; run the same `dataset` command again")
     read_json(folder / "collection.json")
     return Collection(folder, read_index(folder / "index.csv"))

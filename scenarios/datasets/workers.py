@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _TRIES = 3  # of a run that takes its worker down, before it is given up
-_AGAIN = "give the same command: what is complete stays"
+_AGAIN = "run the same command again, complete runs are kept"
 _PROBE = 4_000_000  # bytes that must still find room for a failure to be the run's own
 # The profiler costs a tenth; looking at clocks, memory and tasks many times a second 3 %, and runs take seconds.
 _QUIET = {

@@ -105,7 +105,7 @@ def _bodies(session: Session) -> Iterator[str]:
     else:
         x, y = _pressure(session)
         standing = f"{{x: {x}, y: {y}, heading: CHOOSE}}"
-        what = "where the base frame stands at rest [m, rad, lab]"
+        what = "pose of the base frame at rest [m, rad, lab]"
         text = _body(bodies[0], base).removesuffix("}")
         yield f"  - {text}, standing: {standing}}}  {CHOOSE}: the base? it moves least; {what}"
     left = [n for b in (bodies[1:-1] if session.has_readings else bodies[1:]) for n in b.markers] + [*session.alone]

@@ -133,7 +133,7 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     held = np.abs(tau) > np.maximum(_TORQUE, _LOADED * robot.largest)
     speaks = held & (np.ptp(np.where(held, q, _median(q, held)), axis=0) > _MOVES)
     if not speaks.any():
-        raise NotEnoughData("no joint moves that gravity holds on one flank")
+        raise NotEnoughData("no joint moves that gravity preloads on one flank")
     at = hand.poses_and_derivatives(x.q, tau, robot.names)
     moved = at.J_joint * np.where(held, robot.reading_sigma, np.maximum(robot.reading_sigma, _FREE))[:, None]
     W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
@@ -196,6 +196,6 @@ def refined(
     for _ in range(passes):
         lags = refined_lags(robot, description, trials, clock)
         if not lags:
-            raise NotEnoughData("no trial moves a joint that gravity holds on one flank")
+            raise NotEnoughData("no trial moves a joint that gravity preloads on one flank")
         clock = fit_clock(clock.instrument, lags)[0]
     return lags

@@ -1,4 +1,4 @@
-"""Exchanges of labels that keep a body's shape: reported by the jump, set right or masked, frames counted."""
+"""Exchanges of labels that keep a body's shape: reported by the jump, corrected or masked, frames counted."""
 
 from dataclasses import replace
 
@@ -49,7 +49,7 @@ def test_frames_are_counted_and_reported(truth, caplog):
     found, done = with_right_labels([body], replace(trial, marker_position=wrong))
     np.testing.assert_array_equal(found.marker_position, position)
     assert [(d.body, d.n_mended, d.n_masked) for d in done] == [("base", 30, 0)]
-    assert "'base' exchanged: 30 frames set right, 0 masked" in caplog.text
+    assert "'base' exchanged: 30 frames corrected, 0 masked" in caplog.text
 
 
 def test_exchanges_one_after_the_other_and_with_a_hidden_marker_are_set_right():

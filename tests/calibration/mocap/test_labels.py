@@ -41,7 +41,7 @@ def test_exchanged_labels_are_set_right_and_reported(trial, bodies, pair, caplog
     np.testing.assert_array_equal(found.marker_position, trial.marker_position)
     name = "base" if pair[0] < 4 else "gripper"
     assert [(d.body, d.n_mended, d.n_masked) for d in done] == [(name, 30, 0)]
-    assert name in caplog.text and "30 frames set right" in caplog.text
+    assert name in caplog.text and "30 frames corrected" in caplog.text
 
 
 def test_a_foreign_marker_is_masked_alone(trial, bodies):

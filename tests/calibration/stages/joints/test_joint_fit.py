@@ -154,7 +154,7 @@ def test_joints_that_never_move_are_reported_and_not_corrected() -> None:
         (lambda q, other: -q, "has its sign turned"),
         (lambda q, other: np.degrees(q), "is in degrees"),
         (lambda q, other: 1.05 * q, "has 1.05 of its motor's scale"),
-        (lambda q, other: 0.0 * q + 0.3, "stands still"),
+        (lambda q, other: 0.0 * q + 0.3, "does not move"),
         (lambda q, other: np.minimum(q, np.quantile(q, 0.7)), "does not exceed"),
         (lambda q, other: other, "follows the motor of arm_3_joint"),
         (lambda q, other: q + 2.0 * np.pi * (q > np.median(q)), "wraps by"),
