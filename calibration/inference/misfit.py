@@ -114,10 +114,13 @@ class _Evidence:
     groups: int
 
     def value(self, variance: np.ndarray) -> float:
-        """ln p."""
+        """ln p; none where the variances are so large that rounding leaves it no value."""
         root = np.sqrt(variance[self.group])
         inner = np.eye(len(root)) + root[:, None] * self.G * root
-        L, c = np.linalg.cholesky(inner), root * self.b
+        try:
+            L, c = np.linalg.cholesky(inner), root * self.b
+        except np.linalg.LinAlgError:
+            return -np.inf
         return float(0.5 * np.square(np.linalg.solve(L, c)).sum() - np.log(L.diagonal()).sum())
 
     def maximised(self, free: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
