@@ -90,7 +90,7 @@ def evaluate(
     """
     entries = dataset.entries(role)
     if not entries:
-        raise NotEnoughData(f"no {role} trial to score on")
+        raise NotEnoughData(f"no trial has role {role}; keep trials aside in the mapping (`trials: {{{role}: [...]}}`)")
     submitted, estimate = (estimate, NOTHING) if isinstance(estimate, Submission) else (None, estimate)
     read = tuple(recorded(dataset, entry) for entry in entries)
     remarks = (*check_names(estimate, dataset), *believable(dataset, role, read))

@@ -88,7 +88,8 @@ def _row(rows: Sequence[dict[str, Any]], text: str) -> dict[str, Any]:
     found = {row["base"]: row for row in rows if (row["model"], row["encoder"], row["trials"]) == wanted}
     source = base or next((b for b in SOURCES if b in found), "")
     if source not in found:
-        known = dict.fromkeys(f"{r['model']}:{r['base']}:{r['encoder']}:{r['trials']}" for r in rows)
+        known = [f"{r['base']}:{r['encoder']}:{r['trials']}" for r in rows if r["model"] == model]
+        known = [f"{model}:{of}" for of in known] or [*dict.fromkeys(str(r["model"]) for r in rows)]
         raise ScenarioError(f"check: no row {text!r}; there are {', '.join(known)}")
     return found[source]
 
