@@ -8,6 +8,8 @@ import typer
 from scenarios.commands.options import Overrides, ScenarioName, Seed, overriding
 from scenarios.files.errors import ScenarioError
 
+_SHOWN = 0.3  # of a logarithm: what the motions identify
+
 
 def design(  # noqa: PLR0913  an option each
     scenario: ScenarioName,
@@ -24,6 +26,10 @@ def design(  # noqa: PLR0913  an option each
         Path | None,
         typer.Option(metavar="DIR", help="Write the tour as play_motion and JointTrajectory YAML and as CSV, too."),
     ] = None,
+    base: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write motions that make the base's wheels stick and slip as CSV, too."),
+    ] = None,
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
@@ -31,11 +37,16 @@ def design(  # noqa: PLR0913  an option each
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.steps.design import design as designed
+    from scenarios.steps.design import with_base_motions
 
     for path in (p for p in (out, campaign) if p is not None and p.is_dir()):
         raise ScenarioError(f"{path}: is a folder; name a file")
+    loaded = steps.load(scenario, overriding(overrides, seed))
+    if base is not None:
+        loaded, shown = with_base_motions(loaded, base)
+        known = [f"{n} {100.0 * s:.0f} %" for n, s in zip(shown.names, shown.sigma, strict=True) if s < _SHOWN]
+        typer.echo(f"Base motions: {base}, {len(shown.motions)}; standard deviations after them: {', '.join(known)}")
     with console.progress() as progress:
-        loaded = steps.load(scenario, overriding(overrides, seed))
         found = designed(loaded, n, criterion, out, campaign, play, progress)
     plan, against = found.plan, found.comparison
     typer.echo(

@@ -16,10 +16,12 @@ from scenarios.steps.run_steps import Progress, silent
 
 if TYPE_CHECKING:
     from calibration.design import Comparison, Criterion, Plan, Sample
+    from calibration.design.base_motions import BasePlan
     from scenarios.files.scenario import Scenario
 
 
 _CHOOSING = 0.85  # share of the time of a design that the choice of postures takes
+BASE_MOTIONS = 5
 PLAYED = ("tour.csv", "tour_rests.csv", "tour_play_motion.yaml", "tour_trajectory.yaml")
 
 
@@ -80,6 +82,31 @@ def design(  # noqa: PLR0913  a file each
         with output_folder.updating(play, PLAYED) as new:
             tour.write(new)
     return Designed(found, against)
+
+
+def with_base_motions(scenario: "Scenario", folder: Path) -> "tuple[Scenario, BasePlan]":
+    """The scenario with BASE_MOTIONS calibration motions that show its wheels, written to a folder as CSV.
+
+    Raises:
+        NotEnoughData: The robot has no wheels, or hardly any posture clear of itself and in sight.
+        ScenarioError: The folder cannot be written.
+    """
+    import mjcf
+    from calibration.design.base_motions import base_motions
+    from twin.campaign import describe_dataset
+    from twin.motions.campaign import Trajectory
+    from twin.random_streams import generator
+
+    rng = generator(scenario.seed, "design of base motions")
+    found = base_motions(mjcf.urdf(), describe_dataset(scenario.twin, ()), BASE_MOTIONS, rng)
+    names = [f"base_{k + 1}" for k in range(len(found.motions))]
+    with output_folder.updating(folder, tuple(f"{name}.csv" for name in names)) as new:
+        for name, motion in zip(names, found.motions, strict=True):
+            rows, header = np.column_stack([motion.t, motion.q]), ",".join(("t", *found.joints))
+            np.savetxt(new / f"{name}.csv", rows, "%.6f", ",", header=header, comments="", encoding="utf-8")
+    own = {name: Trajectory(str(folder / f"{name}.csv"), "calibration") for name in names}
+    changed = replace(scenario.twin.campaign, motions=scenario.twin.campaign.motions | own)
+    return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)}), found
 
 
 def _work() -> "Sample":

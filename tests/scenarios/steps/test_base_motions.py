@@ -1,0 +1,65 @@
+"""Designed base motions: they show the wheels better than the campaign's swings do in as much time."""
+
+import json
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration import calibrate, load
+from calibration.design.base_motions import RAMP, SECONDS, Excitation, base_motions, chosen_in_turn
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.stick_slip.parameters import wheel_parameters
+from calibration.stages.stick_slip.wheels import NAMES
+from scenarios.steps import run_steps
+from scenarios.steps.design import BASE_MOTIONS, with_base_motions
+from twin.campaign import describe_dataset
+from twin.motions.motion import path_time
+from twin.motions.swings import CALIBRATION_SWINGS
+
+SHOWN = ("drive_kx", "drive_ky", "front_k", "back_k", "front_mu", "back_mu", "drive_mu", "drive_load")
+SWINGS = ["around_x", "around_y", "around_z", "x_fold", "y_fold"]
+
+
+def test_motions_are_chosen_for_what_the_others_leave_open():
+    H = np.zeros((3, 2, len(NAMES), len(NAMES)))
+    H[0, :, 0, 0], H[1, :, 0, 0], H[2, :, 4, 4] = 900.0, 800.0, 100.0
+    chosen, total = chosen_in_turn(H, 2)
+    assert chosen == [0, 2]
+    assert total[0, 0, 0] > 900.0 and total[0, 4, 4] > 100.0
+
+
+@pytest.mark.slow
+def test_they_are_expected_to_show_every_wheel_better_than_the_swings():
+    described = describe_dataset(run_steps.load("humanoids2024").twin, ())
+    found = base_motions(mjcf.urdf(), described, len(SWINGS), np.random.default_rng(0))
+    excitation, t = Excitation.of(Laboratory(mjcf.urdf(), described)), found.motions[0].t
+    moves = [CALIBRATION_SWINGS[name].at(path_time(t - 1.5, SECONDS, RAMP)) for name in SWINGS]
+    H = np.array([excitation.information(t, q)[0] for q in moves])
+    _, total = chosen_in_turn(H, len(H))
+    usual = np.sqrt(np.mean([np.diag(np.linalg.inv(each)) for each in total], axis=0))
+    rows = [NAMES.index(name) for name in SHOWN]
+    assert np.all(found.sigma[rows] < 0.9 * usual[rows])
+
+
+@pytest.mark.slow
+def test_a_robot_that_plays_them_has_its_wheels_identified_better(tmp_path, claim):
+    length = [f"twin.campaign.calibration_swing={SECONDS}", "twin.campaign.sweep=0.0", "seed=3"]
+    scenario = run_steps.load("humanoids2024", [*length, f"twin.campaign.only=[postures,{','.join(SWINGS)}]"])
+    only = run_steps.load("humanoids2024", [*length, "twin.campaign.only=[postures]"])
+    planned, plan = with_base_motions(only, tmp_path / "motions")
+    assert len(plan.motions) == BASE_MOTIONS
+    off, sigma = {}, {}
+    for name, one in {"swings": scenario, "base motions": planned}.items():
+        run_steps.simulate(one, tmp_path / name)
+        truth = json.loads((tmp_path / name / "truth/truth.json").read_text())["parameters"]
+        true = {p["name"]: p["value"] for p in truth}
+        model = calibrate(load(tmp_path / name / "dataset"), ("suspension", "bundle")).bundle.stick_slip
+        found = [p for p in wheel_parameters(model.wheels, model.direction("plate")) if "right.k" in p.name]
+        found += [p for p in wheel_parameters(model.wheels, model.direction("plate")) if "right.mu" in p.name]
+        off[name] = np.array([abs(np.log(p.value / true[p.name])) for p in found])
+        sigma[name] = np.sqrt(np.diag(model.direction("plate").covariance))[[NAMES.index(n) for n in SHOWN]]
+        for p, error in zip(found, off[name], strict=True):
+            claim(f"design/base/{name}/{p.name} off by, share", error)
+    assert np.median(off["base motions"]) < np.median(off["swings"])
+    assert np.median(sigma["base motions"] / sigma["swings"]) < 0.8
