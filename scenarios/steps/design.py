@@ -15,8 +15,7 @@ from scenarios.files.errors import ScenarioError
 from scenarios.steps.run_steps import Progress, silent
 
 if TYPE_CHECKING:
-    from calibration.design import Comparison, Criterion, Plan, Sample
-    from calibration.design.base_motions import BasePlan
+    from calibration.design import BasePlan, Comparison, Criterion, Plan, Sample
     from scenarios.files.scenario import Scenario
 
 
@@ -92,9 +91,8 @@ def with_base_motions(scenario: "Scenario", folder: Path) -> "tuple[Scenario, Ba
         ScenarioError: The folder cannot be written.
     """
     import mjcf
-    from calibration.design.base_motions import base_motions
+    from calibration.design import base_motions
     from twin.campaign import describe_dataset
-    from twin.motions.campaign import Trajectory
     from twin.random_streams import generator
 
     rng = generator(scenario.seed, "design of base motions")
@@ -104,8 +102,9 @@ def with_base_motions(scenario: "Scenario", folder: Path) -> "tuple[Scenario, Ba
         for name, motion in zip(names, found.motions, strict=True):
             rows, header = np.column_stack([motion.t, motion.q]), ",".join(("t", *found.joints))
             np.savetxt(new / f"{name}.csv", rows, "%.6f", ",", header=header, comments="", encoding="utf-8")
-    own = {name: Trajectory(str(folder / f"{name}.csv"), "calibration") for name in names}
-    changed = replace(scenario.twin.campaign, motions=scenario.twin.campaign.motions | own)
+    motions: dict[str, Any] = dict(scenario.twin.campaign.motions)
+    motions |= {name: {"file": str(folder / f"{name}.csv"), "role": "calibration"} for name in names}
+    changed = replace(scenario.twin.campaign, motions=motions)
     return scenario.model_copy(update={"twin": replace(scenario.twin, campaign=changed)}), found
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import mjcf
 from calibration import calibrate, load
-from calibration.design.base_motions import RAMP, SECONDS, Excitation, base_motions, chosen_in_turn
+from calibration.design.base_excitation import RAMP, SECONDS, Excitation, base_motions, chosen_in_turn
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.stick_slip.parameters import wheel_parameters
 from calibration.stages.stick_slip.wheels import NAMES
