@@ -27,8 +27,8 @@ def base_r2():
         from scipy.spatial.transform import Rotation
 
         import calibration
-        from calibration.prediction.base_pose import base_poses
         from calibration.stages.suspension.base_response import laboratory
+        from tests.doubles.moving_base import base_poses
         from twin.truth import read_trial
 
         dataset = calibration.load(folder / "dataset")

@@ -4,14 +4,14 @@ unseen_motion   other motions: validation trials that move, while the joint move
 static          mean over each dwell of validation trials: S = 1/2, not the side a stop left the gear on
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
-from calibration.stages.joints.correction import Corrected, JointModels, correct, velocities
+from calibration.stages.joints.correction import Corrected, JointModels, velocities
 from calibration.stages.joints.repetitions import EXCITED, MOVING, Regime, RegimeQuality, quality_of
 from calibration.stages.joints.samples import dwell_differences
 
@@ -55,12 +55,6 @@ def validation_qualities(models: JointModels | None, found: Sequence[TrialResidu
     """Fit quality over validation trials: while moving (`unseen_motion`), and of their dwells (`static`)."""
     regimes: tuple[Regime, ...] = ("unseen_motion", "static")
     return () if models is None else tuple(q for regime in regimes for q in _pooled(models, regime, found))
-
-
-def on_validation(models: JointModels, trials: Iterable[Trial], robot: Clock) -> tuple[RegimeQuality, ...]:
-    """The same, of trials."""
-    corrected = ((t, correct(models.of_trial(t.id), t.t_robot, t.q_motor)) for t in trials)
-    return validation_qualities(models, [residuals(models, trial, c, robot) for trial, c in corrected])
 
 
 def _pooled(models: JointModels, regime: Regime, found: Sequence[TrialResiduals]) -> Iterator[RegimeQuality]:

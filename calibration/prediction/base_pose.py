@@ -32,7 +32,7 @@ from calibration.stages.stick_slip.stream import SlipState
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, floor_load
 from calibration.stages.suspension.model import Source, Suspension
-from calibration.stages.suspension.rest_frame import Rest, rest_at, rest_of, upright
+from calibration.stages.suspension.rest_frame import Rest, rest_at, upright
 
 _UPRIGHT = 1e-9  # [m/s2] gravity's components in two frames 0 that are one direction
 
@@ -224,17 +224,6 @@ class BaseInTrial:
     def _driven(self, load: Load, source: Source) -> np.ndarray:
         forcing = forcing_of(load, float(self.trial.t_mocap[0]))
         return interpolate_columns(self.trial.t_mocap, forcing.t, self.suspension.displaced(forcing, source))
-
-
-def base_poses(suspension: Suspension, lab: WrenchSources, trial: Trial, source: Source) -> np.ndarray:
-    """T_lab_B (n, 4, 4) of the base's marker body at `t_mocap`; outside the wrench's recording it stays.
-
-    Raises:
-        NotEnoughData: The wrench, or the base's markers of the first second, were not recorded.
-    """
-    rest = rest_of(lab.lab.description, trial, lab.T_base_B)
-    base = BaseInTrial(suspension, lab, trial, rest.T_lab_0 @ rest.T_0_B)
-    return rest.poses(base.displacement(source, rest))
 
 
 def base_at(body: Body | None, T_base_B: np.ndarray, markers: np.ndarray) -> np.ndarray:

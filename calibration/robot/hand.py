@@ -73,14 +73,6 @@ class HandModel:
             blocks.append(replace(block, values=np.array(new)))
         return replace(self, blocks=tuple(blocks))
 
-    def with_values(self, **values: np.ndarray) -> "HandModel":
-        """The model with other values of whole blocks, by the properties below: base, hand, offset, compliance, gap."""
-        frames = np.concatenate([values.get("base", self.base), values.get("hand", self.hand)])
-        new: dict[type[ParameterBlock], np.ndarray] = {Frames: frames}
-        new |= {kind: values[name] for name, kind in _READINGS.items() if name in values}
-        blocks = tuple(replace(b, values=np.asarray(new.get(type(b), b.values))) for b in self.blocks)
-        return replace(self, blocks=blocks)
-
     def block(self, kind: type[ParameterBlock]) -> ParameterBlock:
         """The block of a kind."""
         return next(b for b in self.blocks if isinstance(b, kind))
@@ -199,9 +191,6 @@ class HandModel:
         fixed = np.array(self._in_base.fixed)
         fixed[0] = inverse(from_vector(self.base)) @ fixed[0]
         return replace(self._in_base, fixed=fixed)
-
-
-_READINGS: dict[str, type[ParameterBlock]] = {"offset": EncoderZeros, "compliance": Compliance, "gap": BacklashPreload}
 
 
 def nominal_hand(chain: Chain, frames: np.ndarray, kinds: Sequence[type[ParameterBlock]] = AT_REST) -> HandModel:

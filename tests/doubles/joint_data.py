@@ -13,6 +13,7 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.joints.correction import InputModel, input_model
 from calibration.stages.joints.model import JointModel, exponents
 from tests.doubles import rigid_robot
+from tests.doubles.rigid_robot import with_values
 
 N = len(rigid_robot.JOINTS)
 OFFSET = np.array([0.0, 4e-3, -3e-3, 4e-3, -4e-3, 0.106, 0.024, 0.027])
@@ -29,7 +30,7 @@ LAB = Laboratory(mjcf.urdf(), described())
 
 def hand() -> HandModel:
     nominal = nominal_hand(chain_of(mjcf.urdf(), described()), np.zeros(12))
-    return nominal.with_values(offset=OFFSET)
+    return with_values(nominal, offset=OFFSET)
 
 
 def inputs() -> InputModel:

@@ -6,9 +6,11 @@ import numpy as np
 import pinocchio as pin
 
 from calibration.numerics.signals import RATE
+from calibration.prediction.base_pose import BaseInTrial
 from calibration.recording.schema import Wheel
 from calibration.recording.trial import Trial
 from calibration.stages.suspension.base_response import BaseResponse, Forcing
+from calibration.stages.suspension.rest_frame import rest_of
 from tests.doubles import rigid_robot
 
 WHEELS = tuple(
@@ -59,3 +61,10 @@ def moved(trial: Trial, x: np.ndarray, t: np.ndarray) -> Trial:
         T = T_LAB_BASE @ pin.SE3(pin.exp3(x_k[3:]), x_k[:3]).homogeneous @ np.linalg.inv(T_LAB_BASE)
         position[k] = position[k] @ T[:3, :3].T + T[:3, 3]
     return replace(trial, marker_position=position)
+
+
+def base_poses(suspension, lab, trial, source) -> np.ndarray:
+    """T_lab_B (n, 4, 4) of the base's marker body at `t_mocap`; outside the wrench's recording it stays."""
+    rest = rest_of(lab.lab.description, trial, lab.T_base_B)
+    base = BaseInTrial(suspension, lab, trial, rest.T_lab_0 @ rest.T_0_B)
+    return rest.poses(base.displacement(source, rest))

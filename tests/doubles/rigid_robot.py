@@ -16,6 +16,8 @@ from calibration.mocap.postures import Postures
 from calibration.numerics.signals import play
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial, write_trial
+from calibration.robot.blocks import BacklashPreload, Compliance, EncoderZeros, Frames
+from calibration.robot.hand import HandModel
 
 JOINTS = ("torso_lift_joint", *(f"arm_{i}_joint" for i in range(1, 8)))
 GRID = 500.0
@@ -263,3 +265,14 @@ def postures(truth: Truth, q: np.ndarray, sigma: float = 1e-9, seed: int = 0) ->
     rng = np.random.default_rng(seed)
     T = np.array([T @ se3(sigma * rng.normal(size=6)) for T in hand_in_base(truth, q)])
     return Postures(q + truth.offset, T, np.tile(sigma**2 * np.eye(6), (len(q), 1, 1)), np.zeros(len(q)))
+
+
+_READINGS = {"offset": EncoderZeros, "compliance": Compliance, "gap": BacklashPreload}
+
+
+def with_values(model: HandModel, **values: np.ndarray) -> HandModel:
+    """The model with other values of base, hand, offset, compliance or gap."""
+    frames = np.concatenate([values.get("base", model.base), values.get("hand", model.hand)])
+    new = {Frames: frames} | {kind: values[name] for name, kind in _READINGS.items() if name in values}
+    blocks = tuple(replace(b, values=np.asarray(new.get(type(b), b.values))) for b in model.blocks)
+    return replace(model, blocks=blocks)

@@ -18,6 +18,7 @@ from calibration.robot.hand import nominal_hand
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.verdict import Verdict
 from tests.doubles import rigid_robot
+from tests.doubles.rigid_robot import with_values
 
 
 def all_bytes(folder: Path) -> dict[str, bytes]:
@@ -51,8 +52,8 @@ def test_zeros_read_back_close_the_loop(estimate, chain, tmp_path):
 
 
 def test_zeros_of_an_elastic_robot_carry_its_compliance(chain, tmp_path):
-    elastic = nominal_hand(chain, np.zeros(12)).with_values(
-        offset=0.01 * np.arange(8.0), compliance=1e-4 * np.arange(8.0)
+    elastic = with_values(
+        nominal_hand(chain, np.zeros(12)), offset=0.01 * np.arange(8.0), compliance=1e-4 * np.arange(8.0)
     )
     (tmp_path / "zeros.yaml").write_text(zeros_text(elastic))
     zeros = read_zeros(tmp_path / "zeros.yaml")

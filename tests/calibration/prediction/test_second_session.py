@@ -10,6 +10,7 @@ from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.registration import fit_frames
+from tests.doubles.rigid_robot import with_values
 
 MARKERS = np.array([[0.1, 0.0, 0.05], [-0.05, 0.1, 0.1]])
 
@@ -31,7 +32,7 @@ def postures(n, n_joints, seed=1):
 
 def test_remounted_markers_are_found_where_they_are(hand, description):
     rng = np.random.default_rng(2)
-    moved = hand.with_values(base=hand.base + 3e-3 * rng.normal(size=6), hand=hand.hand + 8e-3 * rng.normal(size=6))
+    moved = with_values(hand, base=hand.base + 3e-3 * rng.normal(size=6), hand=hand.hand + 8e-3 * rng.normal(size=6))
     q = postures(8, len(description.joints))
     found = fit_frames(hand, q, moved.poses(q), description)
     np.testing.assert_allclose(found.base, moved.base, atol=1e-9)
@@ -54,7 +55,7 @@ def test_what_is_left_of_the_markers_is_smallest(hand, description):
     for k in range(12):
         step = 1e-4 * np.eye(12)[k]
         for sign in (1.0, -1.0):
-            other = best.with_values(base=best.base + sign * step[:6], hand=best.hand + sign * step[6:])
+            other = with_values(best, base=best.base + sign * step[:6], hand=best.hand + sign * step[6:])
             assert misfit(other) > misfit(best)
 
 

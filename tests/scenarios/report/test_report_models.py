@@ -33,6 +33,7 @@ from scenarios.report.sections import payload as loads
 from tests.calibration.stages.suspension.test_suspension_fit import C, K, record
 from tests.doubles import joint_data, rigid_robot
 from tests.doubles.moving_base import WHEELS
+from tests.doubles.rigid_robot import with_values
 
 MOVES = np.array([False, False, True, True, True, False])
 CLOCKS = tuple(Clock(i, 0.0, 0.0, np.zeros((2, 2)), 0.0, 1e-4) for i in ("robot", "plate"))
@@ -82,7 +83,7 @@ def known_estimate(**changes) -> Estimate:
 
 def linked(trial):
     """The trial with link readings that the known joint models make of its motor readings."""
-    inputs = input_model(joint_data.LAB, joint_data.hand().with_values(offset=np.zeros(8)))
+    inputs = input_model(joint_data.LAB, with_values(joint_data.hand(), offset=np.zeros(8)))
     asked, y = inputs.inputs(trial.t_robot, trial.q_motor), np.zeros_like(trial.q_motor)
     j, model = rigid_robot.JOINTS.index(JOINT), known_joint()[0]
     y[:, j] = model.discrepancy(asked.theta[:, j], asked.tau[:, j], asked.velocity[:, j])

@@ -15,6 +15,7 @@ from calibration.stages.geometry.hand_residual import fit
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.parameters import geometry_parameters
 from tests.doubles import rigid_robot
+from tests.doubles.rigid_robot import with_values
 
 HELD = np.array([0.0, 0.0, 1.0, 1.5, 1.5, 3.0, 12.0, 10.0]) * 1e-3
 DESCRIBED = rigid_robot.described()
@@ -79,7 +80,7 @@ def test_the_bayes_factor_is_that_of_the_data_s_likelihoods(chain):
 
 
 def test_zeros_of_a_robot_with_play_carry_it(chain, tmp_path):
-    played = nominal_hand(chain, np.zeros(12)).with_values(compliance=1e-4 * np.arange(8.0), gap=2.0 * HELD)
+    played = with_values(nominal_hand(chain, np.zeros(12)), compliance=1e-4 * np.arange(8.0), gap=2.0 * HELD)
     (tmp_path / "zeros.yaml").write_text(zeros_text(played))
     zeros, q = read_zeros(tmp_path / "zeros.yaml"), rigid_robot.random_angles(np.random.default_rng(0), 5)
     tau = chain.gravity_torques(q)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration import Dataset, Estimate
-from calibration.evaluation.joint_regimes import on_validation
+from calibration.evaluation.joint_regimes import residuals, validation_qualities
 from calibration.mocap.postures import passed_rows
 from calibration.numerics.signals import play
 from calibration.recording.trial import Trial
@@ -14,7 +14,7 @@ from calibration.robot.chain import Chain
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints import repetitions
-from calibration.stages.joints.correction import JointModels
+from calibration.stages.joints.correction import JointModels, correct
 from calibration.stages.joints.degree_selection import Candidate
 from calibration.stages.joints.hand_selection import nearest_hand
 from calibration.stages.joints.repetitions import on_repetitions
@@ -64,6 +64,11 @@ def test_without_markers_the_lowest_degree_worth_trying_is_taken() -> None:
     one, two = (option(data, [t.q_motor for t in data], ARM_6, 1.0, k) for k in (1, 2))
     chosen = nearest_hand(joint_data.described(), data, ROBOT, joint_data.hand(), {}, {"arm_6_joint": (one, two)})
     assert chosen == {"arm_6_joint": one}
+
+
+def on_validation(models, trials, robot):
+    corrected = ((t, correct(models.of_trial(t.id), t.t_robot, t.q_motor)) for t in trials)
+    return validation_qualities(models, [residuals(models, trial, c, robot) for trial, c in corrected])
 
 
 def test_play_is_explained_in_motion_and_not_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,6 @@ import pytest
 import mjcf
 from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import to_vector
-from calibration.prediction.base_pose import base_poses
 from calibration.recording.clock import Clock
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.suspension.base_response import laboratory
@@ -16,7 +15,7 @@ from calibration.stages.suspension.rest_frame import rest_of, upright
 from calibration.stages.suspension.stage import fit_suspension
 from calibration.stages.suspension.wheels import matrices, wheel_model
 from tests.doubles import rigid_robot
-from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved, values
+from tests.doubles.moving_base import T_LAB_BASE, WHEELS, base_poses, moved, values
 
 DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
 TRUTH = rigid_robot.Truth(marker_sigma=2e-6, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))
