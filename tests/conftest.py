@@ -1,5 +1,6 @@
 """One thread of linear algebra for all tests, set before numpy is loaded: several fight over the cores."""
 
+import gc
 import os
 
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -9,6 +10,15 @@ import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 
 from tests.acceptance.claims import keep  # noqa: E402
+
+
+def pytest_sessionstart():
+    gc.disable()  # a fifth of the collection's time looks for garbage among modules that stay
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ a URDF read from a recording comes without its files. Distances below a clearanc
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import coal
@@ -42,10 +43,14 @@ class Shapes:
         """Whether the URDF has any shape at all."""
         return any(not o.name.startswith(("marker:", _FLOOR)) for o in self.geometry.geometryObjects)
 
+    @cached_property
+    def _work(self) -> tuple[pin.Data, pin.GeometryData]:
+        """Where Pinocchio keeps poses and contacts; each query overwrites them."""
+        return self.chain.nominal.createData(), _requests(self.geometry)
+
     def collides(self, q: np.ndarray) -> np.ndarray:
         """(n,) whether the robot touches itself or the floor at q (n, n_measured)."""
-        model, geometry = self.chain.nominal, self.geometry
-        data, shapes = model.createData(), _requests(geometry)
+        model, geometry, (data, shapes) = self.chain.nominal, self.geometry, self._work
         return np.array(
             [pin.computeCollisions(model, data, geometry, shapes, row, True) for row in self.chain.configurations(q)],
             dtype=bool,
@@ -53,8 +58,7 @@ class Shapes:
 
     def parted(self, q: np.ndarray) -> "Shapes":
         """Without the pairs that touch in nearly all of q (n, n_measured): they are joined."""
-        model, geometry = self.chain.nominal, self.geometry
-        data, shapes = model.createData(), _requests(geometry)
+        model, geometry, (data, shapes) = self.chain.nominal, self.geometry, self._work
         often = np.zeros(len(geometry.collisionPairs))
         for row in self.chain.configurations(q):
             pin.computeCollisions(model, data, geometry, shapes, row, False)

@@ -9,6 +9,7 @@ import datetime
 import io
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -103,8 +104,9 @@ def text(instance: Any, beside: Mapping[str, Any] | None = None) -> str:
     return stream.getvalue()
 
 
+@lru_cache(maxsize=32)
 def _parse(text: str, where: str) -> Any:
-    """Load YAML with the line and column of every value."""
+    """Load YAML with the line and column of every value; nobody edits what is found."""
     try:
         return yaml_of(text, where, YAML(typ="rt", pure=True).load)
     except InputError as error:

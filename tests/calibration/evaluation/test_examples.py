@@ -27,7 +27,12 @@ def example(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "share"), [("constant_offset", 0.95), ("least_squares", 0.5), ("residual_model", 0.95)]
+    ("name", "share"),
+    [
+        pytest.param("constant_offset", 0.95, marks=pytest.mark.slow),
+        ("least_squares", 0.5),
+        ("residual_model", 0.95),
+    ],
 )
 def test_an_example_predicts_better_than_the_datasheet(folder, recordings, tmp_path, name, share):
     if name == "residual_model":
