@@ -23,6 +23,10 @@ from calibration.robot.laboratory import Laboratory
 from calibration.verdict import Verdict
 
 STAGE = "suspension"
+SCALE, TURN = (
+    "plate.scale",
+    "plate.turn",
+)  # what a warning's `moves` say of the plate: its scale's error [-], angle [rad]
 _LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or its inverse, in any units
 _SLOW = 2.5  # [Hz] below the base's resonance, where plate and dynamics agree
 _OUTSIDE = 0.03  # [m] the centre of pressure may be outside the wheels
@@ -107,7 +111,7 @@ def _against_dynamics(
         )
         if off:
             message += f"; what is missing is as if {off} stood off the plate"
-        yield Verdict(STAGE, "warning", message)
+        yield Verdict(STAGE, "warning", message, (((SCALE, float(-rest[2] / weight - 1.0)),),))
     pairs = _slow(plate, dynamics)
     p, d = (np.concatenate(a) for a in zip(*pairs, strict=True))
     mirrored = [name for k, name in enumerate(_NAMES) if _is_mirrored(k, p[:, k], d[:, k])]
@@ -123,7 +127,7 @@ def _against_dynamics(
         yield Verdict(STAGE, "refused", _misplaced(outside))
     elif abs(psi) > _TURNED:
         message = f"plate rotated by {np.degrees(psi):.1f} deg about the vertical against the lab"
-        yield Verdict(STAGE, "warning", message)
+        yield Verdict(STAGE, "warning", message, (((TURN, psi),),))
 
 
 def weight_spread(lab: Laboratory) -> float:

@@ -10,11 +10,13 @@ Where there is no plate the wrench is that of inverse dynamics.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from calibration.checks.plates import STAGE, moved_by, wrong_plate
+from calibration.checks.plates import SCALE, STAGE, TURN, moved_by, wrong_plate
 from calibration.inference.parameters import Combination, Model
+from calibration.numerics.lie import skew
 from calibration.numerics.signals import RATE
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -63,7 +65,27 @@ def fit_suspension(
     if not responses.plate:
         found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
     suspension, findings = _fitted(lab.description, responses, full)
-    return suspension, (*found, *findings)
+    return suspension, (*(with_springs_moved(v, suspension) for v in found), *findings)
+
+
+def with_springs_moved(found: Verdict, suspension: Suspension) -> Verdict:
+    """A warning of a plate off by a scale s or an angle psi, with the springs it may have moved.
+
+    dK = s K + psi (Z K - K Z) / 2, C alike, Z the turn about the vertical of forces and moments: the plate's wrench is
+    turned, the motion is not, and K is symmetric.
+    """
+    if not found.moves:
+        return found
+    ((size,),) = found.moves
+    scale, turn = (size[1] if size[0] == what else 0.0 for what in (SCALE, TURN))
+    Z = np.kron(np.eye(2), skew(np.array([0.0, 0.0, 0.5 * turn])))
+    turned = {
+        f"suspension.{letter}.{i + 1}{j + 1}": float((Z @ M - M @ Z)[i, j])
+        for letter, M in (("K", suspension.K), ("C", suspension.C))
+        for i, j in zip(*np.triu_indices(6), strict=True)
+    }
+    moved = tuple((p.name, scale * p.value + turned.get(p.name, 0.0)) for p in suspension.parameters)
+    return replace(found, moves=(moved,))
 
 
 def _moved_bases(responses: Sequence[BaseResponse]) -> dict[str, str]:

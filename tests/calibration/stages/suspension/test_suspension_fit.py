@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import mjcf
+from calibration.checks.plates import TURN
 from calibration.mocap.cluster_pose import poses_of
 from calibration.numerics.lie import to_vector
 from calibration.recording.clock import Clock
@@ -12,8 +13,9 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.modal_response import modes_of
 from calibration.stages.suspension.rest_frame import rest_of, upright
-from calibration.stages.suspension.stage import fit_suspension
+from calibration.stages.suspension.stage import fit_suspension, with_springs_moved
 from calibration.stages.suspension.wheels import matrices, wheel_model
+from calibration.verdict import Verdict
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import T_LAB_BASE, WHEELS, base_poses, moved, values
 
@@ -147,6 +149,26 @@ def turned(trial, degrees):
 def test_a_slightly_turned_plate_is_reported(trials):
     for degrees in (5.0, 8.0):
         assert f"rotated by {degrees:.0f}" in said(fit([turned(t, degrees) for t in trials])[1], "warning")
+
+
+def test_springs_may_be_off_by_the_scale_of_a_doubtful_plate(trials, fitted):
+    suspension, verdicts = fit([plated(t, 1.2 * t.plate_wrench[:, 0]) for t in trials])
+    (moved,) = next(v.moves for v in verdicts if v.moves)
+    known, clean = ({p.name: p.value for p in s.parameters} for s in (suspension, fitted[0]))
+    x = np.array([[size, known[n] - clean[n]] for n, size in moved if n in clean and n.startswith("suspension.K")])
+    assert x[:, 0] @ x[:, 1] > 0.9 * np.linalg.norm(x[:, 0]) * np.linalg.norm(x[:, 1])
+    assert np.linalg.norm(x[:, 0]) == pytest.approx(np.linalg.norm(x[:, 1]), rel=0.25)
+
+
+def test_springs_may_be_off_by_the_turn_of_a_doubtful_plate(fitted):
+    found = with_springs_moved(Verdict("suspension", "warning", "", (((TURN, 1e-4),),)), fitted[0])
+    R = np.kron(np.eye(2), pin.exp3(np.array([0.0, 0.0, 1e-4])))
+    exact = 0.5 * (R @ fitted[0].K + fitted[0].K @ R.T) - fitted[0].K
+    for name, size in found.moves[0]:
+        if name.startswith("suspension.K."):
+            assert size == pytest.approx(
+                exact[int(name[-2]) - 1, int(name[-1]) - 1], abs=1e-7 * np.abs(fitted[0].K).max()
+            )
 
 
 @pytest.mark.parametrize(("wheel", "share"), [(0, 1.0 / 6.0), (2, 1.0 / 6.0), (5, 0.12)])
