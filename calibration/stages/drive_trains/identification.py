@@ -38,7 +38,7 @@ from calibration.stages.drive_trains.train_fit import (
     weights,
 )
 
-_MOST, _LEAST = 4, 0.02  # modes, and the least torque [N.m rms] one is worth
+_MOST, _LEAST = 6, 0.005  # modes, and the least torque [N.m rms] one is worth: fewer make a load too large or small
 _THINNED = 10  # samples between those the modes are of
 _FRICTION, _TORQUE = 0.15, 0.045  # share of the friction, and [N.m], to which a load is not known
 _SPREAD = 0.15  # least standard deviation of where trials start [-]
