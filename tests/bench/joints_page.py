@@ -56,8 +56,8 @@ def robots(folder: Path) -> list[tuple[str, dict]]:
     about = mapping(folder / "scenario.yaml")
     found = figures(load(folder / "dataset"), load_estimate(folder / "estimate"), folder / "truth")
     spread = about["twin"]["widths"]["spread"]
-    name = f"seed {about['seed']}" + (f" with `twin.widths.spread={spread:g}`" if spread else "")
-    return [(about["name"], {"robot": name, "mrad": _plain(found)})]
+    name = about["name"] + (f", twin.widths.spread={spread:g}" if spread else "")
+    return [(name, {"robot": f"seed {about['seed']}", "mrad": _plain(found)})]
 
 
 def _plain(found: Sequence[Magnitude]) -> dict[str, float]:
