@@ -9,7 +9,7 @@ are log-normal and wide: nothing here is of a particular robot.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -110,10 +110,12 @@ class WheelSet:
         With -Fz, My, -Mx so that sum_i max(N_i, 0) (1, x_i, y_i) is what they were: N_i of all that stay on the floor
         and, the springs being linear, heave and tilt are those of the wheels in contact.
         """
-        n, G = self.loads(1.0)
+        (n, G), loads = self._alike, wrench[:, _LOAD] * _SIGN
+        lifted = (n + loads @ G.T).min(axis=1) < 0.0
+        if not lifted.any():
+            return wrench
         A, found = np.column_stack([np.ones(len(n)), self.position]), wrench.copy()
-        loads = wrench[:, _LOAD] * _SIGN
-        for row in np.flatnonzero((n + loads @ G.T).min(axis=1) < 0.0):
+        for row in np.flatnonzero(lifted):
             load = loads[row]
             for _ in range(len(n)):
                 on = n + G @ load > 0.0
@@ -124,6 +126,11 @@ class WheelSet:
                     break
             found[row, _LOAD] = load * _SIGN
         return found
+
+    @cached_property
+    def _alike(self) -> tuple[np.ndarray, np.ndarray]:
+        """n and G of wheels that share the load alike."""
+        return self.loads(1.0)
 
     def stiffness(self, p: SlipParameters) -> np.ndarray:
         """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""
