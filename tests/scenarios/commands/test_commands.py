@@ -1,5 +1,6 @@
 """The command line: what it runs and what it prints. The engines are replaced by small fakes."""
 
+import json
 import subprocess
 import sys
 from importlib.metadata import version
@@ -22,12 +23,18 @@ def test_help_and_import_touch_no_engine():
     assert done.stdout.split() == []
 
 
-def test_the_list_of_scenarios_needs_no_engine():
-    code = "import sys; from scenarios.commands import main; main.main(['list'])"
+@pytest.mark.parametrize(
+    ("arguments", "shown"),
+    [(("list",), "humanoids2024  "), (("check", ".", "--max", "model_2.mm=2"), "ok     model_2.mm")],
+)
+def test_lists_and_limits_need_no_engine(arguments, shown, tmp_path):
+    row = {"model": "model_2", "base": "fixed", "encoder": "motor", "trials": "dynamic"}
+    (tmp_path / "evaluation.json").write_text(json.dumps({"rows": [row | {"position_rmse_component_mm": 1.0}]}))
+    code = f"import sys; from scenarios.commands import main; main.main({list(arguments)})"
     heavy = {"mujoco", "pinocchio", "scipy", "matplotlib", "netCDF4"}
     script = f"try:\n    {code}\nfinally:\n    print('loaded', *({heavy} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert "humanoids2024  " in done.stdout and done.stdout.splitlines()[-1].split() == ["loaded"]
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert shown in done.stdout and done.stdout.splitlines()[-1].split() == ["loaded"]
 
 
 def test_the_installed_command_is_this_one():
