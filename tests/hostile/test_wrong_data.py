@@ -10,6 +10,7 @@ from calibration.robot.laboratory import Laboratory
 from tests.doubles import rigid_robot
 from tests.hostile import random_cases
 from tests.hostile.campaign import Campaign, scaled
+from tests.hostile.laboratory_kinds import KINDS
 from tests.hostile.spoilt import reference_of, tried
 from tests.hostile.wrong_data import FAST, TABLE, VALIDATION
 
@@ -40,7 +41,9 @@ def test_nothing_is_said_of_good_recordings(rigid):
     assert not said(rigid[0].folder)
 
 
-@pytest.mark.parametrize("mistake", FAST, ids=lambda m: m.name)
+@pytest.mark.parametrize(
+    "mistake", [*FAST, *(pytest.param(m, marks=pytest.mark.slow) for m in KINDS)], ids=lambda m: m.name
+)
 def test_a_mistake_seen_in_the_recordings_is_named(rigid, mistake, tmp_path):
     found = said(mistake.spoil(rigid[1]).written(tmp_path / "data"))
     assert any(mistake.says in message for message in found), found
