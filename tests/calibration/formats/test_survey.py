@@ -19,6 +19,7 @@ from calibration.formats.survey.trials import suffixes
 from calibration.formats.survey.view import FileView
 from scenarios.files.errors import ScenarioError
 from scenarios.steps import import_export
+from tests.calibration.formats.test_bag import trial, write_bag
 from tests.calibration.formats.test_csv import postures, series, write_csv
 from tests.doubles.real_postures import ROOT
 
@@ -70,6 +71,15 @@ def test_a_wrist_sensor_beside_the_joints_is_drafted_and_asks_whose_wrench_it_is
         text = draft(session, "robot.urdf", ["log.csv"])
         assert "wrist: {force: [wrist_Fx, wrist_Fy, wrist_Fz], moment: [wrist_Mx, wrist_My, wrist_Mz]" in text
         assert f"wrist_link: {name}" in text and text.count("whose wrench") == 1 and not session.views[0].plates
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_a_wrist_sensor_in_a_bag_is_drafted_by_its_topic(tmp_path, ros):
+    path = tmp_path / ("log.bag" if ros == 1 else "log")
+    write_bag(path, trial(), ros)
+    text = draft(session_of([path], mjcf.urdf()), "robot.urdf", [path.name])
+    assert "wrist: /wrist_ft\n" in text and "wrist_link: wrist_ft_link  # CHOOSE" in text
+    assert "wrist_convention: action  # CHOOSE: whose wrench" in text
 
 
 def test_a_log_of_one_file_asks_for_one_line(tmp_path):
