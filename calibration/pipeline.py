@@ -21,7 +21,7 @@ from calibration.design.next_postures import record_next
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
 from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.estimate.rows import MAIN
-from calibration.inference.parameters import widened
+from calibration.inference.parameters import scaled, widened
 from calibration.mocap.dwells import resting
 from calibration.mocap.labels import relabelled_trials
 from calibration.mocap.measured_trial import MeasuredTrial
@@ -259,7 +259,8 @@ def _cross_validated(estimate: Estimate, data: StageInput) -> Estimate:
     row, lab = _refitted(estimate), data.lab
     found = cross_validated(lab.chain, lab.description, data.static, estimate.models, row)
     main = estimate.main if found.best in ("", row) else found.best
-    return replace(estimate, verdicts=(*estimate.verdicts, *found.verdicts), main=main)
+    models = tuple(scaled(m, found.excess) if m.name == "full" and m.name == row else m for m in estimate.models)
+    return replace(estimate, models=models, verdicts=(*estimate.verdicts, *found.verdicts), main=main)
 
 
 def _bundled(estimate: Estimate) -> bool:

@@ -118,6 +118,19 @@ def widened(model: Model, directions: Iterable[Direction]) -> Model:
     )
 
 
+def scaled(model: Model, factor: float) -> Model:
+    """The model with all standard deviations times a factor [-]."""
+    return replace(
+        model,
+        parameters=tuple(replace(p, sigma=factor * p.sigma) for p in model.parameters),
+        combinations=tuple(replace(c, sigma=factor * c.sigma) for c in model.combinations),
+        covariance=factor**2 * model.covariance,
+        reading_sigma=factor * model.reading_sigma,
+        hand_error=factor * model.hand_error,
+        random=factor**2 * model.random,
+    )
+
+
 @dataclass(frozen=True)
 class Prior:
     """Independent Gaussian priors.

@@ -22,7 +22,7 @@ from calibration.mocap import Postures, mean_postures
 from calibration.pipeline import calibrate
 from calibration.recording import Dataset, load
 from calibration.robot import chain_of
-from calibration.stages.geometry import calibrate_gears, calibrate_geometry
+from calibration.stages.geometry import as_left_out, calibrate_gears, calibrate_geometry
 from calibration.verdict import Verdict
 from scenarios.files import yaml_file
 from scenarios.files.errors import ScenarioError
@@ -128,4 +128,5 @@ def _estimate(dataset: Dataset) -> Estimate:
     verdicts = (*known.verdicts, *(v for _, findings in found for v in findings))
     if refused := [v.message for v in verdicts if v.verdict == "refused"]:
         raise NotCalibrated(refused)
-    return replace(known, models=(*known.models, *(model for model, _ in found)), verdicts=verdicts)
+    models = (found[0][0], as_left_out(chain, description, postures, found[1][0]))
+    return replace(known, models=(*known.models, *models), verdicts=verdicts)

@@ -2,12 +2,15 @@
 
     e_i = |p_B_H(q_i, theta_without_fold(i)) - p_i|       [m]
     rmse = sqrt(mean e_i^2),   interval: the middle 95 % of its values over bootstrap samples of the postures
+    excess = max(1, sqrt(mean e_i^2 / E_i)),    E_i = tr C_i, the mean square stated for i by its fold's fit and markers
 
 Folds are random fifths of the distinct postures; repeated ones are left out together. The row of the smallest error is
 delivered: few postures leave a geometry to its priors, which may be worse than none. Marker bodies whose shape or place
 was taken from these very postures are not made again without them; tests/data's postures show what that leaves out.
-An interval over postures says nothing of
-another session.
+An interval over postures says nothing of another session.
+
+Row `full` chooses from the same few postures which random errors there are, and takes their sizes for known: what it
+states is too small, by how much `excess` shows. All its standard deviations are multiplied by it.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,9 +21,12 @@ import numpy as np
 
 from calibration.errors import CalibrationError
 from calibration.inference import Model
+from calibration.inference.parameters import scaled
 from calibration.mocap.postures import Postures
+from calibration.numerics.lie import places
 from calibration.recording import Description
 from calibration.robot.chain import Chain
+from calibration.robot.hand_uncertainty import Spread, predicted_points
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.robot.parameter_block import joint_lengths
 from calibration.stages.geometry.gear_deflection import calibrate_gears
@@ -44,12 +50,20 @@ class LeftOut:
     Attributes:
         model: Row of the ladder.
         error: (n,) distance of the hand or its point [m]; NaN where a fold could not be fitted.
+        stated: (n,) its root mean square by the fold's fit [m]; of `full` only, NaN of other rows.
         residual: Root mean squared distance where all postures were fitted [m].
     """
 
     model: str
     error: np.ndarray
+    stated: np.ndarray
     residual: float
+
+    @property
+    def excess(self) -> float:
+        """Root mean square of the errors over those stated [-], at least 1."""
+        ratio = (self.error / self.stated) ** 2
+        return max(1.0, float(np.sqrt(np.nanmean(ratio)))) if np.isfinite(ratio).any() else 1.0
 
     @property
     def rmse(self) -> float:
@@ -72,10 +86,12 @@ class CrossValidation:
     Attributes:
         verdicts: The error of each row, and parameters far from nominal.
         best: The row of the smallest error; empty where none is to be had.
+        excess: Factor on the standard deviations of row `full`.
     """
 
     verdicts: tuple[Verdict, ...] = ()
     best: str = ""
+    excess: float = 1.0
 
 
 def left_out_errors(
@@ -86,14 +102,19 @@ def left_out_errors(
     parts = np.array_split(np.random.default_rng(0).permutation(of.max() + 1), FOLDS)
     folds, found = [np.flatnonzero(np.isin(of, part)) for part in parts], []
     for name in names:
-        whole = _errors(name, chain, description, postures, postures)
-        error = np.full(len(postures), np.nan)
+        whole, _ = _errors(name, chain, description, postures, postures)
+        error, stated = np.full((2, len(postures)), np.nan)
         for part in folds:
             kept = np.setdiff1d(np.arange(len(postures)), part)
-            error[part] = _errors(name, chain, description, postures.rows(kept), postures.rows(part))
+            error[part], stated[part] = _errors(name, chain, description, postures.rows(kept), postures.rows(part))
         if np.isfinite(error).any():
-            found.append(LeftOut(name, error, _rms(whole)))
+            found.append(LeftOut(name, error, stated, _rms(whole)))
     return tuple(found)
+
+
+def as_left_out(chain: Chain, description: Description, postures: Postures, full: Model) -> Model:
+    """Row `full` of the postures with the standard deviations that postures left out show."""
+    return scaled(full, max((f.excess for f in left_out_errors(chain, description, postures, ("full",))), default=1.0))
 
 
 def cross_validated(
@@ -120,13 +141,15 @@ def cross_validated(
     if best is None or row not in {f.model for f in found}:
         message = f"no cross-validated error of {row}: {n} distinct postures are too few to leave a fifth out"
         return CrossValidation((_not_better(message, BASELINE),), BASELINE)
-    message = _errors_in_words(row, found)
+    message, excess = _errors_in_words(row, found), max(f.excess for f in found)
+    if excess > 1.0:
+        message += f"; standard deviations of full are multiplied by {excess:.2f}, errors left out over those stated"
     if best.model != row:
-        return CrossValidation((_not_better(message, best.model),), best.model)
-    verdicts = [Verdict(STAGE, "ok", message), *_worth_looking_at(fitted[row])]
+        return CrossValidation((_not_better(message, best.model),), best.model, excess)
+    verdicts = [Verdict(STAGE, "ok", message), *_worth_looking_at(scaled(fitted[row], excess))]
     if row == list(fitted)[-1]:
         verdicts.append(_more(best))
-    return CrossValidation(tuple(verdicts), row)
+    return CrossValidation(tuple(verdicts), row, excess)
 
 
 def _errors_in_words(row: str, found: tuple[LeftOut, ...]) -> str:
@@ -148,18 +171,28 @@ def _not_better(message: str, delivered: str) -> Verdict:
 
 
 def _errors(name: str, chain: Chain, description: Description, fitted: Postures, predicted: Postures) -> np.ndarray:
-    """Distances (n,) [m] at `predicted` of a row fitted to `fitted`, NaN where that must not be used."""
+    """Distances and, of `full`, those stated (2, n) [m] at `predicted` of a row fitted to `fitted`.
+
+    NaN where that must not be used.
+    """
+    found = np.full((2, len(predicted)), np.nan)
     try:
         model, findings = _FITS[name](chain, description, fitted)
     except CalibrationError:
-        return np.full(len(predicted), np.nan)
+        return found
     if any(v.verdict == "refused" for v in findings):
-        return np.full(len(predicted), np.nan)
-    T = hand_of(model, chain, nominal_frames(chain, description)).poses(predicted.q)
-    p = T[:, :3, 3] + T[:, :3, :3] @ predicted.point
-    T_seen = predicted.T_base_hand
-    seen = T_seen[:, :3, 3] if predicted.components == 3 else T_seen[:, :3, 3] + T_seen[:, :3, :3] @ predicted.point
-    return np.asarray(np.linalg.norm(p - seen, axis=1))
+        return found
+    hand = hand_of(model, chain, nominal_frames(chain, description))
+    if name == "full":
+        spread = Spread(
+            tuple(p.name for p in model.parameters), model.covariance, model.reading_sigma, model.hand_error
+        )
+        S = predicted_points(hand, spread, predicted.point[None], predicted.q).covariance[:, 0]
+        found[1] = np.sqrt(np.trace(S + predicted.covariance[:, :3, :3], axis1=1, axis2=2))
+    p, T_seen = places(hand.poses(predicted.q), predicted.point), predicted.T_base_hand
+    seen = T_seen[:, :3, 3] if predicted.components == 3 else places(T_seen, predicted.point)
+    found[0] = np.linalg.norm(p - seen, axis=1)
+    return found
 
 
 def _worth_looking_at(model: Model) -> tuple[Verdict, ...]:
