@@ -2,7 +2,7 @@
 
     e_i = |p_B_H(q_i, theta_without_fold(i)) - p_i|       [m]
     rmse = sqrt(mean e_i^2),   interval: the middle 95 % of its values over bootstrap samples of the postures
-    excess = max(1, sqrt(mean e_i^2 / E_i)),    E_i = tr C_i, the mean square stated for i by its fold's fit and markers
+    excess = max(1, sqrt(mean e_i^2 / E_i)),    E_i = tr C_i, the mean square stated for i by its fold's fit
 
 Folds are random fifths of the distinct postures; repeated ones are left out together. The row of the smallest error is
 delivered: few postures leave a geometry to its priors, which may be worse than none. Marker bodies whose shape or place
@@ -10,7 +10,8 @@ was taken from these very postures are not made again without them; tests/data's
 An interval over postures says nothing of another session.
 
 Row `full` chooses from the same few postures which random errors there are, and takes their sizes for known: what it
-states is too small, by how much `excess` shows. All its standard deviations are multiplied by it.
+states is too small, by how much `excess` shows. All its standard deviations are multiplied by it. Where priors decide
+most (`few`), C_i is of the fit of all postures, i among them: a fold's may have quite other random errors.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,7 +31,7 @@ from calibration.robot.hand_uncertainty import Spread, predicted_points
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.robot.parameter_block import joint_lengths
 from calibration.stages.geometry.gear_deflection import calibrate_gears
-from calibration.stages.geometry.guards import APART, distinct, fewest, groups
+from calibration.stages.geometry.guards import APART, distinct, few, fewest, groups
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.geometry.registration import STAGE as BASELINE
 from calibration.stages.geometry.registration import register
@@ -50,7 +51,7 @@ class LeftOut:
     Attributes:
         model: Row of the ladder.
         error: (n,) distance of the hand or its point [m]; NaN where a fold could not be fitted.
-        stated: (n,) its root mean square by the fold's fit [m]; of `full` only, NaN of other rows.
+        stated: (n,) its root mean square as stated [m]; of `full` only, NaN of other rows.
         residual: Root mean squared distance where all postures were fitted [m].
     """
 
@@ -102,11 +103,12 @@ def left_out_errors(
     parts = np.array_split(np.random.default_rng(0).permutation(of.max() + 1), FOLDS)
     folds, found = [np.flatnonzero(np.isin(of, part)) for part in parts], []
     for name in names:
-        whole, _ = _errors(name, chain, description, postures, postures)
-        error, stated = np.full((2, len(postures)), np.nan)
+        whole, stated = _errors(name, chain, description, postures, postures)
+        error = np.full(len(postures), np.nan)
         for part in folds:
             kept = np.setdiff1d(np.arange(len(postures)), part)
-            error[part], stated[part] = _errors(name, chain, description, postures.rows(kept), postures.rows(part))
+            error[part], own = _errors(name, chain, description, postures.rows(kept), postures.rows(part))
+            stated[part] = stated[part] if few(chain, postures) else own
         if np.isfinite(error).any():
             found.append(LeftOut(name, error, stated, _rms(whole)))
     return tuple(found)

@@ -128,9 +128,10 @@ def share_inside(model, postures):
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [12, 20, 40])
 @pytest.mark.parametrize("size", [1.0, 0.1, 0.02])
-def test_what_is_delivered_is_never_worse_than_registration_in_the_median_of_fifty_robots(n, size, claim):
+def test_what_is_delivered_is_never_worse_than_registration_in_the_median_of_robots(n, size, claim):
+    """Fifty robots where there is little to gain; sixteen where the median is far below."""
     ratio = []
-    for seed in range(50):
+    for seed in range(50 if size < 0.1 else 16):
         some, others = robot(seed, n, size)
         fitted = models(some)
         ratio.append(rms(delivered(some, fitted)[0], others) / rms(fitted[0], others))

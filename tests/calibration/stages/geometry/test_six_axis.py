@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from calibration.inference.parameters import scaled
 from calibration.mocap.postures import Postures
 from calibration.numerics.lie import exp6, from_vector, inverse, log6, to_vector
 from calibration.recording.schema import Description
@@ -57,14 +58,14 @@ def robot(seed, n):
 def judged(seed, n, description):
     """Cross-validated errors of registration and full [m], share of components of new poses in their 95 % interval."""
     postures, q, true = robot(seed, n)
-    rows = {f.model: f.rmse for f in left_out_errors(CHAIN, description, postures, ("registration", "full"))}
-    model, _ = calibrate_gears(CHAIN, description, postures)
+    rows = {f.model: f for f in left_out_errors(CHAIN, description, postures, ("registration", "full"))}
+    model = scaled(calibrate_gears(CHAIN, description, postures)[0], rows["full"].excess)
     names = [p.name for p in model.parameters]
     found = hand_of(model, CHAIN, np.zeros(12)).poses_and_derivatives(q, names=names)
     error = log6(inverse(true) @ found.T)
     variance = np.einsum("nij,jk,nik->ni", found.J, model.covariance, found.J)
     variance += ((found.J_joint * model.reading_sigma) ** 2).sum(axis=2) + np.repeat(model.hand_error**2, 3)
-    return rows["registration"], rows["full"], (np.abs(error) <= 1.959964 * np.sqrt(variance)).mean()
+    return rows["registration"].rmse, rows["full"].rmse, (np.abs(error) <= 1.959964 * np.sqrt(variance)).mean()
 
 
 @pytest.mark.slow
