@@ -57,7 +57,7 @@ def test_a_few_postures_calibrate_and_say_that_they_are_few(n, seen):
     fitted = models(some)
     best, found = delivered(some, fitted)
     assert best.name != "registration" and rms(best, others) < 0.5 * rms(fitted[0], others)
-    assert 1.0 < found.excess < 3.0 and f"multiplied by {found.excess:.2f}" in found.verdicts[0].message
+    assert found.excess > 1.0 and f"multiplied by {found.excess:.2f}" in found.verdicts[0].message
 
 
 def test_fewer_postures_have_wider_intervals():
