@@ -7,8 +7,8 @@ So a few steps are made from several starts, one of which hardly slips, and when
 tried at other values; it goes on from a better one.
 
 Where wheels are declared is not fitted, but looked for: of each wheel alone, by a step from the best point in the
-parameters and its place, whose prior is PLACE wide. Right places seem off by up to 14 mm on robots of development, at
-a chi-square of up to 4; a wrong one, by 30 mm, by 11 to 30 mm, 45 of 48 at a chi-square above 3.
+parameters and its place, whose prior is PLACE wide. Right places seem off by up to 14 mm on robots of development,
+mostly at a chi-square below 3; one that is wrong by 30 mm by 11 to 30, 45 of 48 above 3.
 """
 
 from collections.abc import Sequence

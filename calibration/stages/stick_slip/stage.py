@@ -75,8 +75,7 @@ def fit_stick_slip(
     fits: list[Direction] = []
     for source, _, campaign in usable:
         fits.append(fit_direction(source, campaign, fits[0].logarithms if fits else None))
-    calm = joined(wheels, [row for row, wild in zip(usable[0][1], fits[0].held_out.wild, strict=True) if not wild])
-    shift, chi2 = displaced(calm, descended(calm, tried(calm, [fits[0].logarithms])[0]).logarithms)
+    shift, chi2 = _shifts(wheels, usable[0][1], fits[0])
     if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
     directions = [_linear(fit, suspension) for fit in fits]
@@ -142,6 +141,23 @@ def _plain(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarFo
             square.append((left[motion.valid] ** 2).mean(axis=0))
             reach.append(blocks(reached(forcing.force @ compliance))[motion.valid].mean(axis=0))
     return plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
+
+
+def _shifts(
+    wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], fit: Direction
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shifts (m, 2) [m] and chi-squares (m,) of wheels by the trials that are not wild.
+
+    About the parameters of all trials and of these alone: the less significant one, as one of some trials is chance.
+    """
+    wild = fit.held_out.wild
+    calm = joined(wheels, [row for row, far in zip(rows, wild, strict=True) if not far])
+    points = [fit.logarithms]
+    if wild.any():
+        points.append(descended(calm, tried(calm, points)[0]).logarithms)
+    shifts, chi2 = (np.array(column) for column in zip(*(displaced(calm, p) for p in points), strict=True))
+    least, own = chi2.argmin(axis=0), np.arange(len(wheels.names))
+    return shifts[least, own], chi2[least, own]
 
 
 def _misplaced(names: Sequence[str], shift: np.ndarray, chi2: np.ndarray) -> Iterator[Verdict]:

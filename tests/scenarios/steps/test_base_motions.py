@@ -14,6 +14,7 @@ from calibration.stages.stick_slip.wheels import NAMES
 from scenarios.steps import run_steps
 from scenarios.steps.design import BASE_MOTIONS, with_base_motions
 from twin.campaign import describe_dataset
+from twin.motions import trajectory
 from twin.motions.motion import path_time
 from twin.motions.swings import CALIBRATION_SWINGS
 
@@ -40,6 +41,8 @@ def test_they_are_expected_to_show_every_wheel_better_than_the_swings():
     usual = np.sqrt(np.mean([np.diag(np.linalg.inv(each)) for each in total], axis=0))
     rows = [NAMES.index(name) for name in SHOWN]
     assert np.all(found.sigma[rows] < 0.9 * usual[rows])
+    for motion in found.motions:
+        trajectory("base", motion.t, motion.q)  # within the robot's limits, speeds included
 
 
 @pytest.mark.slow
