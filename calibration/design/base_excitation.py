@@ -2,9 +2,9 @@
 
     q(t) = q_0 + A (1 - cos 2 pi f s(t)) / 2,     ds/dt a ramp of RAMP seconds to 1, as abrupt as the robot allows
 
-from an admissible posture q_0 to another, q_0 + A, and back. At 0.25 of the highest speed wheels stick, which shows
-their springs; at all of it they slide, which shows their frictions. Of the candidates those are chosen in turn that
-leave least volume of the stick-slip parameters,
+from an admissible posture q_0 towards another, q_0 + A, and back; a lift, which is slow, stays. At 0.25 of the highest
+speed wheels stick, which shows their springs; at all of it they slide, which shows their frictions. Of the candidates
+those are chosen in turn that leave least volume of the stick-slip parameters,
 
     max  sum_f log det(S^-2 + sum_k H_k(f)),     H_k of `likelihood.Trials.normal` where markers show what is predicted
 
@@ -33,8 +33,7 @@ SECONDS, RAMP = 10.0, 0.12
 _CANDIDATES = 48
 _HERTZ = (0.2, 0.4)
 _SPEEDS = (0.25, 1.0)  # shares of the highest speed
-_FASTEST = 1.2  # [rad/s], a twentieth of it in m/s
-_SLIDE = 0.05
+_FASTEST = 1.2  # [rad/s]
 _PROBES = 12  # postures along a motion that are asked for contacts
 _FRICTIONS = (0.0, -0.5)  # logarithms over the prior's
 _STIFF = 1e9  # [N/m, N.m/rad] of heave and tilt
@@ -163,11 +162,10 @@ def _candidates(room: Room, rng: np.random.Generator) -> Sequence[tuple[np.ndarr
     s = np.clip(t - 1.5 * REST, 0.0, SECONDS - REST)
     s = np.where(s < RAMP, 0.5 * s**2 / RAMP, s - 0.5 * RAMP)
     chain, found = room.shapes.chain, []
-    limit = np.array([_FASTEST * (_SLIDE if chain.is_prismatic(j) else 1.0) for j in chain.measured])
-    ends = room.pool(2 * _CANDIDATES, rng)
+    lift, ends = np.array([chain.is_prismatic(j) for j in chain.measured]), room.pool(2 * _CANDIDATES, rng)
     for k, (a, b) in enumerate(zip(ends[::2], ends[1::2], strict=True)):
-        f = _HERTZ[k % 2]
-        share = _SPEEDS[k // 2 % 2] * float((limit / np.maximum(np.pi * f * np.abs(b - a), 1e-9)).min())
+        f, b = _HERTZ[k % 2], np.where(lift, a, b)
+        share = _SPEEDS[k // 2 % 2] * _FASTEST / (np.pi * f * float(np.abs(b - a).max()))
         q = a + min(share, 1.0) * 0.5 * (1.0 - np.cos(2.0 * np.pi * f * s))[:, None] * (b - a)
         along = a + np.linspace(0.0, min(share, 1.0), _PROBES)[:, None] * (b - a)
         if not (room.shapes.known and room.shapes.collides(along).any()):
