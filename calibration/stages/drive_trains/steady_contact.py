@@ -124,12 +124,19 @@ def _regressed(problem: Problem, side: np.ndarray, compliance: float) -> SteadyC
             w = np.where(used, data.weight * (NU + 1.0) / (NU * size[data.group] ** 2 + data.weight * r**2), 0.0)
             size = np.maximum(size * np.sqrt(np.bincount(data.group, w * r**2, data.n_groups) / count), _FLOOR)
     c = max(x[1], 0.02 * prior.width[1])
-    theta = np.maximum(np.append([x[0], c], x[2:p] / c), prior.least)
-    J = A.copy()  # by theta
-    J[:, 2:p] *= c
-    J[:, 1] += A[:, 2:p] @ theta[2:]
-    own = np.diag(np.append(prior.width**-2.0, np.append(_ZERO**-2.0, GAMMA_INFORMATION[1:])))
-    return SteadyContact(theta, x[p:], used, J, r, w, (J.T * w) @ J / problem.correlated + own)
+    theta = np.append(np.maximum(np.append([x[0], c], x[2:p] / c), prior.least), x[p:])
+    own = np.append(prior.width**-2.0, np.append(_ZERO**-2.0, GAMMA_INFORMATION[1:]))
+    meant, least = np.append(prior.nominal, np.zeros(5)), np.append(prior.least, np.full(5, -np.inf))
+    for _ in range(_WEIGHTED):  # what the priors mean: a load that is nearly all of modes has its size by them alone
+        J = A.copy()  # by theta
+        J[:, 2:p] *= theta[1]
+        r = np.where(used, y - J @ theta, 0.0)
+        J[:, 1] += A[:, 2:p] @ theta[2:p]
+        H = (J.T * w) @ J / problem.correlated + np.diag(own)
+        theta = np.maximum(
+            theta + np.linalg.solve(H, J.T @ (w * r) / problem.correlated + own * (meant - theta)), least
+        )
+    return SteadyContact(theta[:p], theta[p:], used, J, r, w, H)
 
 
 @dataclass(frozen=True)
