@@ -72,8 +72,15 @@ def test_attributes_of_a_recording_hold_no_value_of_the_sampled_robot(quick_run)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ("model_2", "model_3"),
+        pytest.param(("full",), marks=pytest.mark.xfail(strict=True, reason="3: 0.21 to 0.32 mm, 1/3: to 0.24 mm")),
+    ],
+)
 @pytest.mark.parametrize("factor", [3.0, 1.0 / 3.0])
-def test_the_headline_moves_by_a_tenth_at_most_when_all_priors_are_wider_or_narrower(quick_run, tmp_path, factor):
+def test_the_headline_moves_by_a_tenth_at_most_when_all_priors_are_wider_or_narrower(quick_run, tmp_path, factor, rows):
     dataset = copied(quick_run, tmp_path)
     path = dataset / "dataset.json"
     declared = json.loads(path.read_text())
@@ -81,7 +88,7 @@ def test_the_headline_moves_by_a_tenth_at_most_when_all_priors_are_wider_or_narr
     path.write_text(json.dumps(declared))
     estimate = calibration.calibrate(calibration.load(dataset))
     changed = calibration.evaluate(estimate, calibration.load(dataset))
-    for row in ("model_2", "model_3"):
+    for row in rows:
         assert mm(changed, row) == pytest.approx(mm(quick_run.evaluation, row), rel=0.10)
 
 
