@@ -45,7 +45,9 @@ def design(  # noqa: PLR0913  an option each
     if base is not None:
         loaded, shown = with_base_motions(loaded, base)
         known = [f"{n} {100.0 * s:.0f} %" for n, s in zip(shown.names, shown.sigma, strict=True) if s < _SHOWN]
-        typer.echo(f"Base motions: {base}, {len(shown.motions)}; standard deviations after them: {', '.join(known)}")
+        typer.echo(
+            f"Base motions: {base}, {len(shown.motions)}; expected standard deviations after them: {', '.join(known)}"
+        )
     with console.progress() as progress:
         found = designed(loaded, n, criterion, out, campaign, play, progress)
     plan, against = found.plan, found.comparison
