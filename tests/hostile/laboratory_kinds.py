@@ -1,4 +1,4 @@
-"""Mistakes of units, axes, order and names that the recordings alone show: rows as in `wrong_data`."""
+"""Mistakes of units, axes, order and names, rows as in `wrong_data`: seen in the recordings alone, and of the plate."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.recording.trial import Trial
 from tests.hostile.campaign import Campaign, Spoil, hidden
-from tests.hostile.wrong_data import Mistake
+from tests.hostile.wrong_data import STAGES, Mistake
 
 _DEGREES = 180.0 / np.pi
 _SWAPPED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -92,3 +92,19 @@ KINDS = (
     Mistake("base 1 and 3 exchanged", _labels(_pairs(("base1", "base3"))), "from its drawing"),
     Mistake("hidden markers put down as zero", _filled("zero"), "a marker moved"),
 )  # fmt: skip
+
+
+def _plate(name: str, change: Callable[[np.ndarray], np.ndarray], says: str) -> Mistake:
+    """The plate's wrench (n, plates, 6) changed."""
+    return Mistake(name, _array("plate_wrench", change), says, stages=(*STAGES, "suspension"))
+
+
+PLATE = (
+    _plate("moments in N.mm", lambda w: w * [1.0, 1.0, 1.0, 1e3, 1e3, 1e3], "plate place"),
+    _plate("forces in kgf", lambda w: w / 9.81, "plate scale"),
+    _plate("reaction", np.negative, "plate sign: Fz"),
+    _plate("moments first", lambda w: np.roll(w, 3, axis=2), "plate scale"),
+    _plate("plate upside down", lambda w: w * [1.0, -1.0, -1.0, 1.0, -1.0, -1.0], "plate sign: Fz"),
+    _plate("plate turned by half", lambda w: w * [-1.0, -1.0, 1.0, -1.0, -1.0, 1.0], "plate rotated by"),
+    _plate("Mx reversed", lambda w: w * [1.0, 1.0, 1.0, -1.0, 1.0, 1.0], "Mx mirror"),
+)
