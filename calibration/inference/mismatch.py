@@ -27,6 +27,7 @@ _SIGNS = 8_000
 _SEED = 20261122  # of the signs alone: the same residuals have the same p
 _LEFT = 1e-3  # [-] share of an effect's square that the parameters must leave for it to be excited
 _ABSORBED = 1e-3  # [-] share of an error left by the fit below which nothing is known of it
+_SINGULAR = 1e-14  # [-] share of the largest eigenvalue below which parameters are not determined
 _BLOCKS = 1.5  # blocks a direction, at least
 
 
@@ -41,17 +42,19 @@ class Effect:
 def mismatch(fit: Fit, parameters: ParameterSet, effects: Sequence[Effect], block: np.ndarray) -> tuple[Shown, ...]:
     """Test every effect on the residuals of a fit; block (n,) numbers rows that hang together."""
     H = fit.J_white.T @ fit.J_white + np.diag(parameters.prior.precision(fit.widths.prior))
-    U, s, _ = np.linalg.svd(np.linalg.solve(np.linalg.cholesky(H), fit.J_white.T).T, full_matrices=False)
+    value, V = np.linalg.eigh(H)
+    known = value > _SINGULAR * value[-1]
+    U, s, _ = np.linalg.svd(fit.J_white @ V[:, known] / np.sqrt(value[known]), full_matrices=False)
     rest, r = np.sqrt(np.maximum(1.0 - s**2, 0.0)), fit.r_white.ravel()
-    known = rest > _ABSORBED
-    errors = r + U @ ((np.where(known, 1.0 / np.where(known, rest, 1.0), 0.0) - 1.0) * (U.T @ r))
+    left = rest > _ABSORBED
+    errors = r + U @ ((np.where(left, 1.0 / np.where(left, rest, 1.0), 0.0) - 1.0) * (U.T @ r))
     number = np.unique(block, return_inverse=True)[1]
-    single = _full_size(errors, U[:, ~known], np.repeat(number, len(r) // len(number)))
+    single = _full_size(errors, U[:, ~left], np.repeat(number, len(r) // len(number)))
     found = []
     for effect in effects:
         N = (fit.whitener @ effect.N).reshape(len(r), -1)
-        left = N + U @ ((rest - 1.0)[:, None] * (U.T @ N))
-        found.append(_tested(effect, N, left, errors, single, number))
+        seen = N + U @ ((rest - 1.0)[:, None] * (U.T @ N))
+        found.append(_tested(effect, N, seen, errors, single, number))
     return holm(found)
 
 
