@@ -46,7 +46,7 @@ def test_a_push_is_the_reading_less_the_weight_and_loads_the_joints_by_its_power
 
 
 def test_a_small_force_is_no_push_and_without_a_sensor_there_is_none():
-    q, w, _ = readings(np.array([0.0, 0.0, 1.0]))
+    q, w, _ = readings(np.array([0.0, 0.0, 5.0]))  # what encoder zeros and tolerances of masses amount to
     assert hand_push(LAB.urdf, HUNG, T, q, w) is None
     assert hand_push(LAB.urdf, HUNG.model_copy(update={"wrist_link": None}), T, q, 10.0 * w) is None
     assert hand_push(LAB.urdf, HUNG, T, q, np.full_like(w, np.nan)) is None
