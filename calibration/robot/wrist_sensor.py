@@ -4,7 +4,7 @@
 
 w: reading, the hand's action on the sensor; f: wrench that moves what hangs on it, the nominal links beyond the sensor
 and the declared payload, of weight W, along the readings; w_0: mean of f + w in the trial's first second, in which
-nothing pushes. Zeros of encoders, tolerances of masses and a base that shakes left up to 0.37 W on ten robots that
+nothing pushes. Zeros of encoders, tolerances of masses and a base that shakes left up to 0.39 W on twenty robots that
 nothing pushed: the hand is pushed in trials in which p's force, averaged over 0.4 s, exceeds 0.75 W.
 """
 
