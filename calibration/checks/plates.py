@@ -23,10 +23,8 @@ from calibration.robot.laboratory import Laboratory
 from calibration.verdict import Verdict
 
 STAGE = "suspension"
-SCALE, TURN = (
-    "plate.scale",
-    "plate.turn",
-)  # what a warning's `moves` say of the plate: its scale's error [-], angle [rad]
+# What the `moves` of a warning say of a plate: error of its scale [-], its angle about the vertical [rad].
+SCALE, TURN = "plate.scale", "plate.turn"
 _LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or its inverse, in any units
 _SLOW = 2.5  # [Hz] below the base's resonance, where plate and dynamics agree
 _OUTSIDE = 0.03  # [m] the centre of pressure may be outside the wheels
