@@ -154,12 +154,12 @@ def from_vector(value: np.ndarray) -> np.ndarray:
     """Transforms (..., 4, 4) whose translation [m] and rotation vector [rad] are `value` (..., 6)."""
     flat = np.array(value, dtype=float, order="C").reshape(-1, 6)
     T = np.zeros((len(flat), 4, 4))
-    _from_vectors(flat, T)
+    from_vectors(flat, T)
     return T.reshape(*value.shape[:-1], 4, 4)
 
 
 @njit(cache=True, error_model="numpy")
-def _from_vectors(x: np.ndarray, T: np.ndarray) -> None:
+def from_vectors(x: np.ndarray, T: np.ndarray) -> None:
     """`from_vector` into zeros T (n, 4, 4): R = I + sin t / t [w]x + (1 - cos t) / t^2 [w]x^2."""
     for n in range(len(x)):
         w, R = x[n, 3:], T[n]

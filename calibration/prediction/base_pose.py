@@ -34,6 +34,7 @@ from calibration.stages.suspension.floor_wrench import Load, floor_load
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_at, upright
 
+_STILL = np.zeros((2, 3))
 _UPRIGHT = 1e-9  # [m/s2] gravity's components in two frames 0 that are one direction
 
 
@@ -98,19 +99,19 @@ class LoadedBase:
         """The same as the springs alone have it; `moved` is left as it was. `borne` as `WheelSet` has it."""
         if wrench.shape != (6,):
             raise ShapeError("wrench", wrench.shape, (6,))
-        w = self._action @ wrench
+        w = self.action @ wrench
         w = w if borne is None else borne(w[None])[0]
         if before is None:
             none = np.zeros(len(self.suspension.modes.tau), dtype=complex)
-            return BaseState(t, t, w, w, 1, none, none, np.zeros(6), np.eye(4)[None])
+            return BaseState(t, t, w, w, 1, none, none, np.zeros(6), np.eye(4)[None], _STILL)
         if t <= before.start + REST:
             n = before.n + 1
             return before._replace(t=t, wrench=w, rest=before.rest + (w - before.rest) / n, n=n)
         y, u, x = self.suspension.modes.advanced(before.y, before.u, w - before.rest, t - before.t)
-        return BaseState(before.start, t, w, before.rest, before.n, u, y, x, before.moved, before.slip)
+        return BaseState(before.start, t, w, before.rest, before.n, u, y, x, before.moved, _STILL)
 
     @cached_property
-    def _action(self) -> np.ndarray:
+    def action(self) -> np.ndarray:
         """From a wrench about the centre, lab axes, to one in frame 0 (6, 6)."""
         self._need_centre()
         return in_frame(np.eye(6)[:, None], self.centre[None], self.T_lab_0).T
@@ -131,11 +132,12 @@ class LoadedBase:
 
     def in_lab(self, x: np.ndarray) -> np.ndarray:
         """Motions of the lab (n, 4, 4) by displacements x (n, 6) of frame 0."""
-        return self._rest.poses(x)
+        return Rest(self.T_lab_0, self.T_0_lab).poses(x)
 
     @cached_property
-    def _rest(self) -> Rest:
-        return Rest(self.T_lab_0, inverse(self.T_lab_0))
+    def T_0_lab(self) -> np.ndarray:
+        """Inverse of T_lab_0."""
+        return inverse(self.T_lab_0)
 
 
 def loaded_base(suspension: Suspension, description: Description, T_lab_base: np.ndarray | None) -> LoadedBase:
@@ -161,6 +163,7 @@ class BaseState(NamedTuple):
         y: (k,) where the modes are.
         x: (6,) displacement by the springs on all axes [m, rad, frame 0].
         moved: (1, 4, 4) how the base moved in the lab.
+        acceleration: (2, 3) linear and angular of the base frame [m/s2, rad/s2, lab axes], as far as it slips.
         slip: State of a base that slips; None of one that does not.
     """
 
@@ -173,6 +176,7 @@ class BaseState(NamedTuple):
     y: np.ndarray
     x: np.ndarray
     moved: np.ndarray
+    acceleration: np.ndarray
     slip: SlipState | None = None
 
 

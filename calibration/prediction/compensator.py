@@ -250,7 +250,7 @@ class Compensator:
                 variance = partial(self.slipping.variance, state)
         arm, in_base = None, None
         if self.arm is not None and moving is not None:
-            loads = proper_acceleration(self.arm, self.slipping, base, state, T_lab_base_start)
+            loads = proper_acceleration(self.arm, state, T_lab_base_start)
             arm = self.arm.stepped(t, moving, before.arm, loads)
             in_base = self._on_links(arm.positions)
         in_base = in_base or self._hand(np.array([t]), q, v)

@@ -12,7 +12,6 @@ from calibration.inference.parameters import Model
 from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase
 from calibration.prediction.bundled_arm import ArmState, BundledArm
-from calibration.prediction.slipping_base import SlippingBase
 from calibration.recording.clock import Clock
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
@@ -131,15 +130,9 @@ def continuous(t: np.ndarray) -> bool:
     return len(t) > 1 and steps.min() > 0.0 and steps.max() <= _SPACING and t[-1] - t[0] >= _SPAN
 
 
-def proper_acceleration(
-    arm: BundledArm,
-    slipping: SlippingBase | None,
-    base: LoadedBase | None,
-    state: BaseState | None,
-    T_lab_base: np.ndarray | None,
-) -> np.ndarray | None:
+def proper_acceleration(arm: BundledArm, state: BaseState | None, T_lab_base: np.ndarray | None) -> np.ndarray | None:
     """Proper acceleration (6,) of the root after a sample, the base at the start at T_lab_base (4, 4)."""
-    if state is None or base is None:
+    if state is None:
         return arm.proper(T_lab_base)
     T = state.moved[0] if T_lab_base is None else state.moved[0] @ T_lab_base
-    return arm.proper(T, None if slipping is None else slipping.accelerations(base, state))
+    return arm.proper(T, state.acceleration)

@@ -8,22 +8,71 @@ wrench is taken as it comes, and inverse dynamics leave out the inertia of heave
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from calibration.numerics.lie import from_vectors
 from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase
+from calibration.recording.trial import REST
+from calibration.robot.kinematics import shift
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, planar_forcing, wrenches_along
-from calibration.stages.stick_slip.kernel import ACCELERATION, LANES
+from calibration.stages.stick_slip.kernel import ACCELERATION, COLUMNS, LANES, STEPS, Bases
 from calibration.stages.stick_slip.model import StickSlip
-from calibration.stages.stick_slip.stream import Sample, SlipStream, slip_stream
+from calibration.stages.stick_slip.stream import (
+    UNDRIVEN,
+    Fitted,
+    Sample,
+    SlipState,
+    SlipStream,
+    slip_stream,
+    step_members,
+)
+from calibration.stages.stick_slip.wheels import bear
 from calibration.stages.suspension.floor_wrench import root_in_base
+from calibration.stages.suspension.modal_response import advance_modes
 from calibration.stages.suspension.model import Source
 
 _UPPER = tuple((PLANE[i], PLANE[j]) for i, j in UPPER)
+_UNMOVED = np.zeros((3, 0))
+
+
+class Place(NamedTuple):
+    """A base where it is: from the plate's wrench to what wheels and springs bear, and from there to the lab.
+
+    Attributes:
+        action: (6, 6) of wrenches in the lab on those in frame 0.
+        standing: (m, 3) as `bear` takes it.
+        a: (6, k), b: (k, 6) and tau: (k,) of `Modes`.
+        T_lab_0: (4, 4) frame 0.
+        T_0_lab: (4, 4) its inverse.
+        gravity: (3,) in frame 0 [m/s2].
+    """
+
+    action: np.ndarray
+    standing: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    tau: np.ndarray
+    T_lab_0: np.ndarray
+    T_0_lab: np.ndarray
+    gravity: np.ndarray
+
+
+class Earlier(NamedTuple):
+    """What a sample carries on: `rest`, `y`, `u` of `BaseState`; `rest`, `before`, `found`, `band` of `SlipState`."""
+
+    wrench: np.ndarray
+    y: np.ndarray
+    u: np.ndarray
+    rest: np.ndarray
+    row: np.ndarray
+    found: np.ndarray
+    band: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -69,16 +118,33 @@ class SlippingBase:
 
         `moving` are motor readings, velocities and accelerations [rad, m, s].
         """
-        state = at.sprung(t, wrench, before, self.model.wheels.borne)
-        driving = None if moving is None else self._driven(at.gravity, moving)
-        slip = self._stream.stepped(
-            Sample(t, state.wrench, state.x[3:5], driving), None if before is None else before.slip
+        if before is None or before.slip is None or t <= before.start + REST:
+            state = at.sprung(t, wrench, before, self.model.wheels.borne)
+            driving = None if moving is None else self._driven(at.gravity, moving)
+            slip = None if before is None else before.slip
+            return state._replace(slip=self._stream.stepped(Sample(t, state.wrench, state.x[3:5], driving), slip))
+        slip, modes, stream = before.slip, at.suspension.modes, self._stream
+        place = Place(
+            at.action, self.model.wheels.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity
         )
-        x = state.x.copy()
-        for axis, own, linear in self._axes:
-            if not linear:
-                x[axis] = slip.x[own]
-        return state._replace(moved=at.in_lab(x[None]), slip=slip)
+        earlier = Earlier(before.rest, before.y, before.u, slip.rest, slip.before, slip.found, slip.band)
+        motion = _UNMOVED if moving is None else moving
+        tree, actions, work, room = self._robot
+        w, (y, u), x, moved, a, row, state, wheels, found = carried(
+            wrench, motion, t - before.t, earlier, slip.bases, place, stream.fitted, tree, *actions, work, room
+        )
+        slip = SlipState(
+            slip.start,
+            t,
+            slip.rest,
+            slip.n,
+            row,
+            Bases(state, wheels, slip.bases.lanes),
+            found,
+            slip.band,
+            found[1] * stream.fitted.moves,
+        )
+        return BaseState(before.start, t, w, before.rest, before.n, u, y, x, moved, a, slip)
 
     def variance(self, state: BaseState) -> np.ndarray:
         """(6,) of the displacement in frame 0 [m2, rad2]."""
@@ -86,12 +152,6 @@ class SlippingBase:
         found[list(PLANE)] = np.zeros(3) if state.slip is None else state.slip.variance(own)
         found[list(HEAVE)] = own.heave_variance
         return found
-
-    def accelerations(self, at: LoadedBase, state: BaseState) -> np.ndarray | None:
-        """(2, 3) linear and angular of the base frame [m/s2, rad/s2, lab axes], mean of the members; None at rest."""
-        if state.slip is None:
-            return None
-        return np.asarray(_accelerations(state.slip.bases.state, len(self._stream.direction.ensemble), at.T_lab_0))
 
     def _driven(self, gravity: np.ndarray, moving: np.ndarray) -> np.ndarray:
         """What the arm does to the base in the floor's plane (9,), see `Sample`; gravity (3,) in frame 0."""
@@ -106,25 +166,8 @@ class SlippingBase:
         return tree, actions, scratch(tree), room(1, len(tree.column))
 
     @cached_property
-    def _axes(self) -> tuple[tuple[int, int, bool], ...]:
-        """Axis of the displacement, its place in the plane, whether the compliance has it."""
-        return tuple((axis, k, bool(self._stream.direction.linear[k])) for k, axis in enumerate(PLANE))
-
-    @cached_property
     def _stream(self) -> SlipStream:
         return slip_stream(self.model)
-
-
-@njit(cache=True, error_model="numpy")
-def _accelerations(states: np.ndarray, members: int, T_lab_0: np.ndarray) -> np.ndarray:
-    """`SlippingBase.accelerations` of the first of the bases, states as in `kernel.Bases`."""
-    found = np.zeros((2, 3))
-    for k in range(members):
-        a = states[k // LANES, ACCELERATION : ACCELERATION + 3, k % LANES]
-        for i in range(3):
-            found[0, i] += (T_lab_0[i, 0] * a[0] + T_lab_0[i, 1] * a[1]) / members
-            found[1, i] += T_lab_0[i, 2] * a[2] / members
-    return found
 
 
 @njit(cache=True, error_model="numpy")
@@ -151,3 +194,51 @@ def driven(
             for c in range(6):
                 out[3 + k] += dual[i, r] * found.composite[0, r, c] * back[c, j]
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def carried(  # noqa: PLR0913  compiled: arrays alone
+    wrench: np.ndarray,
+    moving: np.ndarray,
+    dt: float,
+    before: Earlier,
+    bases: Bases,
+    place: Place,
+    fitted: Fitted,
+    tree: RigidTree,
+    dual: np.ndarray,
+    back: np.ndarray,
+    work: np.ndarray,
+    room: TreeDynamics,
+) -> tuple:
+    """`SlippingBase.stepped` after the first second: fields of the states.
+
+    Returns:
+        wrench, y and u, x, moved, acceleration of `BaseState`; row, state, wheels of bases and found of `SlipState`.
+    """
+    w, x, own, turn = np.zeros((1, 6)), np.empty(6), np.empty((1, 6)), np.zeros((1, 4, 4))
+    row, found, driving = np.empty(COLUMNS), np.empty((4, 3)), UNDRIVEN.copy()
+    for i in range(6):
+        for c in range(6):
+            w[0, i] += place.action[i, c] * wrench[c]
+    bear(place.standing, w)
+    modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, w[0] - before.wrench, dt, x)
+    if moving.shape[1]:
+        driving = driven(tree, (dual, back), place.gravity, moving, work, room)
+    after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes)
+    readings = w[0], x[3:5], driving, before.rest, before.row, before.found
+    step_members(after, readings, fitted, before.band, dt / STEPS, row, found)
+    own[0] = x
+    for k in range(3):
+        if not fitted.linear[k]:
+            own[0, PLANE[k]] = found[1, k] * fitted.moves[k]
+    from_vectors(own, turn)
+    moved, scratch, a = place.T_lab_0.copy().reshape(1, 4, 4), np.empty((3, 4)), np.zeros((2, 3))
+    shift(moved[0], turn[0], scratch)
+    shift(moved[0], place.T_0_lab, scratch)
+    for e in range(fitted.members):
+        for i in range(3):
+            forward = after.state[e // LANES, ACCELERATION : ACCELERATION + 3, e % LANES] / fitted.members
+            a[0, i] += place.T_lab_0[i, 0] * forward[0] + place.T_lab_0[i, 1] * forward[1]
+            a[1, i] += place.T_lab_0[i, 2] * forward[2]
+    return w[0], modes, x, moved, a, row, after.state, after.wheels, found

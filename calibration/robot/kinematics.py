@@ -119,7 +119,7 @@ def _turn(T: np.ndarray, axis: np.ndarray, sine: float, versine: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _shift(T: np.ndarray, fixed: np.ndarray, own: np.ndarray) -> None:
+def shift(T: np.ndarray, fixed: np.ndarray, own: np.ndarray) -> None:
     """Multiply T by `fixed` on the right; `own` (3, 4) is scratch."""
     for i in range(3):
         for c in range(4):
@@ -157,7 +157,7 @@ def _walk(
         at = T[n]
         at[0, 0] = at[1, 1] = at[2, 2] = at[3, 3] = 1.0
         for k in range(len(fixed)):
-            _shift(at, fixed[k], own)
+            shift(at, fixed[k], own)
             if k == len(axis):
                 break
             if R.shape[1] > 0:

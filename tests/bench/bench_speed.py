@@ -118,4 +118,4 @@ def test_speed_of_the_compensator(short_run, keep):
         "compensator_predict_us_per_sample": 1e6 * seconds(lambda: compensator.predict(t, q, w, T, v)) / len(t),
     }
     keep(figures)
-    assert figures["compensator_step_us"] < 200.0
+    assert figures["compensator_step_us"] < 120.0

@@ -83,7 +83,7 @@ def _cofactors(a: np.ndarray) -> tuple[float, float, float, float, float, float,
 
 
 @njit(cache=True, error_model="numpy")
-def _solved(a: np.ndarray, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
+def solved(a: np.ndarray, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
     """Solution of a symmetric system, a = (a00, a01, a02, a11, a12, a22)."""
     c00, c01, c02, c11, c12, c22, i = _cofactors(a)
     return (
@@ -117,9 +117,9 @@ def _corrector(wheels: np.ndarray, lane: int, share: float, state: np.ndarray) -
         a[k] = s[k] + share * a[k]
     n = _P
     for i in range(3):
-        y0, y1, y2 = _solved(a, 1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2))
+        y0, y1, y2 = solved(a, 1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2))
         z0, z1 = s[0] * y0 + s[1] * y1 + s[2] * y2, s[1] * y0 + s[3] * y1 + s[4] * y2
-        z = _solved(a, z0, z1, s[2] * y0 + s[4] * y1 + s[5] * y2)
+        z = solved(a, z0, z1, s[2] * y0 + s[4] * y1 + s[5] * y2)
         for j in range(i, 3):
             state[n * LANES + lane] = z[j]
             n += 1

@@ -21,7 +21,7 @@ from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
 
-_UNDRIVEN = np.array([0.0] * 3 + [UNMOVED, 0.0, 0.0, UNMOVED, 0.0, UNMOVED])
+UNDRIVEN = np.array([0.0] * 3 + [UNMOVED, 0.0, 0.0, UNMOVED, 0.0, UNMOVED])
 _NO_REST = np.zeros(6)
 _LOADS = np.array([0.0] * 3 + [1.0] * 3 + [0.0] * 5)  # of a sample at rest: the vertical load alone
 
@@ -41,6 +41,24 @@ class Sample(NamedTuple):
     wrench: np.ndarray
     tilt: np.ndarray
     driving: np.ndarray | None = None
+
+
+class Fitted(NamedTuple):
+    """What was fitted.
+
+    Attributes:
+        members: Of the ensemble.
+        k: Bases: members, then the preloaded optimum.
+        compliance: (3, 3) K_0^-1 of the optimum.
+        moves: (3,) axes that are moved.
+        linear: (3,) axes that the compliance moves, see `loaded_base`.
+    """
+
+    members: int
+    k: int
+    compliance: np.ndarray
+    moves: np.ndarray
+    linear: np.ndarray
 
 
 class SlipState(NamedTuple):
@@ -82,20 +100,18 @@ class SlipStream:
         wheel_set: Of the robot.
         wheels: (e, m, 10) of the members, then of the optimum, once for each preload.
         bodies: (e, 4) as the kernel takes them.
-        compliance: (3, 3) K_0^-1 of the optimum.
-        moves: (3,) axes that are moved; linear ones are the compliance's, see `loaded_base`.
+        fitted: What was fitted.
     """
 
     direction: Direction
     wheel_set: WheelSet
     wheels: np.ndarray
     bodies: np.ndarray
-    compliance: np.ndarray
-    moves: np.ndarray
+    fitted: Fitted
 
     def stepped(self, sample: Sample, before: SlipState | None) -> SlipState:
         """The base one sample on; without a state before, this sample is the first at rest."""
-        driving = _UNDRIVEN if sample.driving is None else sample.driving
+        driving = UNDRIVEN if sample.driving is None else sample.driving
         if before is None or sample.t <= before.start + REST:
             row = np.empty(COLUMNS)
             sample_row(sample.wrench, sample.tilt, driving, _NO_REST, row)
@@ -107,10 +123,9 @@ class SlipStream:
         was = before.bases
         bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes)
         row, found = np.empty(COLUMNS), np.empty_like(before.found)
-        fitted = len(self.direction.ensemble), len(self.bodies), self.compliance, before.band
         readings = sample.wrench, sample.tilt, driving, before.rest, before.before, before.found
-        step_members(bases, readings, fitted, (sample.t - before.t) / STEPS, row, found)
-        return before._replace(t=sample.t, before=row, bases=bases, found=found, x=found[1] * self.moves)
+        step_members(bases, readings, self.fitted, before.band, (sample.t - before.t) / STEPS, row, found)
+        return before._replace(t=sample.t, before=row, bases=bases, found=found, x=found[1] * self.fitted.moves)
 
     def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
         of, none = self.direction.band.begun(row[3:6]), np.zeros((4, 3))
@@ -133,14 +148,8 @@ def slip_stream(model: StickSlip) -> SlipStream:
     wheels = np.array([model.wheels.rows(p) for p in parameters])
     bodies = np.array([body(p, found.corrected) for p in parameters])
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
-    return SlipStream(
-        found,
-        model.wheels,
-        wheels,
-        bodies,
-        compliance,
-        found.slips,
-    )
+    fitted = Fitted(len(found.ensemble), len(bodies), compliance, found.slips, np.asarray(found.linear, dtype=bool))
+    return SlipStream(found, model.wheels, wheels, bodies, fitted)
 
 
 @njit(cache=True, error_model="numpy")
@@ -189,7 +198,8 @@ def sample_row(wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: 
 def step_members(
     bases: Bases,
     readings: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    fitted: tuple[int, int, np.ndarray, np.ndarray],
+    fitted: Fitted,
+    band: np.ndarray,
     h: float,
     row: np.ndarray,
     found: np.ndarray,
@@ -199,12 +209,13 @@ def step_members(
     Args:
         bases: States and deflections are changed.
         readings: Wrench, tilt, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
-        fitted: Members, bases, K_0^-1 (3, 3), band (4, 3) of `banded`.
+        fitted: Members, bases and K_0^-1.
+        band: (4, 3) of `banded`.
         h: [s].
         row: (11,) of this sample, filled.
         found: (4, 3) of `banded`, filled.
     """
-    (wrench, tilt, driving, rest, earlier, before), (members, k, compliance, band) = readings, fitted
+    wrench, tilt, driving, rest, earlier, before = readings
     drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
     sample_row(wrench, tilt, driving, rest, row)
     for s in range(STEPS):
@@ -214,5 +225,5 @@ def step_members(
         inertia[i] = driving[3 + i]
     for i in range(3):
         for c in range(3):
-            elastic[i] += compliance[i, c] * row[PLATE + c]
-    banded(advance_members(bases, drive, inertia, h, members, k), before, band, elastic, found)
+            elastic[i] += fitted.compliance[i, c] * row[PLATE + c]
+    banded(advance_members(bases, drive, inertia, h, fitted.members, fitted.k), before, band, elastic, found)

@@ -13,8 +13,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
 from calibration.recording.schema import Wheel
+from calibration.stages.stick_slip.kernel import solved
 
 NAMES = (
     "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
@@ -24,7 +26,6 @@ PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0
 PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.15])
 PRELOADS = 8  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
-_LOAD, _SIGN = [2, 4, 3], np.array([-1.0, 1.0, -1.0])  # of a wrench: (-Fz, My, -Mx)
 _LEGS = 3  # wheels that a base stands on
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
 
@@ -110,27 +111,14 @@ class WheelSet:
         With -Fz, My, -Mx so that sum_i max(N_i, 0) (1, x_i, y_i) is what they were: N_i of all that stay on the floor
         and, the springs being linear, heave and tilt are those of the wheels in contact.
         """
-        (n, G), loads = self._alike, wrench[:, _LOAD] * _SIGN
-        lifted = (n + loads @ G.T).min(axis=1) < 0.0
-        if not lifted.any():
-            return wrench
-        A, found = np.column_stack([np.ones(len(n)), self.position]), wrench.copy()
-        for row in np.flatnonzero(lifted):
-            load = loads[row]
-            for _ in range(len(n)):
-                on = n + G @ load > 0.0
-                if on.sum() < _LEGS:
-                    break
-                load, before = np.linalg.solve(A[on].T @ G[on], loads[row] - A[on].T @ n[on]), load
-                if np.array_equal(on, n + G @ load > 0.0) or np.array_equal(load, before):
-                    break
-            found[row, _LOAD] = load * _SIGN
+        found = np.array(wrench, dtype=float, order="C")
+        bear(self.standing, found)
         return found
 
     @cached_property
-    def _alike(self) -> tuple[np.ndarray, np.ndarray]:
-        """n and G of wheels that share the load alike."""
-        return self.loads(1.0)
+    def standing(self) -> np.ndarray:
+        """(m, 3) x, y and n of wheels that share the load alike."""
+        return np.column_stack([self.position, self.loads(1.0)[0]])
 
     def stiffness(self, p: SlipParameters) -> np.ndarray:
         """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""
@@ -139,6 +127,35 @@ class WheelSet:
             A = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])
             K += A.T @ np.diag([kx, ky]) @ A
         return K
+
+
+@njit(cache=True, error_model="numpy")
+def bear(standing: np.ndarray, wrench: np.ndarray) -> None:
+    """`WheelSet.borne` of wrenches (n, 6), which are changed: N_i = n_i + c (1, x_i, y_i) of wheels in contact."""
+    m, a, on = len(standing), np.empty(6), np.empty(len(standing), np.bool_)
+    for w in wrench:
+        on[:] = True
+        for step in range(m + 1):  # noqa: B007  its last value is read
+            a[:] = 0.0
+            b0, b1, b2, same, legs = -w[2], w[4], -w[3], True, 0
+            for i in range(m):
+                if on[i]:
+                    x, y, n = standing[i, 0], standing[i, 1], standing[i, 2]
+                    a[0], a[1], a[2] = a[0] + 1.0, a[1] + x, a[2] + y
+                    a[3], a[4], a[5] = a[3] + x * x, a[4] + x * y, a[5] + y * y
+                    b0, b1, b2 = b0 - n, b1 - n * x, b2 - n * y
+            c0, c1, c2 = solved(a, b0, b1, b2)
+            for i in range(m):
+                touches = standing[i, 2] + c0 + c1 * standing[i, 0] + c2 * standing[i, 1] > 0.0
+                same, legs, on[i] = same and touches == on[i], legs + touches, touches
+            if same or legs < _LEGS:
+                break
+        if step > 0:
+            w[2:5] = 0.0
+            for i in range(m):
+                x, y = standing[i, 0], standing[i, 1]
+                share = c0 + c1 * x + c2 * y
+                w[2], w[3], w[4] = w[2] - share, w[3] - share * y, w[4] + share * x
 
 
 @lru_cache(maxsize=8)

@@ -50,7 +50,7 @@ class Modes:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step [s] under a wrench w (6,): the modes' lags y (k,), what drives them u (k,), displacement x (6,)."""
         x = np.empty(6)
-        found = _advance((self.a, self.b, self.tau), y, u_before, w, step, x)
+        found = advance_modes((self.a, self.b, self.tau), y, u_before, w, step, x)
         return found[0], found[1], x
 
     def _factors(self, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +81,7 @@ def modes_of(K: np.ndarray, C: np.ndarray, M: np.ndarray) -> Modes:
 
 
 @njit(cache=True, error_model="numpy")
-def _advance(
+def advance_modes(
     of: tuple[np.ndarray, np.ndarray, np.ndarray],
     y: np.ndarray,
     u_before: np.ndarray,
