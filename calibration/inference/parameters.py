@@ -206,6 +206,15 @@ class ParameterSet:
         """Positions of those of these parameters that are in the set."""
         return [self.names.index(name) for name in names if name in self.names]
 
+    def without(self, names: Iterable[str]) -> "ParameterSet":
+        """All but those of these names."""
+        dropped = set(self.indices(names))
+        kept = [i for i in range(len(self)) if i not in dropped]
+        labels, units, group = (
+            tuple(x[i] for i in kept) for x in (self.names, self.units, self.group or ("",) * len(self))
+        )
+        return ParameterSet(labels, units, self.nominal[kept], self.tolerance[kept], group)
+
     def joined(self, other: "ParameterSet") -> "ParameterSet":
         """These parameters, then the other ones."""
         groups = [s.group or ("",) * len(s) for s in (self, other)]

@@ -8,6 +8,7 @@ import pytest
 
 from calibration import Compensator, calibrate, evaluate, fit_geometry, load
 from calibration.errors import InputError
+from calibration.stages.geometry.from_arrays import Widths
 from scenarios.steps import import_export
 from tests.doubles.real_postures import KINDS, ROOT, TWO_DAYS, one_marker, real_rows, spoilt_rows, written
 
@@ -28,17 +29,27 @@ def test_static_postures_are_calibrated_and_say_what_is_missing(tmp_path):
     assert (said["suspension"].verdict, said["joints"].verdict) == ("missing", "missing")
 
 
+@pytest.mark.slow
 def test_arrays_give_the_answer_of_the_command(tmp_path):
-    folder, _ = imported(tmp_path, "qualisys_2021-11-30_postures.csv", "qualisys_postures.yaml")
-    dataset = load(folder)
+    head, rows = real_rows()
+    file = written(tmp_path / "qualisys_2021-11-30_postures.csv", head, rows[:26])
+    import_export.import_files("csv", [file], ROOT / "docs/mappings/qualisys_postures.yaml", tmp_path / "dataset")
+    dataset = load(tmp_path / "dataset")
     ((_, means),) = dataset.means("calibration")
     joints, tool = dataset.description.joint_names, dataset.description.tool_frame
-    arrays = fit_geometry(dataset.urdf, joints, tool, means.q_motor, means.marker_position, "base_footprint")
+    arrays = fit_geometry(
+        dataset.urdf, joints, tool, means.q_motor, means.marker_position, "base_footprint", Widths(marker=2e-4)
+    )
     xyz = np.array([m.xyz for m in dataset.description.hand_body.markers])
-    command = Compensator.of(calibrate(dataset)).points(xyz, means.q_motor).positions
-    apart = np.linalg.norm(arrays.predict(means.q_motor) - command, axis=2)
-    left = np.linalg.norm(command - means.marker_position, axis=2)
-    assert np.sqrt((apart**2).mean()) < 0.05 * np.sqrt((left**2).mean())
+    estimate = calibrate(dataset, cross_validate=True)
+    command = Compensator.of(estimate).points(xyz, means.q_motor)
+    apart = np.linalg.norm(arrays.predict(means.q_motor) - command.positions, axis=2)
+    left = np.linalg.norm(command.positions - means.marker_position, axis=2)
+    assert np.sqrt((apart**2).mean()) < 0.02 * np.sqrt((left**2).mean())
+    radii = arrays.predict_with_covariance(means.q_motor).radius_95
+    np.testing.assert_allclose(radii, command.radius_95, rtol=0.01)
+    factor = "standard deviations of full are multiplied by 1."
+    assert factor in arrays.verdicts[-1].message and factor in " ".join(v.message for v in estimate.verdicts)
 
 
 def test_a_second_file_is_predicted_within_its_band(tmp_path):

@@ -6,9 +6,9 @@ from calibration.errors import InputError
 from calibration.formats.bag.messages import JOINT_STATE, NAMES, POSES, VALUES, WRENCH
 from calibration.formats.bag.read import read_bag, topics_of
 from calibration.formats.mapping.layouts import BagLayout
-from calibration.formats.survey.poses_in_columns import SIGMAS
+from calibration.formats.survey.poses_in_columns import SIGMAS, TYPICAL
 from calibration.formats.survey.robot import UrdfRobot
-from calibration.formats.survey.view import CHOOSE, WHOSE, WRIST, FileView, flow
+from calibration.formats.survey.view import GUESS, WHOSE, WRIST, FileView, flow
 
 _LINK = ("absolute", "link", "encoder")
 _COMMAND = ("command", "target", "desired")
@@ -40,10 +40,12 @@ def view_bag(path: Path, robot: UrdfRobot) -> FileView:
     poses = {_body(t): {"topic": t} | SIGMAS for t, (kind, _) in topics.items() if kind in POSES}
     if poses:
         layout = BagLayout.model_validate(layout.model_dump() | {"poses": poses})
-        rows = (f"  {flow(name)}: {flow(p)}  {CHOOSE}: how well it is measured, per axis" for name, p in poses.items())
+        rows = (f"  {flow(name)}: {flow(p)}  {GUESS}: {TYPICAL}" for name, p in poses.items())
         lines += ["poses:", *rows]
     wrist = next((t for t, (kind, _) in sorted(topics.items()) if kind == WRENCH and WRIST.search(t)), None)
-    lines += [f"wrist: {wrist}", f"wrist_convention: action{WHOSE}"] if wrist else []
+    if wrist:
+        layout = layout.model_copy(update={"wrist": wrist, "wrist_convention": "action"})
+        lines += [f"wrist: {wrist}", f"wrist_convention: action{WHOSE}"]
     used = {wrist, motor, link, command, *(p["topic"] for p in poses.values())}
     left = tuple(sorted(t for t in topics if t not in used and t not in (NAMES, VALUES)))
     return FileView(path, "bag", read_bag([path], layout), (), tuple(lines), left)

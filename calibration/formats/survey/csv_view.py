@@ -7,7 +7,7 @@ degrees. 6D poses: `poses_in_columns`. With CoP = c + (-My, Mx) / Fz a plate in 
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +77,10 @@ def view_csv(path: Path, robot: UrdfRobot) -> FileView:
     parts = _wrenches(wrenches)
     wrists = [of for prefix, of in parts.items() if WRIST.search(prefix)][:1] if timed and readings else []
     plates = tuple(_plate(text, prefix or "plate", of) for prefix, of in parts.items() if not WRIST.search(prefix))
-    lines += [_wrist_line(of) for of in wrists]
+    for of in wrists:
+        lines.append(_wrist_line(of))
+        stored = text.numbers((*of["force"].columns, *of["moment"].columns), gaps=True)
+        readings = None if readings is None else replace(readings, wrist_wrench=stored)
     used |= {c for t in wrenches.values() for c in t.columns} if plates else set()
     used |= {c for of in wrists for t in of.values() for c in t.columns}
     recorded = _recorded(path, t, seen, readings) if seen or readings else Recorded(str(path))
@@ -94,12 +97,8 @@ def _recorded(path: Path, t: np.ndarray | None, markers: Markers | None, reading
             raise InputError(path, "no time column, and not both markers and joints: it is no table of postures")
         return Recorded(str(path), means=Means(readings.names, readings.q_motor, markers.names, markers.position, 0.0))
     at_markers = None if markers is None else Markers(t, markers.names, markers.position)
-    at_joints = None if readings is None else Joints(t, readings.names, *_sides(readings))
+    at_joints = None if readings is None else replace(readings, t=t)
     return Recorded(str(path), at_markers, at_joints)
-
-
-def _sides(j: Joints) -> tuple[np.ndarray, ...]:
-    return j.q_motor, j.q_link, j.v_motor, j.effort, j.q_command
 
 
 def _triples(columns: Iterable[str]) -> Iterable[Triple]:

@@ -3,6 +3,7 @@
 A plate's centre, axes and size are the file's where it shows them.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -12,7 +13,9 @@ from calibration.formats.survey.bodies import FoundBody
 from calibration.formats.survey.plate_signs import division, reversed_force
 from calibration.formats.survey.session import Session, sigmas_of
 from calibration.formats.survey.trials import kind_of
-from calibration.formats.survey.view import CHOOSE, FileView, PlateView, flow
+from calibration.formats.survey.view import CHOOSE, GUESS, WHOSE, FileView, flow
+
+_FARTHER, _MOVED = 5.0, 0.05  # [-], [m]: how far one body moves more than another where there is little doubt
 
 
 def draft(session: Session, urdf: str, files: Sequence[str], wheels: str | None = None) -> str:
@@ -26,7 +29,8 @@ def draft(session: Session, urdf: str, files: Sequence[str], wheels: str | None 
     """
     lines = [
         f"# Drafted from {len(session.views)} file(s), {len(session.trials)} trial(s). Lines marked CHOOSE state what",
-        "# no file does: check each. Then `tiago-twin process` this file. Fields: docs/recording.md.",
+        "# no file does: check each. GUESS: probable by the files, edit it only if it is wrong. Then",
+        "# `tiago-twin process` this file. Fields: docs/recording.md.",
         f"urdf: {flow(urdf)}",
         f"files: {flow(list(files))}",
         "setup:",
@@ -39,8 +43,7 @@ def draft(session: Session, urdf: str, files: Sequence[str], wheels: str | None 
 
 
 def _setup(session: Session, wheels: str | None) -> Iterator[str]:
-    robot, names = session.robot, session.measured
-    tool = session.tool
+    robot, names, tool = session.robot, session.measured, session.tool
     yield f"robot: {flow(robot.name)}"
     yield f"base_frame: {flow(robot.root)}"
     yield f"tool_frame: {flow(tool)}"
@@ -56,9 +59,22 @@ def _setup(session: Session, wheels: str | None) -> Iterator[str]:
     yield f"joints: {flow({k: v for k, v in entries.items() if v})}"
     if wheels is not None:
         yield f"wheels: {flow(wheels)}"
-    if any(line.startswith("wrist:") for v in session.views for line in v.layout):
-        yield f"wrist_link: {flow(robot.wrist(tool))}  {CHOOSE}: the sensor's own frame"
-    plates = _plates(session)
+    sensor, whose = session.wrist
+    if sensor:
+        why = f"{GUESS}: its weight turns as below this link" if whose else f"{CHOOSE}: the sensor's own frame"
+        yield f"wrist_link: {flow(sensor)}  {why}"
+    yield from _plates_of(session)
+    yield (
+        f"# payload: {{link: {tool}, mass: 0.5, com: [0.0, 0.0, 0.0], tolerance: 0.02}}  {CHOOSE}: uncomment "
+        "if the hand carries a load [kg, m]"
+    )
+    if _in_base_frame(session):
+        yield f"marker_frame: base  {GUESS}: one body only, so positions are in a frame at rest with the base"
+    yield f"sigmas: {flow(sigmas_of(session))}"
+
+
+def _plates_of(session: Session) -> Iterator[str]:
+    plates = list({p.name: p for v in session.views for p in v.plates}.values())
     if plates:
         yield "plates:"
     for p in plates:
@@ -70,21 +86,10 @@ def _setup(session: Session, wheels: str | None) -> Iterator[str]:
         note = note if known else f"  {CHOOSE}: centre of its surface in the lab, its edges [m]"
         axes = np.round(p.axes, 6) + 0.0
         yield f"  - {flow({'name': p.name, 'centre': place, 'axes': axes.tolist(), 'size': size})}{note}"
-    yield (
-        f"# payload: {{link: {tool}, mass: 0.5, com: [0.0, 0.0, 0.0], tolerance: 0.02}}  {CHOOSE}: uncomment "
-        "if the hand carries a load [kg, m]"
-    )
-    if _in_base_frame(session):
-        yield f"marker_frame: base  {CHOOSE}: one body only, so positions must be in a frame fixed on the base"
-    yield f"sigmas: {flow(sigmas_of(session))}"
 
 
 def _in_base_frame(session: Session) -> bool:
     return session.has_readings and len(session.bodies) == 1 and session.drawing is None
-
-
-def _plates(session: Session) -> list[PlateView]:
-    return list({p.name: p for v in session.views for p in v.plates}.values())
 
 
 def _bodies(session: Session) -> Iterator[str]:
@@ -100,8 +105,9 @@ def _bodies(session: Session) -> Iterator[str]:
         yield f"  - {flow({'name': 'base', 'link': base, 'fitted': True})}"
         yield f"  - {_body(bodies[0], tool, fitted=True)}"
     elif session.has_readings:
-        yield f"  - {_body(bodies[0], base, fitted=True)}  {CHOOSE}: the base? it moves least"
-        yield f"  - {_body(bodies[-1], tool, fitted=True)}  {CHOOSE}: the hand? it moves most"
+        least, most = (_mark(a, b) for a, b in ((bodies[1], bodies[0]), (bodies[-1], bodies[-2])))
+        yield f"  - {_body(bodies[0], base, fitted=True)}  {least}: the base, it moves least"
+        yield f"  - {_body(bodies[-1], tool, fitted=True)}  {most}: the hand, it moves most"
     else:
         x, y = _pressure(session)
         standing = f"{{x: {x}, y: {y}, heading: CHOOSE}}"
@@ -111,6 +117,11 @@ def _bodies(session: Session) -> Iterator[str]:
     left = [n for b in (bodies[1:-1] if session.has_readings else bodies[1:]) for n in b.markers] + [*session.alone]
     if left:
         yield f"  # not used: {', '.join(left)}"
+
+
+def _mark(body: FoundBody, other: FoundBody) -> str:
+    """Whether a body moved so much more than another that there is little doubt which is which."""
+    return GUESS if body.travel > max(_FARTHER * other.travel, _MOVED) else CHOOSE
 
 
 def _body(body: FoundBody, link: str, **more: bool) -> str:
@@ -162,13 +173,21 @@ def _layouts(session: Session) -> Iterator[str]:
         lines = [f"suffix: {session.tails[view.path.name]}", *layout]
         why = "of a posture's mean position of a marker [m]"
         static = static and any(line.startswith("markers:") for line in layout)
-        lines += [f"marker_std: {sigmas_of(session)['marker']:g}  {CHOOSE}: {why}"] if static else []
-        yield from _nested(lines + list(_plate_lines(session, view)), view)
+        lines += [f"marker_std: {sigmas_of(session)['marker']:g}  {GUESS}: {why}"] if static else []
+        yield from _nested([_known(session, line) for line in lines] + list(_plate_lines(session, view)), view)
     for kind, views in others.items():
         yield f"{kind}:"
         standing = max(views, key=lambda v: len(v.plates))
         shown = dict.fromkeys(line for v in views for line in v.layout)
-        yield from (f"  {line}" for line in [*shown, *_plate_lines(session, standing), *_unused(views[0])])
+        known = [_known(session, line) for line in shown]
+        yield from (f"  {line}" for line in [*known, *_plate_lines(session, standing), *_unused(views[0])])
+
+
+def _known(session: Session, line: str) -> str:
+    """A line with whose wrench the wrist's sensor stores, where the recordings show it."""
+    _, whose = session.wrist if WHOSE in line else ("", "")
+    shown = f"{whose}{{}}  {GUESS}: the weight below the sensor turns with the readings as its {whose}"
+    return re.sub(r"\baction(\}?)" + re.escape(WHOSE), lambda m: shown.format(m[1]), line) if whose else line
 
 
 def _nested(lines: list[str], view: FileView) -> Iterator[str]:
@@ -181,14 +200,10 @@ def _plate_lines(session: Session, view: FileView) -> Iterator[str]:
         yield "plates:"
     for p in view.plates:
         force = float(np.nanmedian(p.wrench[:, 2]))
-        why = (
-            f"whose wrench: Fz is {force:+.0f} N, z up"
-            if view.kind == "csv"
-            else f"whose wrench: {force:+.0f} N upwards"
-        )
+        why = f"the robot presses down, {force:+.0f} N along the upward axis"
         wrong = reversed_force(p, view.recorded.markers, session.bodies[-1]) if session.bodies else ""
         signs, seen = (f", reversed: [{wrong}]", f"; {wrong} against the hand's motion") if wrong else ("", "")
-        yield f"  {flow(p.name)}: {{{p.layout}{signs}, convention: {p.convention}}}  {CHOOSE}: {why}{seen}"
+        yield f"  {flow(p.name)}: {{{p.layout}{signs}, convention: {p.convention}}}  {GUESS}: {why}{seen}"
 
 
 def _unused(view: FileView) -> Iterator[str]:

@@ -15,13 +15,14 @@ import numpy as np
 from calibration.formats.csv.read import CsvText
 from calibration.formats.mapping.layouts import PoseChannels
 from calibration.formats.mapping.poses import marker_names, markers_at
-from calibration.formats.survey.view import CHOOSE, flow
+from calibration.formats.survey.view import CHOOSE, GUESS, flow
 
 _ROTATION = re.compile(r"^(?P<body>.*?)[\W_]*(?:(?:rot(?:ation)?|quat(?:ernion)?)[\W_]*|[qr])(?P<axis>[xyzw])$", re.I)
 _ANGLES = re.compile(r"^(?P<body>.*?)[\W_]*(?P<axis>roll|pitch|yaw)$", re.I)
 _POSITION = re.compile(r"^(?P<body>.*?)[\W_]*(?:(?:pos(?:ition)?|trans(?:lation)?|[tp])[\W_]*)?(?P<axis>[xyz])$", re.I)
 _KINDS = ((_ROTATION, "xyzw", "quat_xyzw"), (_ROTATION, "xyz", "rotation_vector"))
 SIGMAS = {"sigma_position": 2e-4, "sigma_rotation": 1e-3}  # [m], [rad] of a body of 0.2 m in motion capture
+TYPICAL = "standard deviations per axis, those of motion capture [m, rad]"
 _FAR, _TURN = 30.0, 2.0 * np.pi
 UNNAMED = "body"
 
@@ -73,9 +74,11 @@ def lines_of(poses: Sequence[PoseColumns]) -> Iterator[str]:
         yield "poses:"
     for p in poses:
         known = p.channels.order.startswith("quat")
-        what = "" if known else "which three numbers (rotation_vector, euler_XYZ, euler_zyx, ...); "
+        what = (
+            f"{GUESS}: " if known else f"{CHOOSE}: which three numbers (rotation_vector, euler_XYZ, euler_zyx, ...); "
+        )
         fields = flow(p.channels.model_dump(exclude_defaults=True))
-        yield f"  {flow(p.name)}: {fields}  {CHOOSE}: {what}how well it is measured, per axis [m, rad]"
+        yield f"  {flow(p.name)}: {fields}  {what}{TYPICAL}"
 
 
 def _of(pattern: re.Pattern[str], columns: list[str]) -> dict[str, dict[str, str]]:

@@ -5,7 +5,7 @@ Standard deviations are those of the samples at rest, of posture means those of 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from calibration.formats.survey.csv_view import view_csv
 from calibration.formats.survey.robot import UrdfRobot, read_urdf
 from calibration.formats.survey.trials import stem_of, suffixes
 from calibration.formats.survey.view import FileView
+from calibration.formats.survey.wrist_sign import convention_of
 from calibration.mocap.cluster_shape import cluster, in_line
 from calibration.recording.trial import REST
 
@@ -47,6 +48,7 @@ class Session:
         bodies: Groups of labels, the one that moves least first.
         alone: Labels of no body.
         drawing: The measured bodies, None where nobody measured them.
+        urdf: Text of the robot.
     """
 
     robot: UrdfRobot
@@ -56,6 +58,15 @@ class Session:
     bodies: tuple[FoundBody, ...]
     alone: tuple[str, ...]
     drawing: Drawing | None
+    urdf: str
+
+    @cached_property
+    def wrist(self) -> tuple[str, str]:
+        """Link of the wrist's sensor, empty where there is none, and whose wrench it stores, empty where not shown."""
+        if not any(r.joints is not None and r.joints.wrist_wrench is not None for r in self.trials.values()):
+            return "", ""
+        link = self.robot.wrist(self.tool)
+        return link, convention_of(self.trials.values(), self.urdf, self.robot.root, link)
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -103,7 +114,7 @@ def session_of(files: Sequence[Path], urdf: str, drawing: Drawing | None = None)
         bodies, alone = found_bodies(list(trials.values()))
     else:
         bodies, alone = tuple(FoundBody(name, markers, 0.0) for name, _, markers in drawing.bodies), ()
-    return Session(robot, tuple(views), tails, trials, bodies, alone, drawing)
+    return Session(robot, tuple(views), tails, trials, bodies, alone, drawing, urdf)
 
 
 def _view(path: Path, robot: UrdfRobot) -> FileView:

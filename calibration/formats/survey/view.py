@@ -9,10 +9,12 @@ import numpy as np
 from calibration.formats.mapping.channels import Recorded
 
 CHOOSE = "# CHOOSE"
+"""Mark of lines that state what no file does."""
+GUESS = "# GUESS"
+"""Mark of lines that the files make probable, with the reason: to be edited only where it is wrong."""
 WHOSE = f"  {CHOOSE}: whose wrench, `action` of the hand on the sensor or the sensor's `reaction`"
 WRIST = re.compile(r"wrist|(^|[_/])ft($|[_/])", re.IGNORECASE)
 """Names of a wrist's force-torque sensor."""
-"""Mark of lines that state what no file does."""
 _PLAIN = re.compile(r"^[A-Za-z_][\w./-]*$")
 _WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 

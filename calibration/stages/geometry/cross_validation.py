@@ -27,6 +27,7 @@ from calibration.mocap.postures import Postures
 from calibration.numerics.lie import places
 from calibration.recording import Description
 from calibration.robot.chain import Chain
+from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Spread, predicted_points
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.robot.parameter_block import joint_lengths
@@ -37,6 +38,9 @@ from calibration.stages.geometry.registration import STAGE as BASELINE
 from calibration.stages.geometry.registration import register
 from calibration.stages.geometry.stage import STAGE, calibrate_geometry
 from calibration.verdict import Verdict
+
+Fitted = tuple[HandModel, Spread | None]
+"""A calibrated robot and how uncertain it states to be; None where it states nothing."""
 
 FOLDS = 5
 _SAMPLES = 2000  # of the bootstrap
@@ -99,19 +103,21 @@ def left_out_errors(
     chain: Chain, description: Description, postures: Postures, names: tuple[str, ...]
 ) -> tuple[LeftOut, ...]:
     """Of `registration`, `model_2` and `full`, those of `names`; rows that could be fitted in no fold are absent."""
+    found = (errors_left_out(name, partial(_fitted, name, chain, description), chain, postures) for name in names)
+    return tuple(f for f in found if np.isfinite(f.error).any())
+
+
+def errors_left_out(name: str, fit: Callable[[Postures], Fitted | None], chain: Chain, postures: Postures) -> LeftOut:
+    """Of a row of any `fit` to some of the postures; None where that must not be used."""
     of = groups(postures.q[:, chain.columns], APART * joint_lengths(chain))
     parts = np.array_split(np.random.default_rng(0).permutation(of.max() + 1), FOLDS)
-    folds, found = [np.flatnonzero(np.isin(of, part)) for part in parts], []
-    for name in names:
-        whole, stated = _errors(name, chain, description, postures, postures)
-        error = np.full(len(postures), np.nan)
-        for part in folds:
-            kept = np.setdiff1d(np.arange(len(postures)), part)
-            error[part], own = _errors(name, chain, description, postures.rows(kept), postures.rows(part))
-            stated[part] = stated[part] if few(chain, postures) else own
-        if np.isfinite(error).any():
-            found.append(LeftOut(name, error, stated, _rms(whole)))
-    return tuple(found)
+    whole, stated = _errors(fit(postures), postures)
+    error = np.full(len(postures), np.nan)
+    for part in (np.flatnonzero(np.isin(of, part)) for part in parts):
+        kept = np.setdiff1d(np.arange(len(postures)), part)
+        error[part], own = _errors(fit(postures.rows(kept)), postures.rows(part))
+        stated[part] = stated[part] if few(chain, postures) else own
+    return LeftOut(name, error, stated, _rms(whole))
 
 
 def as_left_out(chain: Chain, description: Description, postures: Postures, full: Model) -> Model:
@@ -144,8 +150,7 @@ def cross_validated(
         message = f"no cross-validated error of {row}: {n} distinct postures are too few to leave a fifth out"
         return CrossValidation((_not_better(message, BASELINE),), BASELINE)
     message, excess = _errors_in_words(row, found), max(f.excess for f in found)
-    if excess > 1.0:
-        message += f"; standard deviations of full are multiplied by {excess:.2f}, errors left out over those stated"
+    message += multiplied(excess)
     if best.model != row:
         return CrossValidation((_not_better(message, best.model),), best.model, excess)
     verdicts = [Verdict(STAGE, "ok", message), *_worth_looking_at(scaled(fitted[row], excess))]
@@ -156,15 +161,25 @@ def cross_validated(
 
 def _errors_in_words(row: str, found: tuple[LeftOut, ...]) -> str:
     mine = next(f for f in found if f.model == row)
-    low, high = mine.interval
     beside = "".join(
         f", {f.model} {1e3 * f.rmse:.2f} mm (residual {1e3 * f.residual:.2f})" for f in found if f is not mine
     )
+    return f"{in_words(mine)}{beside}; {np.isfinite(mine.error).sum()} postures, {FOLDS} folds"
+
+
+def in_words(found: LeftOut) -> str:
+    """The error of a row with its interval, and beside it the residual."""
+    low, high = found.interval
     return (
-        f"{row}: hand error at left-out postures {1e3 * mine.rmse:.2f} mm rms (95 % interval {1e3 * low:.2f} to "
-        f"{1e3 * high:.2f}, residual {1e3 * mine.residual:.2f}){beside}; {np.isfinite(mine.error).sum()} postures, "
-        f"{FOLDS} folds"
+        f"{found.model}: hand error at left-out postures {1e3 * found.rmse:.2f} mm rms (95 % interval "
+        f"{1e3 * low:.2f} to {1e3 * high:.2f}, residual {1e3 * found.residual:.2f})"
     )
+
+
+def multiplied(excess: float) -> str:
+    """What an excess does; empty where it is 1."""
+    why = f"standard deviations of full are multiplied by {excess:.2f}, errors left out over those stated"
+    return f"; {why}" if excess > 1.0 else ""
 
 
 def _not_better(message: str, delivered: str) -> Verdict:
@@ -172,23 +187,26 @@ def _not_better(message: str, delivered: str) -> Verdict:
     return Verdict(STAGE, "warning", f"{message}: not better than {delivered} at postures left out, so {action}")
 
 
-def _errors(name: str, chain: Chain, description: Description, fitted: Postures, predicted: Postures) -> np.ndarray:
-    """Distances and, of `full`, those stated (2, n) [m] at `predicted` of a row fitted to `fitted`.
-
-    NaN where that must not be used.
-    """
-    found = np.full((2, len(predicted)), np.nan)
+def _fitted(name: str, chain: Chain, description: Description, postures: Postures) -> Fitted | None:
+    """A row of the ladder, with what `full` states; None where it must not be used."""
     try:
-        model, findings = _FITS[name](chain, description, fitted)
+        model, findings = _FITS[name](chain, description, postures)
     except CalibrationError:
-        return found
+        return None
     if any(v.verdict == "refused" for v in findings):
+        return None
+    names = tuple(p.name for p in model.parameters)
+    spread = Spread(names, model.covariance, model.reading_sigma, model.hand_error) if name == "full" else None
+    return hand_of(model, chain, nominal_frames(chain, description)), spread
+
+
+def _errors(fitted: Fitted | None, predicted: Postures) -> np.ndarray:
+    """Distances and those stated (2, n) [m] at postures; NaN where there is no fit, or it states none."""
+    found = np.full((2, len(predicted)), np.nan)
+    if fitted is None:
         return found
-    hand = hand_of(model, chain, nominal_frames(chain, description))
-    if name == "full":
-        spread = Spread(
-            tuple(p.name for p in model.parameters), model.covariance, model.reading_sigma, model.hand_error
-        )
+    hand, spread = fitted
+    if spread is not None:
         S = predicted_points(hand, spread, predicted.point[None], predicted.q).covariance[:, 0]
         found[1] = np.sqrt(np.trace(S + predicted.covariance[:, :3, :3], axis1=1, axis2=2))
     p, T_seen = places(hand.poses(predicted.q), predicted.point), predicted.T_base_hand

@@ -4,15 +4,16 @@ The laboratory's frame, the marker body's place on the tool and its shape are un
 compressed to one pose a posture, fewer give a position. Estimated are both frames, six increments for every joint
 placement, the zero of every reading, compliance and backlash of every gear, as by `calibrate` (`gear_deflection`),
 together with the readings' and the hand's random errors and the priors' widths (`evidence`). Postures that no error of
-the robot explains are left out and named.
+the robot explains are left out and named. Intervals are as wide as errors at postures left out in turn show.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from calibration.errors import NotCalibrated, NotEnoughData, ShapeError
+from calibration.errors import CalibrationError, NotCalibrated, NotEnoughData, ShapeError
 from calibration.inference.identifiability import Identifiability
 from calibration.inference.map_estimate import Fit
 from calibration.inference.parameters import ParameterSet
@@ -26,7 +27,8 @@ from calibration.robot.chain import Chain, chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
 from calibration.robot.parameter_block import Known, joint_lengths, parameters_of
-from calibration.stages.geometry.gear_deflection import fit_gears
+from calibration.stages.geometry.cross_validation import errors_left_out, in_words, multiplied
+from calibration.stages.geometry.gear_deflection import GearFit, fit_gears, without
 from calibration.stages.geometry.guards import unusable_data
 from calibration.stages.geometry.hand_residual import HAND_NAMES, NoiseModel
 from calibration.stages.geometry.parameters import hand_model, reading_names
@@ -50,6 +52,7 @@ class Widths:
         reading: Of a joint's random reading error [rad, a tenth of it in m].
         position: Of the hand's random position error [m].
         orientation: Of the hand's random rotation error [rad].
+        marker: Of a marker's mean position, least [m]; distances within the body show it where it is more.
     """
 
     translation: float = 3e-3
@@ -59,6 +62,7 @@ class Widths:
     reading: float = 8e-3
     position: float = 5e-4
     orientation: float = 1e-3
+    marker: float = _LEAST
 
 
 @dataclass(frozen=True)
@@ -90,8 +94,7 @@ class GeometryFit:
 
     def predict_with_covariance(self, q: np.ndarray, session: Session | None = None) -> Predicted:
         """The same with covariance, of this session, or of any other one where `session` is given."""
-        reading = self.fit.noise_sigma(reading_names(self.hand.nominal))
-        spread = Spread(self.parameters.names, self.fit.covariance, reading, self.fit.noise_sigma(HAND_NAMES))
+        spread = _spread(self.hand.nominal, self.parameters, self.fit)
         return predicted_points(self.hand, spread, self.markers, q, session)
 
 
@@ -120,18 +123,42 @@ def fit_geometry(
         NoSuchElement, InputError: Not a joint, frame or URDF.
         NotCalibrated: The result must not be used, with every reason.
     """
-    return fit_chain(chain_of_frames(urdf, tuple(joints), base, tool), q, positions, widths or Widths())
+    chain, widths = chain_of_frames(urdf, tuple(joints), base, tool), widths or Widths()
+    found = fit_chain(chain, q, positions, widths)
+    postures, _, _ = _postures(*_arrays(q, positions), widths.marker)
+    left = errors_left_out("full", partial(_fitted, chain, widths), chain, postures)
+    words = Verdict(_STAGE, "ok", in_words(left) + multiplied(left.excess))
+    return replace(_scaled(found, left.excess), verdicts=(*found.verdicts, words))
 
 
 def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths) -> GeometryFit:
-    """`fit_geometry` of a chain that was made before."""
+    """`fit_geometry` of a chain that was made before, with the intervals that the fit states by itself."""
+    q, positions = _arrays(q, positions)
+    postures, markers, usable = _postures(q, positions, widths.marker)
+    nominal, found = _gears(chain, postures, widths)
+    used = found.robust.kept
+    left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~used].tolist()}))
+    verdicts = (*_verdicts(left_out, len(q), found.known, found.parameters), *without(found.negative))
+    hand = nominal.with_theta(found.fit.theta, found.parameters.names)
+    return GeometryFit(hand, found.parameters, found.fit, markers, left_out, verdicts, found.known)
+
+
+def _arrays(q: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     q, positions = np.asarray(q, dtype=float), np.asarray(positions, dtype=float)
     if positions.ndim != 3 or positions.shape[0] != len(q) or positions.shape[2] != 3:
         raise ShapeError("positions", positions.shape, (len(q), "markers", 3))
-    postures, markers, usable = _postures(q, positions)
-    oriented = len(markers) > 1
+    return q, positions
+
+
+def _gears(chain: Chain, postures: Postures, widths: Widths) -> tuple[HandModel, GearFit]:
+    """The nominal robot and its fit.
+
+    Raises:
+        NotCalibrated: It must not be used.
+    """
+    oriented = postures.components == 6
     start = registration_start(chain.poses(postures.q), postures.T_base_hand, oriented)
-    if refused := list(unusable_data(chain, postures.q, start, 6 if oriented else 3)):
+    if refused := list(unusable_data(chain, postures.q, start, postures.components)):
         raise NotCalibrated(refused)
     nominal, reading = hand_model(chain, start.frames), widths.reading * joint_lengths(chain)
     less, more = _parameters(nominal, widths, chain.gravity_torques(postures.q), oriented)
@@ -139,11 +166,27 @@ def fit_chain(chain: Chain, q: np.ndarray, positions: np.ndarray, widths: Widths
     found = fit_gears(nominal, less, more, postures, NoiseModel(reading, _LEAST_READING * joint_lengths(chain), pose))
     if found.rejected:
         raise NotCalibrated(found.rejected)
-    used = found.robust.kept
-    left_out = tuple(sorted({*np.flatnonzero(~usable).tolist(), *np.flatnonzero(usable)[~used].tolist()}))
-    verdicts = _verdicts(left_out, len(q), found.known, found.parameters)
-    hand = nominal.with_theta(found.fit.theta, found.parameters.names)
-    return GeometryFit(hand, found.parameters, found.fit, markers, left_out, verdicts, found.known)
+    return nominal, found
+
+
+def _fitted(chain: Chain, widths: Widths, postures: Postures) -> tuple[HandModel, Spread] | None:
+    """The robot of some postures and what it states; None where it must not be used."""
+    try:
+        nominal, found = _gears(chain, postures, widths)
+    except CalibrationError:
+        return None
+    return nominal.with_theta(found.fit.theta, found.parameters.names), _spread(chain, found.parameters, found.fit)
+
+
+def _spread(chain: Chain, parameters: ParameterSet, fit: Fit) -> Spread:
+    return Spread(parameters.names, fit.covariance, fit.noise_sigma(reading_names(chain)), fit.noise_sigma(HAND_NAMES))
+
+
+def _scaled(found: GeometryFit, factor: float) -> GeometryFit:
+    """With all standard deviations times a factor [-]."""
+    fit = found.fit
+    widths = replace(fit.widths, noise=factor * fit.widths.noise)
+    return replace(found, fit=replace(fit, covariance=factor**2 * fit.covariance, widths=widths))
 
 
 def _verdicts(
@@ -157,19 +200,20 @@ def _verdicts(
     return tuple(verdicts)
 
 
-def _postures(q: np.ndarray, positions: np.ndarray) -> tuple[Postures, np.ndarray, np.ndarray]:
+def _postures(q: np.ndarray, positions: np.ndarray, marker: float) -> tuple[Postures, np.ndarray, np.ndarray]:
     """Postures of the usable rows, the markers in the hand's frame, and which rows (n,) are usable."""
     finite = np.isfinite(q).all(axis=1)
     if positions.shape[1] == 1:
         usable = finite & np.isfinite(positions[:, 0]).all(axis=1)
         T = compose(np.tile(np.eye(3), (int(usable.sum()), 1, 1)), positions[usable, 0])
-        noise = np.tile(_LEAST**2 * np.eye(3), (len(T), 1, 1))
+        noise = np.tile(marker**2 * np.eye(3), (len(T), 1, 1))
         return Postures(q[usable], T, noise, np.zeros(len(T))), np.zeros((1, 3)), usable
     if in_line(positions):
         raise NotEnoughData("markers of a body must be three or more, not in line; or give one of them alone")
     body: Cluster = cluster(positions)
     usable = finite & ~body.odd & np.isfinite(body.T).all(axis=(1, 2))
-    covariance = body.covariance[usable] + np.diag(np.full(6, _LEAST**2))
+    larger = max(1.0, marker / max(body.sigma, 1e-2 * _LEAST))
+    covariance = larger**2 * body.covariance[usable] + np.diag(np.full(6, _LEAST**2))
     return Postures(q[usable], body.T[usable], covariance, np.zeros(int(usable.sum()))), body.xyz, usable
 
 

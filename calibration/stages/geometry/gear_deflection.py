@@ -8,9 +8,11 @@ On real postures this, by cross-validation, is what reaches furthest; a URDF hol
 motion is needed: where sweeps are recorded it is a row beside those with joint models.
 
 A fit averaged over which gears are compliant: most of a robot's are not, and estimating all of them costs accuracy.
+Neither a compliance nor a gap is negative: where the fit finds one below zero by more than two standard deviations, the
+postures show another effect, and that gear is fitted without it and named.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +45,7 @@ from calibration.verdict import Verdict
 
 _HAND = np.array([5e-4, 1e-3])  # random errors of the hand's position [m] and rotation [rad] to begin with
 _SPREAD = 720  # components from which rank and combinations are found
+_BELOW = 2.0  # standard deviations below zero at which a compliance or a gap is none [-]
 _OTHER_SIDE = 0.05  # share of postures whose backlash may lie against its load
 _STRONG = np.log(20.0)  # evidence called strong by Kass and Raftery, JASA 1995
 
@@ -58,7 +61,7 @@ def calibrate_gears(chain: Chain, description: Description, postures: Postures) 
     model = model_of("full", chain, found.parameters, found.fit)
     if found.rejected:
         return model, tuple(Verdict(STAGE, "refused", message) for message in found.rejected)
-    return model, (*left_out(postures, found.robust, _OTHER_SIDE), *_findings(model, hand))
+    return model, (*left_out(postures, found.robust, _OTHER_SIDE), *_findings(model, hand), *without(found.negative))
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,7 @@ class GearFit:
         parameters: With backlash, unless the postures are strong evidence against it.
         known: Rank and combinations.
         rejected: Why it must not be used.
+        negative: Compliances and gaps it is without, with the values below zero that they had [rad/(N.m), rad; m].
     """
 
     fit: Fit
@@ -78,12 +82,36 @@ class GearFit:
     parameters: ParameterSet
     known: Identifiability
     rejected: tuple[str, ...]
+    negative: tuple[tuple[str, float], ...] = ()
 
 
 def fit_gears(
     hand: HandModel, parameters: ParameterSet, more: ParameterSet, postures: Postures, errors: NoiseModel
 ) -> GearFit:
     """Fit `parameters`, and `more` of them, with backlash, unless the postures are strong evidence against it."""
+    found, negative = _fitted(hand, parameters, more, postures, errors), dict[str, float]()
+    while not found.rejected and (below := _below_zero(found, hand)):
+        negative |= below
+        parameters, more = parameters.without(below), more.without(below)
+        found = _fitted(hand, parameters, more, postures, errors)
+    return replace(found, negative=tuple(negative.items()))
+
+
+def _below_zero(found: GearFit, hand: HandModel) -> dict[str, float]:
+    """The compliance or gap farthest below zero in standard deviations, before averaging, where it is too far."""
+    asked = found.parameters.indices(averaged_names(hand))
+    fit = found.robust.fit
+    z = fit.theta[asked] / np.sqrt(np.diag(fit.covariance)[asked])
+    if z.min(initial=0.0) >= -_BELOW:
+        return {}
+    worst = asked[int(z.argmin())]
+    return {found.parameters.names[worst]: float(fit.theta[worst])}
+
+
+def _fitted(
+    hand: HandModel, parameters: ParameterSet, more: ParameterSet, postures: Postures, errors: NoiseModel
+) -> GearFit:
+    """`fit_gears` with every compliance and gap of any sign."""
     found = fit_robustly(hand, parameters, postures, errors)
     some = spread(len(found.fit.at.r), postures.components, _SPREAD)
     known = identifiability(found.fit.rows_white(some), parameters)
@@ -116,6 +144,14 @@ def _findings(model: Model, hand: HandModel) -> Iterator[Verdict]:
         sizes = ", ".join(f"{p.name} {1e3 * p.value:+.1f} {unit}" for p in mine if abs(p.value) > 2.0 * p.sigma)
         if mine:
             yield Verdict(STAGE, "ok", f"{what}: {sizes or 'none'}")
+
+
+def without(negative: Sequence[tuple[str, float]]) -> Iterator[Verdict]:
+    """Which compliances and gaps the fit is without because they came out negative."""
+    if negative:
+        values = ", ".join(f"{name} {1e3 * value:+.1f}e-3" for name, value in negative)
+        message = f"fitted without what came out below zero by more than {_BELOW:.0f} standard deviations: {values}"
+        yield Verdict(STAGE, "ok", f"{message}; these postures show an effect the model does not have")
 
 
 def _averaged(fit: Fit, parameters: ParameterSet, hand: HandModel) -> Fit:

@@ -9,8 +9,11 @@ import mjcf
 from calibration.errors import NotCalibrated, NotEnoughData, ShapeError
 from calibration.mocap.cluster_shape import cluster
 from calibration.numerics.alignment import registration_start
+from calibration.robot.chain import chain_of_frames
 from calibration.robot.hand_uncertainty import Session
-from calibration.stages.geometry.from_arrays import GeometryFit, fit_geometry
+from calibration.stages.geometry import from_arrays
+from calibration.stages.geometry.cross_validation import LeftOut
+from calibration.stages.geometry.from_arrays import GeometryFit, Widths, fit_chain
 from calibration.stages.geometry.parameters import reading_names
 from tests.doubles import rigid_robot
 from tests.doubles.real_postures import KINDS, spoilt
@@ -29,7 +32,7 @@ def markers(truth, q, sigma, seed=0, xyz=X):
 
 
 def fitted(q, positions, tool=TOOL) -> GeometryFit:
-    return fit_geometry(mjcf.urdf(), rigid_robot.JOINTS, tool, q, positions, "base_footprint")
+    return fit_chain(chain_of_frames(mjcf.urdf(), rigid_robot.JOINTS, "base_footprint", tool), q, positions, Widths())
 
 
 @pytest.fixture(scope="module")
@@ -135,6 +138,16 @@ def test_arrays_that_do_not_belong_together_are_refused(good):
         fitted(good[0][:10], good[1])
     with pytest.raises(NotEnoughData, match="in line"):
         fitted(good[0], good[1][:, :2])
+
+
+def test_intervals_are_as_wide_as_errors_left_out(good, monkeypatch):
+    left = LeftOut("full", np.full(40, 3e-3), np.full(40, 2e-3), 1e-3)
+    monkeypatch.setattr(from_arrays, "errors_left_out", lambda *_: left)
+    found = from_arrays.fit_geometry(mjcf.urdf(), rigid_robot.JOINTS, TOOL, *good[:2], "base_footprint")
+    alone = fitted(good[0], good[1])
+    radii = [f.predict_with_covariance(good[0]).radius_95 for f in (found, alone)]
+    np.testing.assert_allclose(radii[0], 1.5 * radii[1])
+    assert "3.00 mm rms" in found.verdicts[-1].message and "multiplied by 1.50" in found.verdicts[-1].message
 
 
 def test_another_session_has_a_wider_band(good):

@@ -87,3 +87,11 @@ def test_zeros_of_a_robot_with_play_carry_it(chain, tmp_path):
     angles = q - np.array([z.compliance for z in zeros]) * tau - [z.gap / 2 for z in zeros] * np.tanh(tau / 0.3)
     np.testing.assert_allclose(angles, played.angles(q), atol=1e-15)
     assert np.abs(angles - q).max() > 5e-3
+
+
+def test_a_gap_below_zero_is_none_and_is_named(chain):
+    held = np.where(np.arange(8) == 6, -HELD, HELD)
+    model, said = calibrate_gears(chain, DESCRIBED, data(chain, held, 40, 0))
+    assert "backlash.arm_6_joint.gap" not in names(model) and "backlash.arm_5_joint.gap" in names(model)
+    (message,) = (v.message for v in said if "below zero" in v.message)
+    assert "backlash.arm_6_joint.gap -2" in message and "arm_5" not in message
