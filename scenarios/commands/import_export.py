@@ -35,7 +35,7 @@ def import_(
     kind = str(given.pop(0)) if given and str(given[0]) in FORMATS else None
     if init is not None:
         typer.echo(import_export.init_mapping(given, init, urdf), nl=False)
-        typer.echo(f"\nMapping: {init}; check its lines marked CHOOSE", err=True)
+        typer.echo(f"\nMapping: {init}; check its lines marked CHOOSE, and GUESS where wrong", err=True)
         return
     if mapping is None or out is None:
         raise ScenarioError("import: name a mapping with --map and a folder with --out; --init drafts a mapping")

@@ -43,6 +43,7 @@ def test_files_give_the_errors_of_the_dataset(native, tmp_path, kinds):
     files += [] if "csv" in kinds else [tmp_path / "c3d/markers.csv"]
     mapping = tmp_path / "lab.yaml"
     text = import_export.init_mapping(files, mapping)
+    assert sum("# CHOOSE" in line for line in text.splitlines()) <= 3
     for pattern, line in EDITS:
         text, n = re.subn(pattern, line, text)
         assert n == 1

@@ -3,7 +3,7 @@
     f = s m |g| u + f_0,    u = R_base_sensor' (0, 0, -1)      s = 1: action of the hand on the sensor, -1: its reaction
 
 f_0 is the sensor's zero. The sign of the covariance of f and u is that of s; nothing is stated where they do not follow
-one another, as where the sensor's frame in the URDF is not its own.
+one another, as where the sensor's frame in the URDF is not its own, or where the hand hardly turns.
 """
 
 from collections.abc import Iterable
@@ -14,6 +14,7 @@ from calibration.formats.mapping.channels import Recorded
 from calibration.robot.chain import chain_of_frames
 
 _FOLLOWS = 0.8  # [-] correlation of the force with the weight's direction
+_TURNS = 0.3  # [-] least root mean square by which the weight's direction varies
 _SAMPLES = 200  # of a trial
 
 
@@ -41,7 +42,8 @@ def convention_of(trials: Iterable[Recorded], urdf: str, root: str, link: str) -
         return ""
     force, down = (x - x.mean(axis=0) for x in (np.concatenate(f), np.concatenate(u)))
     scale = np.sqrt((force**2).sum() * (down**2).sum())
-    follows = float((force * down).sum() / scale) if scale > 0.0 else 0.0
+    turned = np.sqrt((down**2).sum(axis=1).mean())
+    follows = float((force * down).sum() / scale) if scale > 0.0 and turned > _TURNS else 0.0
     if abs(follows) < _FOLLOWS:
         return ""
     return "action" if follows > 0.0 else "reaction"

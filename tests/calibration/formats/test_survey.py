@@ -7,7 +7,7 @@ import pytest
 
 import mjcf
 from calibration.errors import InputErrors
-from calibration.formats.mapping.channels import Markers, Recorded
+from calibration.formats.mapping.channels import Joints, Markers, Recorded
 from calibration.formats.mapping.short_form import TYPICAL, written_out
 from calibration.formats.survey.bodies import FoundBody, found_bodies
 from calibration.formats.survey.csv_view import view_csv
@@ -17,6 +17,8 @@ from calibration.formats.survey.robot import read_urdf
 from calibration.formats.survey.session import session_of
 from calibration.formats.survey.trials import suffixes
 from calibration.formats.survey.view import FileView
+from calibration.formats.survey.wrist_sign import convention_of
+from calibration.robot.chain import chain_of_frames
 from scenarios.files.errors import ScenarioError
 from scenarios.steps import import_export
 from tests.calibration.formats.test_bag import trial, write_bag
@@ -71,6 +73,18 @@ def test_a_wrist_sensor_beside_the_joints_is_drafted_and_asks_whose_wrench_it_is
         text = draft(session, "robot.urdf", ["log.csv"])
         assert "wrist: {force: [wrist_Fx, wrist_Fy, wrist_Fz], moment: [wrist_Mx, wrist_My, wrist_Mz]" in text
         assert f"wrist_link: {name}" in text and text.count("whose wrench") == 1 and not session.views[0].plates
+
+
+@pytest.mark.parametrize(("sign", "found"), [(1.0, "action"), (-1.0, "reaction"), (0.0, "")])
+def test_the_weight_below_a_wrist_sensor_shows_whose_wrench_it_stores(sign, found):
+    rng, urdf = np.random.default_rng(0), mjcf.urdf()
+    names = tuple(j for j in ROBOT.movable if j.startswith("arm"))
+    q = rng.uniform(-1.0, 1.0, (100, len(names)))
+    T = chain_of_frames(urdf, names, ROBOT.root, "wrist_ft_link").poses(q, "wrist_ft_link")
+    wrench = np.hstack([-8.0 * sign * T[:, 2, :3] + [3.0, -40.0, 5.0], np.zeros((100, 3))]) + rng.normal(size=(100, 6))
+    none = np.full(q.shape, np.nan)
+    joints = Joints(np.arange(100.0), names, q, none, none, none, none, wrench)
+    assert convention_of([Recorded("x", joints=joints)], urdf, ROBOT.root, "wrist_ft_link") == found
 
 
 @pytest.mark.parametrize("ros", [1, 2])
@@ -128,7 +142,7 @@ def test_a_draft_imports_as_it_is_and_asks_what_no_file_says(tmp_path):
     file = write_csv(tmp_path / "postures.csv", postures(20))
     text = import_export.init_mapping([file], tmp_path / "lab.yaml")
     lines = text.splitlines()
-    assert len(lines) <= 25 and sum(CHOOSE in line for line in lines) == 4
+    assert len(lines) <= 25 and sum(CHOOSE in line for line in lines) == 2
     import_export.import_files(None, (), tmp_path / "lab.yaml", tmp_path / "dataset")
     with pytest.raises(ScenarioError, match="exists"):
         import_export.init_mapping([file], tmp_path / "lab.yaml")
