@@ -5,8 +5,9 @@
 finds where most postures agree; a posture farther from what all others predict than `limit` is left out, the rest
 fitted by least squares, and every posture judged again until the set stays. Those left out have then decided where the
 search ended: it starts again with the postures kept, so that the fit is the one there would be without the others, and
-a wrong posture that hid behind another is found. Weights alone would discard the real, configuration-dependent errors
-of a robot; leaving out is for what no robot does.
+a wrong posture that hid behind another is found. One that was left out and that the fit of the others predicts after
+all does not contradict them: it comes back, and stays. Weights alone would discard the real, configuration-dependent
+errors of a robot; leaving out is for what no robot does.
 Reference: Lange, Little, Taylor, JASA 1989.
 """
 
@@ -23,7 +24,7 @@ from calibration.inference.residual import Linearised
 _NU = 4.0
 _ROUGHLY = 2.0  # times the limit, for what few postures say of all
 _FEW = 300  # components that are enough to find where most agree
-_RARE = 1e-5  # share of good postures beyond the limit, were their errors Gaussian
+RARE = 1e-5  # share of good postures beyond the limit, were their errors Gaussian
 _ROUNDS = 6
 
 
@@ -44,7 +45,7 @@ class RobustFit:
 
 def robust_fit(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.ndarray) -> RobustFit:
     """Fit from theta (p,); `problem` makes that of some of the n postures of d components, given as a mask."""
-    limit, asked = float(chdtri(d, _RARE)), np.ones(n, dtype=bool)
+    limit, asked = float(chdtri(d, RARE)), np.ones(n, dtype=bool)
     for _ in range(_ROUNDS):
         rows = np.flatnonzero(asked)
         found = _agreed(partial(_of_these, problem, n, rows), len(rows), d, theta, limit)
@@ -77,7 +78,7 @@ def _agreed(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.
     weight[some] = found.at.weight
     at, distance = _judged(everything, found, weight)
     kept = _near(distance, _ROUGHLY * limit)
-    used = kept
+    used, back = kept, np.zeros(n, dtype=bool)
     for _ in range(_ROUNDS):
         used = kept
         good = everything if kept.all() else problem(kept)
@@ -86,9 +87,10 @@ def _agreed(problem: Callable[[np.ndarray], Problem], n: int, d: int, theta: np.
             distance = distances(found.at, found.noise, found.widths, found.covariance)
         else:
             at, distance = _judged(everything, found, kept.astype(float))
-        kept = _near(distance, limit)
+        kept = _near(distance, limit) | back
         if np.array_equal(kept, used):
             break
+        back = back | (kept & ~used)
     return RobustFit(found, used, distance)
 
 

@@ -27,6 +27,7 @@ Role = Literal["calibration", "validation", "confirmation"]
 Kind = Literal["static", "sweep", "swing", "spin", "drive"]
 _ORTHOGONAL = 1e-3  # axes of a plate may be rounded [-]
 _GRAVITY = (0.5, 30.0)  # [m/s2]
+_FLAT = 1e-6  # second extent of markers over the first below which they stand in a line [-]
 _MOST_JOINTS, _MOST_BODIES, _MOST_MARKERS, _MOST_TRIALS = 100, 100, 1000, 10_000
 
 
@@ -69,6 +70,15 @@ class Body(Declaration):
     link: Name
     markers: Annotated[tuple[Marker, ...], Field(max_length=_MOST_MARKERS)]
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @field_validator("markers")
+    @classmethod
+    def _are_not_in_line(cls, markers: tuple[Marker, ...]) -> tuple[Marker, ...]:
+        x = np.array([m.xyz for m in markers]).reshape(-1, 3)
+        spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False) if len(x) >= 3 else np.ones(2)
+        if spread[1] < _FLAT * spread[0] or spread[0] == 0.0:
+            raise ValueError("are drawn in a line: they have no rotation; draw them where they are")
+        return markers
 
     @property
     def is_point(self) -> bool:

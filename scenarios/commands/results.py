@@ -66,7 +66,7 @@ def picture(  # noqa: PLR0913  an option each
     clip: Annotated[Path | None, typer.Option(metavar="FILE", help="The GIF to write.")] = None,
     still: Annotated[Path | None, typer.Option(metavar="FILE", help="The PNG to write, at --start.")] = None,
     magnify: Annotated[
-        float, typer.Option(min=0.0, metavar="M", help="Show the base's motion M times as large.")
+        float, typer.Option(min=0.0, max=1e4, metavar="M", help="Show the base's motion M times as large.")
     ] = 1.0,
     start: Annotated[
         float, typer.Option(min=0.0, metavar="S", help="Start of the clip, or time of the still [s].")
@@ -110,7 +110,7 @@ def view(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="The page; RUN/view.html unless given.")] = None,
     magnify: Annotated[
-        float, typer.Option(min=0.0, metavar="M", help="Show errors and base motion M times as large.")
+        float, typer.Option(min=0.0, max=1e4, metavar="M", help="Show errors and base motion M times as large.")
     ] = 20.0,
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open it in a browser.")] = False,
 ) -> None:

@@ -1,9 +1,12 @@
 """Cases of damaged and forged datasets: names and places of files, JSON, arrays, URDF."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from calibration.recording.trial import read_trial, write_trial
 from tests.hostile.case import Case, edit, linked, pipe, put, replaced, text
 from tests.hostile.laboratory import renew, trial, values
 
@@ -71,6 +74,28 @@ JSON = [
         CALIBRATE,
         "no frame named 'no'",
     ),
+    Case(
+        "payload of 1e308 kg",
+        put(DATA, "payload", value={"link": "arm_7_link", "mass": 1e308, "com": [0, 0, 0], "tolerance": 0.1}),
+        CALIBRATE,
+        "payload.mass",
+    ),
+    Case(
+        "wheels of one name",
+        put(DATA, "wheels", value=2 * [{"name": "w", "type": "drive", "centre": [0, 0, 0.1], "contact": [0, 0, 0]}]),
+        CALIBRATE,
+        "wheels named more than once: ['w']",
+    ),
+    Case("body on an unknown link", put(DATA, "bodies", 1, "link", value="no"), CALIBRATE, "no frame named 'no'|no "),
+    Case("base frame that moves", put(DATA, "base_frame", value="torso_lift_link"), CALIBRATE, "moves with joint"),
+    Case("tool frame on the base", put(DATA, "tool_frame", value="base_footprint"), CALIBRATE, "no measured joint"),
+    Case("joints in another order", edit(DATA, lambda d: d["joints"].reverse()), CALIBRATE, "joints"),
+    Case(
+        "hand drawn in a line",
+        edit(DATA, lambda d: [m.update(xyz=[0.1 * k, 0, 0]) for k, m in enumerate(d["bodies"][1]["markers"])]),
+        CALIBRATE,
+        "drawn in a line",
+    ),
     Case("a lone surrogate", text(DATA, '{"robot": "\\ud800"}'), CALIBRATE, "robot"),
 ]
 
@@ -106,6 +131,18 @@ def _absent(folder: Path) -> None:
 def _strings(file) -> None:
     file.renameVariable("q_motor", "old")
     file.createVariable("q_motor", str, ("t_robot", "joint"))
+
+
+def _one_sample(*names: str) -> Callable[[Path], None]:
+    """The swing with the first sample of some arrays alone."""
+
+    def spoil(folder: Path) -> None:
+        path = folder / "data/trials/swing.nc"
+        swing = read_trial(path)
+        write_trial(path, replace(swing, **{name: getattr(swing, name)[:1] for name in names}))
+        renew(folder)
+
+    return spoil
 
 
 def _last(value: float):
@@ -144,6 +181,13 @@ TRIALS = [
     Case("a dwell NaN", values("postures", "dwell_start", _last(np.nan)), EXPORT, "dwell"),
     Case("approach 127", values("postures", "approach", lambda x: x + 127), CALIBRATE, "approach"),
     Case("a link out of the dataset", _linked_out, LOOK_ONE, "link out"),
+    Case(
+        "one sample of readings",
+        _one_sample("t_robot", "q_motor", "q_link", "v_motor", "effort", "q_command", "wrist_wrench"),
+        CALIBRATE,
+        "t_robot",
+    ),
+    Case("one sample of the plate", _one_sample("t_plate", "plate_wrench"), CALIBRATE, "t_plate"),
     Case("checksum of another", put(DATA, "trials", 0, "sha256", value="0" * 64), LOOK, "sha256"),
     Case(
         "one plate sample NaN",

@@ -70,6 +70,7 @@ RESULTS = [
         "check run --max coverage=2",
         "not known",
     ),
+    Case("picture magnified infinitely", lambda d: None, "picture run --clip out.gif --magnify inf", "--magnify"),
     Case("collection {", text("run/collection.json", "{"), "dataset short -n 1 --out run", "not a collection"),
 ]
 

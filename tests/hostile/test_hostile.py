@@ -5,6 +5,7 @@ import shutil
 import pytest
 
 from tests.hostile.case import Case, judged
+from tests.hostile.findings import FINDINGS, unshown
 from tests.hostile.laboratory import copied, make
 from tests.hostile.page import tables
 
@@ -26,3 +27,7 @@ def test_a_hostile_case_ends_as_its_row_says(laboratory, tmp_path, case: Case):
     found = judged(case, folder)
     shutil.rmtree(folder, ignore_errors=True)
     assert not found.wrong, f"{found.wrong}\n{found.outcome.said[-3000:]}"
+
+
+def test_every_finding_of_use_is_a_row_a_test_or_argued():
+    assert not list(unshown(FINDINGS))

@@ -19,9 +19,10 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.time_delay import coarse_lag, fit_lag
 from calibration.recording.clock import Clock, shared_clock
-from calibration.recording.schema import Tolerances
+from calibration.recording.schema import Description, Tolerances
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.clock_fit import TrialLag, allowance, fit_clock
@@ -78,7 +79,10 @@ def _estimated_robot_clock(
     lab: Laboratory, trials: Sequence[Trial]
 ) -> tuple[Clock, Provisional | None, tuple[Verdict, ...]]:
     chain, description = lab.chain, lab.description
-    robot, verdicts = _clock("robot", robot_motions(description, chain, trials), 1, description.tolerances)
+    try:
+        robot, verdicts = _clock("robot", robot_motions(description, chain, trials), 1, description.tolerances)
+    except NotEnoughData as error:
+        raise NotEnoughData(f"{error}; {_shown(description, trials)}") from error
     try:
         model = provisional(chain, description, trials, robot)
         robot, verdicts = _concluded("robot", refined(model, description, trials, robot), description.tolerances)
@@ -86,6 +90,13 @@ def _estimated_robot_clock(
         warning = Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}")
         return robot, None, (*verdicts, warning)
     return robot, model, verdicts
+
+
+def _shown(description: Description, trials: Sequence[Trial]) -> str:
+    """What trials that identify no clock of the robot show, or do not."""
+    if any(np.isfinite(MeasuredTrial.of(description, trial).T_base_hand).all(axis=(1, 2)).any() for trial in trials):
+        return "readings and markers show no common rotation: jitter of the stamps, units, readings of another time?"
+    return "base and hand are never seen at once by three markers each"
 
 
 def _plate_clock(

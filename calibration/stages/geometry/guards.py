@@ -22,7 +22,7 @@ _SCALE = 1.2  # plausible ratio of the robot's size to the measured one, or its 
 APART = 0.05  # [rad, a tenth of it in m] postures closer than this in every joint are one
 _CONDITION_OF_COMPLIANCES = 1e6  # scaled [-]
 _FACTOR = 6.0  # largest plausible ratio of a prior's width to what it began with [-]
-_READING = 0.03  # largest plausible random error of a reading [rad, a tenth of it in m]
+READING = 0.03  # largest plausible random error of a reading [rad, a tenth of it in m]
 MANY_ODD = 0.25  # share of postures that may be wrong
 TOO_FEW, DEFICIENT = "distinct postures among", "the postures do not excite the model"
 _HAND = (("position [m]", 1e-2), ("rotation [rad]", 5e-2))  # largest plausible random errors of the hand
@@ -109,7 +109,7 @@ def _implausible_values(hand: HandModel, parameters: ParameterSet, fit: Fit) -> 
             yield f"{name} = {offset:.3g} exceeds the plausible {_OFFSET * length:.2g}; readings of another joint?"
     reading = fit.noise_sigma(reading_names(hand.nominal))
     for joint, s, length, seen in zip(joints, reading, lengths, _seen(fit, len(joints)), strict=True):
-        if s * seen > _READING * length:
+        if s * seen > READING * length:
             yield f"readings of {joint} scatter by {s:.2g}; units, order of the joints, tool frame?"
     for (what, limit), s in zip(_HAND, fit.noise_sigma(HAND_NAMES), strict=False):
         if s > limit:

@@ -12,9 +12,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import chdtri
 
 from calibration.inference.identifiability import identifiability
-from calibration.inference.outliers import RobustFit, robust_fit
+from calibration.inference.outliers import RARE, RobustFit, robust_fit
 from calibration.inference.parameters import Model, ParameterSet
 from calibration.inference.small_sample import small_sample_covariance
 from calibration.mocap.cluster_shape import of_one_shape
@@ -24,11 +25,13 @@ from calibration.recording.schema import Description
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
+from calibration.robot.parameter_block import joint_lengths
 from calibration.stages.geometry.departures import shown_by, with_departures
 from calibration.stages.geometry.guards import (
     APART,
     CONDITION,
     MANY_ODD,
+    READING,
     few,
     implausible,
     recommended,
@@ -42,6 +45,7 @@ from calibration.stages.geometry.parameters import geometry_parameters, hand_mod
 from calibration.verdict import Verdict
 
 STAGE = "geometry"
+_OTHER_SIDE = 0.1  # share of postures of which one joint may be on the other side of its backlash
 
 
 def calibrate_geometry(
@@ -66,7 +70,7 @@ def calibrate_geometry(
     if scarce and not refused:
         message = f"fewer than the {recommended(chain, postures.components)} distinct postures recommended"
         verdicts.append(Verdict(STAGE, "warning", f"{message}; what they do not show stays near nominal"))
-    verdicts += left_out(postures, robust)
+    verdicts += left_out(postures, robust, 0.0, other_sides(hand, parameters, postures, errors, robust))
     still = [name for name, span in zip(chain.joints, spans(chain, postures), strict=True) if span < APART]
     if still:
         verdicts.append(
@@ -107,13 +111,44 @@ def fit_robustly(hand: HandModel, parameters: ParameterSet, postures: Postures, 
     return RobustFit(found.fit, kept, distance)
 
 
-def left_out(postures: Postures, found: RobustFit, usual: float = 0.0) -> Iterator[Verdict]:
+def other_sides(
+    hand: HandModel, parameters: ParameterSet, postures: Postures, errors: NoiseModel, found: RobustFit
+) -> np.ndarray:
+    """Which postures left out (n,) one joint's reading explains, off by no more than the largest plausible backlash.
+
+    Of 20 postures, one may be the only one with its link on the other side of a gap: r = b_j x + noise, chi-square.
+    """
+    explained = np.zeros(len(postures), dtype=bool)
+    odd = np.flatnonzero(~found.kept & np.isfinite(found.distance))
+    if not len(odd):
+        return explained
+    problem = hand_problem(hand, parameters, postures.rows(odd), errors)
+    at, lengths = problem.linearise(found.fit.theta), joint_lengths(hand.nominal)
+    W = problem.noise.roots(at.B, found.fit.widths.noise)
+    A, r, b = W @ at.J, (W @ at.r[..., None])[..., 0], W @ at.B[:, :, : len(lengths)]
+    P = np.linalg.inv(np.eye(r.shape[1]) + A @ found.fit.covariance @ np.swapaxes(A, 1, 2))
+    along, size = np.einsum("nij,nil,nl->nj", b, P, r), np.einsum("nij,nil,nlj->nj", b, P, b)
+    rest = np.einsum("ni,nij,nj->n", r, P, r)[:, None] - along**2 / size
+    small = np.abs(along / size) <= 2.0 * READING * lengths
+    explained[odd] = (small & (rest <= chdtri(r.shape[1] - 1, RARE))).any(axis=1)
+    return explained
+
+
+def left_out(
+    postures: Postures, found: RobustFit, usual: float = 0.0, explained: np.ndarray | None = None
+) -> Iterator[Verdict]:
     """The postures that were not used, by name; up to a share `usual` of good ones contradict a fine model as well."""
-    odd = np.flatnonzero(~found.kept)
-    if len(odd):
-        names = ", ".join(postures.label[odd] if len(postures.label) else odd.astype(str))
-        message = (
-            f"{len(odd)} of {len(postures)} postures contradict the others and were left out, counted from 0: {names}"
-        )
-        share = len(odd) / len(postures)
-        yield Verdict(STAGE, "refused" if share > MANY_ODD else "warning" if share > usual else "ok", message)
+    odd, n = ~found.kept, len(postures)
+    sides = odd & explained if explained is not None else np.zeros(n, dtype=bool)
+    if sides.sum() > _OTHER_SIDE * n or odd.sum() > MANY_ODD * n:
+        sides = np.zeros(n, dtype=bool)
+    name = postures.label if len(postures.label) else np.arange(n).astype(str)
+    if sides.any():
+        message = f"{sides.sum()} of {n} postures have a joint on the other side of its backlash"
+        yield Verdict(STAGE, "ok", f"{message} and were left out, counted from 0: {', '.join(name[sides])}")
+    odd = odd & ~sides
+    if odd.any():
+        message = f"{odd.sum()} of {n} postures contradict the others and were left out, counted from 0: "
+        share = odd.sum() / n
+        kind = "refused" if share > MANY_ODD else "warning" if share > usual else "ok"
+        yield Verdict(STAGE, kind, message + ", ".join(name[odd]))

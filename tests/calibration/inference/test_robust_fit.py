@@ -1,6 +1,7 @@
 """A robust fit returns the postures that it used, also where it stopped before they were settled."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,3 +29,22 @@ def test_the_postures_kept_are_those_of_the_fit(monkeypatch, rounds):
         lambda some: hand_problem(hand, parameters, postures.rows(some), none), 60, 6, parameters.nominal
     )
     assert len(found.fit.r_white) == found.kept.sum() < 60
+
+
+def test_a_posture_that_the_fit_of_the_others_predicts_comes_back_and_stays(monkeypatch):
+    fits = []
+
+    def solved(problem, *_, **__):
+        fits.append(problem)
+        return SimpleNamespace(at=SimpleNamespace(weight=np.ones(8)), noise=None, widths=None, covariance=None)
+
+    def judged(problem, found, weight):  # the last row alone is far from a fit that has it, and near one that has not
+        return SimpleNamespace(rows=lambda kept: None), np.array([*np.ones(7), 50.0 if weight[-1] else 10.0])
+
+    monkeypatch.setattr(outliers, "solve", solved)
+    monkeypatch.setattr(outliers, "_judged", judged)
+    monkeypatch.setattr(outliers, "distances", lambda *_: np.array([*np.ones(7), 50.0]))
+    monkeypatch.setattr(outliers, "replace", lambda problem, **_: problem)
+    problem = SimpleNamespace(linearise=lambda theta: None)
+    found = outliers._agreed(lambda some: problem, 8, 6, np.zeros(1), 33.0)
+    assert found.kept.all()

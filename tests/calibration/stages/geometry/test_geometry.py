@@ -206,6 +206,17 @@ def test_thirty_good_postures_are_not_refused(chain):
     assert refusals(chain, postures) == ""
 
 
+@pytest.mark.parametrize(("off", "kind", "words"), [(0.03, "ok", "other side of its"), (0.2, "warning", "contradict")])
+def test_a_link_alone_on_the_other_side_of_its_gap_is_no_contradiction(chain, off, kind, words):
+    truth = rigid_robot.defects(1)
+    q = rigid_robot.random_angles(np.random.default_rng(0), 30)
+    found = rigid_robot.postures(truth, q, 2e-5)
+    read = q + truth.offset
+    read[7, 6] += off
+    verdicts = calibrate_geometry(chain, rigid_robot.described(), replace(found, q=read))[1]
+    assert [v.verdict for v in verdicts if words in v.message] == [kind]
+
+
 def test_three_postures_are_refused(chain):
     postures = with_play(rigid_robot.defects(1), rigid_robot.near_postures(np.random.default_rng(1), 3))
     assert "3 distinct postures" in refusals(chain, postures)
