@@ -12,7 +12,7 @@ from dataclasses import replace
 from calibration.breakdown import Breakdowns
 from calibration.checks.changes import changes, exchanged_sides, wrong_mounts
 from calibration.checks.joint_columns import wrong_columns
-from calibration.checks.recordings import judged, listed_twice
+from calibration.checks.recordings import judged, listed_twice, unused_plates
 from calibration.checks.unexplained import passed, unexplained
 from calibration.conclusion import conclusion
 from calibration.context import Context, with_postures
@@ -194,6 +194,8 @@ def _synchronised(context: Context, means: Sequence[PostureMeans]) -> Context:
         if context.data.rejected:
             return context
         raise
+    if not any(clock.instrument == "plate" for clock in clocks):
+        findings = (*findings, *unused_plates(data.lab, data.trials))
     return Context(replace(data, clocks=clocks), replace(context.estimate, clocks=clocks)).with_findings(*findings)
 
 
@@ -211,7 +213,10 @@ def _changed(data: StageInput) -> Iterator[Verdict]:
         return
     hand = hand_of(model, data.lab.chain, data.lab.nominal_frames)
     yield from wrong_mounts(hand, model, data.lab.description)
-    left = unexplained(hand, model, passed(trials, robot))
+    samples = passed(trials, robot)
+    if not len(samples.t):
+        return
+    left = unexplained(hand, model, samples)
     changed = [*changes(left, data.lab.description, [t.id for t in trials])]
     yield from changed or remounted(hand, model, data.static, data.lab.description)
     yield from exchanged_sides(left, data.lab.description)

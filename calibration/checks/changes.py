@@ -35,6 +35,7 @@ _CHANCE, _CLEAR = 5.7e-7, 1.1  # five standard deviations; times the square of t
 _SURE = 5.0  # standard deviations
 _FAR_OFF = 4.0  # tolerances of a body of markers the hand may be off throughout
 _MOUNTED = 3.0  # tolerances a body of markers may be off its drawing
+_KNOWN = 4.0  # standard deviations of the clock that readings may be late unsaid, long after the trials it is of
 _LATE, _SLOW = 3e-3, 0.02  # [s]; [rad/s, m/s] below which backlash is not on one side
 _NEAR, _UNCLEAR = 3.0, 0.25  # sigma from exchanged; a sigma that leaves sides open [-]
 _GEAR = 10.0  # times what a gear explains: a difference of sides that no exchange makes, see `joint_readings`
@@ -262,7 +263,8 @@ def _late(left: Unexplained, when: str, step: np.ndarray) -> Change:
     """Readings that come late; a link behind backlash does so as well, by a constant angle against the motion."""
     v = left.x.v[:, None, left.hand.nominal.columns]
     late, behind = -(left.J * v).sum(axis=2, keepdims=True) * step[:, None, None], left.J * np.tanh(v / _SLOW)
-    columns, limit = np.concatenate([late, behind], axis=2), np.array([_LATE])
+    known = float(np.sqrt((left.x.late[step > 0.0] ** 2).mean()))
+    columns, limit = np.concatenate([late, behind], axis=2), np.array([np.hypot(_LATE, _KNOWN * known)])
     return Change(f"readings are late{when}", columns, limit, "ms", moves=("clock.robot.offset",))
 
 

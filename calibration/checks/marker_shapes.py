@@ -32,6 +32,7 @@ _SURE = 5.0  # standard deviations
 _SCALE, _WRONG_SCALE = 1e-3, 5e-3  # off by less is 1 mm at the hand, by more 5 mm [-]
 _ODD, _FAR = 3.0, 1e-3  # times the usual size, and [m], a marker may be off its drawing unsaid
 _WINDOW = 2.0  # [s]
+_QUIET = 20.0  # times less than declared that markers may scatter unsaid
 _MOVED, _LASTING = 10.0, 2  # standard deviations of a marker's noise; windows in which it shows, a ghost in one
 
 
@@ -59,6 +60,13 @@ def wrong_shapes(lab: Laboratory, trials: Sequence[Trial | PostureMeans]) -> Ite
     known = {name: e for name, e in usual.items() if np.isfinite(e).all()}
     if not known:
         return
+    moving = [_scatter(shapes[name], e) for name, e in known.items()]
+    if np.nanmax([0.0, *moving]) * _QUIET < description.sigmas.marker and np.isfinite(moving).any():
+        message = (
+            f"markers scatter by {1e3 * np.nanmax(moving):.2g} mm, sigmas.marker of dataset.json is "
+            f"{1e3 * description.sigmas.marker:.2g} mm: correct it (in metres), what the markers show hardly counts"
+        )
+        yield Verdict(STAGE, "warning", message)
     xyz = {name: _drawn(bodies[name]) for name in known}
     scale, sigma = _scale([(xyz[name], e) for name, e in known.items()])
     if abs(scale - 1.0) > max(_SURE * sigma, _SCALE):
@@ -125,6 +133,12 @@ def _median(e: np.ndarray) -> np.ndarray:
     """Median (m, 3) over samples e (n, m, 3) that show every marker; NaN without one."""
     whole = e[np.isfinite(e).all(axis=(1, 2))]
     return np.median(whole, axis=0) if len(whole) else np.full(e.shape[1:], np.nan)
+
+
+def _scatter(shapes: Sequence[Shape], usual: np.ndarray) -> float:
+    """rms [m] of residuals about the usual ones (m, 3), noise and all else; NaN where there are means alone."""
+    e = [s.e - usual for s in shapes if s.t is not None]
+    return float(np.sqrt(np.nanmean(np.concatenate(e) ** 2))) if e else np.nan
 
 
 def _scale(known: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:

@@ -35,6 +35,7 @@ _BORNE = 0.1  # share of the weight that a wheel may bear [-]
 _TURNED, _WRONG = np.radians(4.0), np.radians(20.0)  # plate to lab: doubtful, not usable [rad]
 _MIRRORED = -0.5  # correlation [-]
 _ALIKE = 0.7  # share of common motion of two pairs of moments between which an angle means something [-]
+_STAYS, _FEW = 0.2, 100  # share of samples at the largest or least reading; samples that show one
 _FAINT = (1.0, 0.5)  # rms force [N] and moment [N.m] that say nothing of a sign
 _SHIFTED, _TWISTED = 15e-3, 0.1  # rest pose after against before: slip alone reaches 6 mm, 30 mrad [m, rad]
 _NAMES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -68,6 +69,8 @@ def implausible_plates(trial: Trial, weight: float) -> Iterator[str]:
     if not len(trial.t_plate):
         return
     load = -float(np.median(trial.plate_wrench[:, :, 2].sum(axis=1)))
+    if not np.isfinite(load):
+        return
     if load < 0.0:
         yield (
             f"plate: Fz is {-load:+.0f} N on a robot that weighs {weight:.0f} N: its wrench is the reaction, or the "
@@ -75,6 +78,16 @@ def implausible_plates(trial: Trial, weight: float) -> Iterator[str]:
         )
     elif not weight / _LOAD < load < weight * _LOAD:
         yield f"plate carries {load:.3g} N, the nominal robot weighs {weight:.0f} N; see the plate's units and labels"
+
+
+def saturated(trial: Trial) -> Iterator[str]:
+    """Channels of the plates that stay at their largest or least reading; a channel of zeros is not measured."""
+    if len(trial.t_plate) < _FEW:
+        return
+    for name, channel in zip(_NAMES, np.moveaxis(trial.plate_wrench, 2, 0), strict=True):
+        for end in {*channel.max(axis=0).tolist(), *channel.min(axis=0).tolist()} - {0.0}:
+            if (share := float((channel == end).any(axis=1).mean())) > _STAYS:
+                yield f"plate: {name} stays at {end:.4g} in {100.0 * share:.0f} % of the samples: saturated, or stuck"
 
 
 def wrong_plate(lab: Laboratory, plate: Sequence[Felt], dynamics: Sequence[Felt]) -> Iterator[Verdict]:
@@ -99,6 +112,12 @@ def _against_dynamics(
         message = f"plate scale: it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} N"
         yield Verdict(STAGE, "refused", message)
         return
+    yield from _weighed(lab, rest, dynamics, weight)
+    yield from _driven(lab, rest, _slow(plate, dynamics))
+
+
+def _weighed(lab: Laboratory, rest: np.ndarray, dynamics: Sequence[Felt], weight: float) -> Iterator[Verdict]:
+    """A load that is not the robot's, whose nominal weight is given [N]."""
     spread = weight_spread(lab)
     missing = rest - np.median([f.rest for f in dynamics], axis=0)
     off = _off_plate(lab.description, missing)
@@ -110,11 +129,16 @@ def _against_dynamics(
         if off:
             message += f"; what is missing is as if {off} stood off the plate"
         yield Verdict(STAGE, "warning", message, (((SCALE, float(-rest[2] / weight - 1.0)),),))
-    pairs = _slow(plate, dynamics)
+
+
+def _driven(lab: Laboratory, rest: np.ndarray, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Iterator[Verdict]:
+    """Slow changes of the plate's wrench that are not those of the robot's motion."""
     p, d = (np.concatenate(a) for a in zip(*pairs, strict=True))
     mirrored = [name for k, name in enumerate(_NAMES) if _is_mirrored(k, p[:, k], d[:, k])]
     psi = _turn([(d[:, 3:5], p[:, 3:5]) for p, d in pairs])
     outside = _outside(lab.description, np.array([-rest[4], rest[3]]) / rest[2])
+    loud, ratio = float(np.linalg.norm(d[:, 3:5].std(axis=0))), float(np.linalg.norm(p[:, 3:5].std(axis=0)))
+    ratio /= max(loud, np.finfo(float).tiny)
     if abs(psi) > _WRONG:
         message = f"plate rotated by {np.degrees(psi):.0f} deg about the vertical against the lab: turn its axes"
         yield Verdict(STAGE, "refused", message)
@@ -123,6 +147,9 @@ def _against_dynamics(
         yield Verdict(STAGE, "refused", message)
     elif outside > _OUTSIDE:
         yield Verdict(STAGE, "refused", _misplaced(outside))
+    elif loud > 4.0 * _FAINT[1] and not 1.0 / _LOAD < ratio < _LOAD:
+        message = f"plate scale: its moments change by {ratio:.2g} of those of the robot's motion; see their unit"
+        yield Verdict(STAGE, "refused", message)
     elif abs(psi) > _TURNED:
         message = f"plate rotated by {np.degrees(psi):.1f} deg about the vertical against the lab"
         yield Verdict(STAGE, "warning", message, (((TURN, psi),),))

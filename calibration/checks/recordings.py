@@ -12,7 +12,7 @@ import numpy as np
 from calibration.checks.joint_readings import commanded, implausible_readings, missing_readings, wrong_sides
 from calibration.checks.marker_bodies import implausible_markers, not_rigid, wrong_scale
 from calibration.checks.marker_shapes import STAGE, wrong_shapes
-from calibration.checks.plates import implausible_plates
+from calibration.checks.plates import implausible_plates, saturated
 from calibration.errors import InputError
 from calibration.mocap.dwells import rests
 from calibration.mocap.measured_trial import MeasuredTrial
@@ -63,12 +63,24 @@ def judged(lab: Laboratory, trials: Sequence[Trial | PostureMeans], calibrated: 
     continuous = [MeasuredTrial.of(lab.description, t) for t in trials if isinstance(t, Trial)]
     found = [*wrong_shapes(lab, trials), *wrong_dwells(continuous), *holes(continuous)]
     for trial in continuous:
+        found += [Verdict(STAGE, "warning", f"{trial.id}: {message}") for message in saturated(trial)]
         wrong = [*commanded(trial, lab.description.sigmas.encoder)]
         if not calibrated:
-            weight = float(sum(i.mass for i in lab.floating.inertias) * np.linalg.norm(lab.description.gravity))
-            wrong += [*wrong_sides(trial), *implausible_plates(trial, weight)]
+            wrong += [*wrong_sides(trial), *implausible_plates(trial, _weight(lab))]
         found += [Verdict(STAGE, "refused", f"{trial.id}: {message}") for message in wrong]
     return tuple(found)
+
+
+def unused_plates(lab: Laboratory, trials: Sequence[Trial]) -> Iterator[Verdict]:
+    """What is wrong with plates on no known clock, which no stage judges."""
+    for trial in trials:
+        for message in implausible_plates(trial, _weight(lab)):
+            yield Verdict(STAGE, "warning", f"{trial.id}: {message}")
+
+
+def _weight(lab: Laboratory) -> float:
+    """Of the nominal robot [N]."""
+    return float(sum(i.mass for i in lab.floating.inertias) * np.linalg.norm(lab.description.gravity))
 
 
 def _named(lab: Laboratory, trials: Sequence[Trial | PostureMeans]) -> Iterator[str]:

@@ -38,6 +38,7 @@ class Passed:
         v: (n, n_measured) their velocities [rad/s, m/s].
         link: (n, n_measured) link readings [rad, m], NaN without one.
         T: (n, 4, 4) measured T_B_H.
+        late: (n,) standard deviation of the readings' clock [s].
     """
 
     trial: np.ndarray
@@ -46,6 +47,7 @@ class Passed:
     v: np.ndarray
     link: np.ndarray
     T: np.ndarray
+    late: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,9 @@ def passed(trials: Sequence[MeasuredTrial], robot: Clock) -> Passed:
         good = np.isfinite(before + q + after).all(axis=1) & np.isfinite(T).all(axis=(1, 2))
         v = (after - before) / (2.0 * _STEP)
         link = readings_at(trial, robot, t[rows], trial.q_link)
-        found.append((np.full(good.sum(), k), t[rows][good], q[good], v[good], link[good], T[good]))
+        at = t[rows][good]
+        late = robot.sigma_at(robot.from_mocap(at))
+        found.append((np.full(good.sum(), k), at, q[good], v[good], link[good], T[good], late))
     return Passed(*(np.concatenate(x) for x in zip(*found, strict=True)))
 
 

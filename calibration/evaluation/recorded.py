@@ -63,4 +63,9 @@ def departures(
     lab = Laboratory(estimate.urdf or dataset.urdf, dataset.description)
     hand = hand_of(model, lab.chain, lab.nominal_frames)
     for trial in trials:
-        yield from constants(unexplained(hand, model, passed([trial], robot)), dataset.description, trial.id)
+        samples = passed([trial], robot)
+        if len(samples.t):
+            yield from constants(unexplained(hand, model, samples), dataset.description, trial.id)
+        else:
+            message = f"{trial.id}: no reading is beside a marker by the calibrated clock: another clock or session?"
+            yield Verdict("reading", "warning", message)

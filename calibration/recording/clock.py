@@ -33,6 +33,11 @@ class Clock:
         """Times t [s] of the motion-capture clock on the instrument's clock [s]."""
         return (t - self.offset) / (1.0 + self.drift)
 
+    def sigma_at(self, t: np.ndarray) -> np.ndarray:
+        """Standard deviations (n,) of t_mocap [s] at times t (n,) of the instrument [s]."""
+        offset, both, drift = self.covariance[0, 0], self.covariance[0, 1], self.covariance[1, 1]
+        return np.sqrt(np.maximum(offset + (2.0 * both + drift * t) * t, 0.0))
+
 
 def shared_clock(instrument: str) -> Clock:
     """The clock of an instrument that one machine samples together with the motion capture."""

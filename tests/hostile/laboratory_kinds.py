@@ -217,7 +217,7 @@ PLATE = (
     _plate("plate reads zero", lambda w: 0.0 * w, "plate"),
     _plate("plate saturated at 600 N", lambda w: np.maximum(w, [-1e9, -1e9, -600.0, -1e9, -1e9, -1e9]), "plate scale"),
     _plate("Fz of the plate missing", lambda w: w * [1.0, 1.0, np.nan, 1.0, 1.0, 1.0], "plate"),
-    _plate("wrench of another moment", lambda w: np.roll(w, len(w) // 2, axis=0), ""),
+    _plate("wrench of another moment", lambda w: np.roll(w, len(w) // 2, axis=0), "plate rotated by"),
     _plate("plate reversed in time", lambda w: w[::-1], ""),
     _plate("plate a quarter too heavy", lambda w: 1.25 * w, "plate scale"),
     _plate("30 kg on the plate", lambda w: w + [0.0, 0.0, -294.0, 0.0, 0.0, 0.0], "plate scale"),
@@ -301,7 +301,8 @@ FITTED = (
         t, t_mocap=t.t_mocap[::2], marker_position=t.marker_position[::2])), "", 1.1),
     Mistake("robot moved by 5 mm", _robot_moved(5e-3), "", 1.02),
     Mistake("robot moved by 50 mm", _robot_moved(5e-2), "", 1.02),
-    Mistake("sigma of markers a thousand times too large", _listed("sigmas", "marker", value=0.1), ""),
+    Mistake("sigma of markers a thousand times too large", _listed("sigmas", "marker", value=0.1),
+        "markers scatter by"),
     Mistake("tolerances in millimetres", _listed("tolerances", value=lambda t: {
         k: v * 1000.0 if k.endswith("translation") else v for k, v in t.items()}), ""),
     Mistake("tolerances a millionth", _listed("tolerances", value=lambda t: {

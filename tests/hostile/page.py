@@ -26,8 +26,8 @@ case, each tried on a copy of one small laboratory in a process of its own: what
 message must have. `make test` tries every other of the fast rows, `make slow` all; `make fuzz` adds random damage for
 half an hour.
 
-Bounds of every row: {MEMORY / 2**30:.0f} GB beyond the start of the process, {SECONDS} s, no traceback, no crash,
-nothing written outside `--out`, nothing left half-written.
+Bounds of every row: {MEMORY / 2**30:.0f} GB beyond the start of the process, {SECONDS} s of a processor, no traceback,
+no crash, nothing written outside `--out`, nothing left half-written.
 
 """
 _RANDOM = "## Mistakes at random, and clean campaigns"

@@ -77,6 +77,7 @@ def unusable_data(chain: Chain, q: np.ndarray, start: Start, components: int) ->
     size = abs(start.scale)
     if not 1.0 / _SCALE < size < _SCALE:
         unit = " (markers recorded in millimetres?)" if 5e-4 < size < 2e-3 else ""
+        unit += f" of {n} distinct postures, which are few" if n < recommended(chain, components) else ""
         yield f"the robot is {size:.3g} times as large as by the markers' paths{unit}; units, joint order, tool frame?"
     elif start.scale < 0.0:
         yield "the markers move as in a mirror: the laboratory's frame is left-handed; swap two axes or turn one"

@@ -150,5 +150,5 @@ def left_out(
     if odd.any():
         message = f"{odd.sum()} of {n} postures contradict the others and were left out, counted from 0: "
         share = odd.sum() / n
-        kind = "refused" if share > MANY_ODD else "warning" if share > usual else "ok"
-        yield Verdict(STAGE, kind, message + ", ".join(name[odd]))
+        message += ", ".join(name[odd])
+        yield Verdict(STAGE, "refused" if share > MANY_ODD else "warning" if share > usual else "ok", message)

@@ -151,8 +151,9 @@ def test_a_slightly_turned_plate_is_reported(trials):
         assert f"rotated by {degrees:.0f}" in said(fit([turned(t, degrees) for t in trials])[1], "warning")
 
 
-def test_springs_may_be_off_by_the_scale_of_a_doubtful_plate(trials, fitted):
-    suspension, verdicts = fit([plated(t, 1.2 * t.plate_wrench[:, 0]) for t in trials])
+@pytest.mark.parametrize("change", [lambda t: plated(t, 1.2 * t.plate_wrench[:, 0]), lambda t: turned(t, 8.0)])
+def test_springs_may_be_off_by_the_scale_or_turn_of_a_doubtful_plate(trials, fitted, change):
+    suspension, verdicts = fit([change(t) for t in trials])
     (moved,) = next(v.moves for v in verdicts if v.moves)
     known, clean = ({p.name: p.value for p in s.parameters} for s in (suspension, fitted[0]))
     x = np.array([[size, known[n] - clean[n]] for n, size in moved if n in clean and n.startswith("suspension.K")])
