@@ -24,7 +24,7 @@ from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
-from calibration.numerics.lie import skew
+from calibration.numerics.lie import adjoint, from_vector, skew
 from calibration.numerics.signals import CUTOFF, RATE, even, low_passed
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -57,6 +57,12 @@ class Forcing:
     inertia: np.ndarray
     tangent: np.ndarray
     T_0_plate: np.ndarray
+
+    def turned(self, angle: float) -> "Forcing":
+        """With the wrench turned by an angle [rad] about the vertical through the centre of the plate."""
+        to_plate, R = adjoint(self.T_0_plate).T, from_vector(np.array([0.0, 0.0, 0.0, 0.0, 0.0, angle]))[:3, :3]
+        M = np.linalg.solve(to_plate, np.kron(np.eye(2), R) @ to_plate)
+        return replace(self, w=self.w @ M.T, rest=M @ self.rest, tangent=tangent_of(M @ self.rest))
 
 
 @dataclass(frozen=True)
@@ -112,11 +118,17 @@ def base_response_of(description: Description, trial: Trial, rest: Rest, load: L
     )
 
 
-def _tangent(rest: np.ndarray, load: Load) -> np.ndarray:
-    """G (6, 6) from the wrench at rest: its weight W and centre of pressure, moments (-W y, W x)."""
+def tangent_of(rest: np.ndarray) -> np.ndarray:
+    """G (6, 6) from the plate's wrench at rest: its weight W and centre of pressure, moments (-W y, W x)."""
     G = np.zeros((6, 6))
     G[:3, 3:] = -skew(rest[:3] * [0.0, 0.0, 1.0])
     G[5, 3:5] = rest[4], -rest[3]
+    return G
+
+
+def _tangent(rest: np.ndarray, load: Load) -> np.ndarray:
+    """G (6, 6) of a load; that of dynamics moves with its centre of mass."""
+    G = tangent_of(rest)
     if load.weight > 0.0:
         f = np.array([0.0, 0.0, -load.weight])
         G[3:, :3] += skew(f)

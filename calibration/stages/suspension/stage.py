@@ -14,9 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.checks.plates import SCALE, STAGE, TURN, moved_by, wrong_plate
+from calibration.checks.plates import SCALE, STAGE, moved_by, wrong_plate
 from calibration.inference.parameters import Combination, Model
-from calibration.numerics.lie import skew
 from calibration.numerics.signals import RATE
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -65,27 +64,25 @@ def fit_suspension(
     if not responses.plate:
         found.append(Verdict(STAGE, "missing", "no force plate: springs fitted to the nominal inverse dynamics"))
     suspension, findings = _fitted(lab.description, responses, full)
-    return suspension, (*(with_springs_moved(v, suspension) for v in found), *findings)
+    moved_by_plate = (with_springs_moved(v, lab.description, responses, suspension, full) for v in found)
+    return suspension, (*moved_by_plate, *findings)
 
 
-def with_springs_moved(found: Verdict, suspension: Suspension) -> Verdict:
-    """A warning of a plate off by a scale s or an angle psi, with the springs it may have moved.
+def with_springs_moved(
+    found: Verdict, description: Description, responses: BaseResponses, suspension: Suspension, full: bool
+) -> Verdict:
+    """A warning of a plate off by a scale or an angle, with what it moved the springs by.
 
-    dK = s K + psi (Z K - K Z) / 2, C alike, Z the turn about the vertical of forces and moments: the plate's wrench is
-    turned, the motion is not, and K is symmetric.
+    Fitted to the plate's wrench turned back they are others; a scale s makes them larger by s.
     """
     if not found.moves:
         return found
-    ((size,),) = found.moves
-    scale, turn = (size[1] if size[0] == what else 0.0 for what in (SCALE, TURN))
-    Z = np.kron(np.eye(2), skew(np.array([0.0, 0.0, 0.5 * turn])))
-    turned = {
-        f"suspension.{letter}.{i + 1}{j + 1}": float((Z @ M - M @ Z)[i, j])
-        for letter, M in (("K", suspension.K), ("C", suspension.C))
-        for i, j in zip(*np.triu_indices(6), strict=True)
-    }
-    moved = tuple((p.name, scale * p.value + turned.get(p.name, 0.0)) for p in suspension.parameters)
-    return replace(found, moves=(moved,))
+    (((what, size),),) = found.moves
+    if what == SCALE:
+        return replace(found, moves=(tuple((p.name, size * p.value) for p in suspension.parameters),))
+    back = tuple(replace(r, forcing=r.forcing.turned(-size)) for r in responses.plate)
+    other = {p.name: p.value for p in _fitted(description, replace(responses, plate=back), full)[0].parameters}
+    return replace(found, moves=(tuple((p.name, p.value - other.get(p.name, p.value)) for p in suspension.parameters),))
 
 
 def _moved_bases(responses: Sequence[BaseResponse]) -> dict[str, str]:
