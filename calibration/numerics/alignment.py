@@ -10,10 +10,10 @@ scale between robot and laboratory and shows wrong units and mirrored axes; its 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.spatial.transform import Rotation
 
 from calibration.errors import NotEnoughData
+from calibration.numerics.compiled import njit
 from calibration.numerics.lie import compose, inverse, mean, rotation_vector, to_vector
 
 _MANY = 100  # postures that are enough for a start

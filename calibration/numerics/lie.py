@@ -24,8 +24,9 @@ Its turns are not seen. What they do to the geometry is: 33 of the 36 combinatio
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 from scipy.spatial.transform import Rotation
+
+from calibration.numerics.compiled import njit
 
 _SMALL = 0.25  # t^2 below which series are used [rad^2]
 _D = np.array([1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600, 0.0])

@@ -13,10 +13,10 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
-from numba import njit
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
+from calibration.numerics.compiled import njit
 from calibration.numerics.lie import rotation_vector
 
 RATE = 100.0  # common grid [Hz]

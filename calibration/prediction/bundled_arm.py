@@ -18,8 +18,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.numerics.lie import adjoint, inverse
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending, moved

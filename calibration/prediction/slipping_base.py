@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.numerics.lie import from_vectors
 from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase

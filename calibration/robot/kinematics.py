@@ -16,9 +16,9 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 
 from calibration.errors import ShapeError
+from calibration.numerics.compiled import njit
 from calibration.numerics.lie import skew
 
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.robot.kinematics import unit_twists
 
 

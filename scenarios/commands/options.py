@@ -39,7 +39,15 @@ def overriding(given: Sequence[str] | None, seed: int | None) -> list[str]:
 
 
 class Grouped(TyperGroup):
-    """Commands in help by their `rich_help_panel`, a line each, whole; without rich, which imports slowly."""
+    """Commands in help by their `rich_help_panel`, a line each; without rich and pydantic, which import slowly."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Its options; a flag that is not set is False from the start, for typer converts None by pydantic."""
+        found = super().get_params(ctx)
+        for flag in found:
+            if flag.type_descriptor.annotation is bool and flag.default is None:
+                flag.default = False
+        return found
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a section for each panel, in the order in which they first occur."""

@@ -21,8 +21,8 @@ Reference: Lampaert, Al-Bender, Swevers, IEEE MMAR 2003 (Maxwell-slip elements).
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, sample
 
 HALF_GAP, COMPLIANCE, COULOMB, VISCOUS, RELAXATION, SPRING, SLIP = range(7)  # order of `values`

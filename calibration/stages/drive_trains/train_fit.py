@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.stages.drive_trains.drive_train import DriveTrain, Form
 from calibration.stages.drive_trains.joint_data import JointData
 

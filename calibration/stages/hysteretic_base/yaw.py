@@ -17,9 +17,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.optimize import least_squares
 
+from calibration.numerics.compiled import njit
 from calibration.numerics.signals import RATE
 from calibration.stages.hysteretic_base.log import BaseLog, compared
 

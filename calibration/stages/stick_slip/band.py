@@ -24,9 +24,9 @@ better the less the base is shaken: V = s^2 + r^2 max_(t' < t) x_el^2.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numba import njit
 from scipy.optimize import minimize
 
+from calibration.numerics.compiled import njit
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.measured import blocks
 

@@ -23,7 +23,8 @@ Reference: Simo, Hughes, Computational Inelasticity, 1998, ch. 1 (return mapping
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from calibration.numerics.compiled import njit
 
 PLATE = 8  # first of the plate's columns of `drive`
 STEPS = 2  # of the integration to a sample

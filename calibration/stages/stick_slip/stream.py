@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.band import banded
 from calibration.stages.stick_slip.forcing import UNMOVED

@@ -11,8 +11,8 @@ between samples: stiff modes (tau << step) cost nothing and cannot blow up. tau 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.numerics.signals import RATE
 from calibration.stages.suspension.base_response import Forcing
 

@@ -1,0 +1,35 @@
+"""Loops over scalars, compiled by numba when they are first called: a command that calls none does not import numba."""
+
+from collections.abc import Callable
+from functools import update_wrapper
+from typing import Any
+
+
+class Kernel:
+    """A function and, from its first call on, its compiled form; other kernels it calls are compiled with it."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        """Keep what `numba.njit` needs."""
+        self._function, self._options, self._compiled = function, options, None
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """The function's value."""
+        return (self._compiled or self.compiled())(*arguments)
+
+    def compiled(self) -> Any:
+        """Numba's form of the function; in its module compiled kernels replace this one and those that it calls."""
+        if self._compiled is None:
+            from numba import njit as compile_
+
+            self._compiled = compile_(**self._options)(self._function)
+            known = self._function.__globals__
+            for name in (self._function.__name__, *self._function.__code__.co_names):
+                if isinstance(known.get(name), Kernel):
+                    known[name] = known[name].compiled()
+        return self._compiled
+
+
+def njit(**options: Any) -> Any:
+    """Decorator like `numba.njit`, which is imported with the first call."""
+    return lambda function: Kernel(function, options)
