@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-import matplotlib.image
 import mujoco
 import numpy as np
+from PIL import Image
 
 import mjcf
 from twin.campaign.laboratory_model import Laboratory, laboratory
@@ -41,7 +41,7 @@ def picture(config: TwinConfig, seed: int, path: Path, size: tuple[int, int] = S
     mujoco.mj_kinematics(model, data)
     image = render(model, data, portrait(nominal, lab.T_lab_base, size))
     path.parent.mkdir(parents=True, exist_ok=True)
-    matplotlib.image.imsave(path, image, metadata={"Software": "tiago-twin"}, pil_kwargs={"optimize": True})
+    Image.fromarray(image).save(path, optimize=True)
 
 
 def with_markers(lab: Laboratory) -> mujoco.MjSpec:
