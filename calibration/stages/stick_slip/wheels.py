@@ -13,8 +13,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 
+from calibration.numerics.compiled import njit
 from calibration.recording.schema import Wheel
 from calibration.stages.stick_slip.kernel import solved
 

@@ -3,9 +3,11 @@
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[3]
 LIBRARIES = {"mujoco", "pinocchio", "numba", "matplotlib", "viser", "trimesh", "distributed", "ezc3d", "rosbags"}
 HELP = 0.3  # [s] of processor time
 MISTAKE = "--set x=1"
@@ -55,6 +57,15 @@ def test_every_command_is_here():
     from scenarios.commands import main
 
     assert {line.split()[0] for line in USED} == {c.name or c.callback.__name__ for c in main.app.registered_commands}
+
+
+def test_kernels_import_numba_when_they_are_called():
+    found = {
+        p.relative_to(ROOT).as_posix()
+        for p in (ROOT / "calibration").rglob("*.py")
+        if "from numba import" in p.read_text()
+    }
+    assert found == {"calibration/numerics/compiled.py"}
 
 
 @pytest.mark.slow
