@@ -10,7 +10,7 @@ from calibration.robot.laboratory import Laboratory
 from tests.doubles import rigid_robot
 from tests.hostile import random_cases
 from tests.hostile.campaign import Campaign, scaled
-from tests.hostile.laboratory_kinds import KINDS, PLATE
+from tests.hostile.laboratory_kinds import FITTED, KINDS, PLATE, UNSEEN
 from tests.hostile.spoilt import reference_of, tried
 from tests.hostile.wrong_data import FAST, TABLE, VALIDATION
 
@@ -60,7 +60,7 @@ def test_a_bounded_mistake_is_in_the_intervals_of_what_it_moves(rigid, tmp_path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mistake", (*TABLE, *PLATE), ids=lambda m: m.name)
+@pytest.mark.parametrize("mistake", (*TABLE, *PLATE, *FITTED), ids=lambda m: m.name)
 def test_a_mistake_is_named_or_costs_little(twin, mistake, tmp_path):
     good, campaign, reference = twin
     found = tried(mistake, campaign, good, reference, tmp_path / "data")
@@ -69,7 +69,7 @@ def test_a_mistake_is_named_or_costs_little(twin, mistake, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mistake", VALIDATION, ids=lambda m: m.name)
+@pytest.mark.parametrize("mistake", (*VALIDATION, *UNSEEN), ids=lambda m: m.name)
 def test_a_mistake_of_validation_recordings_is_named(twin, mistake, tmp_path):
     good, campaign, reference = twin
     found = tried(mistake, campaign, good, reference, tmp_path / "data")
