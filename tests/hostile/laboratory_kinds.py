@@ -230,6 +230,12 @@ PLATE = (
         "plate place",
     ),
     Mistake(
+        "y up",
+        _array("marker_position", lambda p: p[..., [0, 2, 1]] * [1.0, 1.0, -1.0]),
+        "plate",
+        stages=(*STAGES, "suspension"),
+    ),
+    Mistake(
         "payload in grams",
         _listed("payload", "mass", value=lambda m: 1000.0 * m),
         "plate scale",

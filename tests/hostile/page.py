@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests.acceptance.claims import measured, when
-from tests.hostile import random_cases
+from tests.hostile import findings, random_cases, tried_mistakes
 from tests.hostile.case import Case, Judged, judged
 from tests.hostile.child import MEMORY, SECONDS
 from tests.hostile.laboratory import copied, make
@@ -29,6 +29,16 @@ half an hour.
 Bounds of every row: {MEMORY / 2**30:.0f} GB beyond the start of the process, {SECONDS} s of a processor, no traceback,
 no crash, nothing written outside `--out`, nothing left half-written.
 
+"""
+_MISTAKES = f"""## Mistakes of a laboratory
+
+Rows of `wrong_data.py` and `laboratory_kinds.py`, on one campaign each of a rigid robot and of `short --quick`, seed
+{tried_mistakes.SEED}: what is wrong is named in the words of its row; what is harmless is calibrated within its bound.
+"""
+_FINDINGS = """## What earlier trials found
+
+`tests/hostile/findings.csv` has what trying the program as users and as enemies found, each with the row or test that
+shows it mended, or why it is left.
 """
 _RANDOM = "## Mistakes at random, and clean campaigns"
 _COLUMNS = (
@@ -64,7 +74,11 @@ def _line(cells: Sequence[object]) -> str:
 def page(kept: dict) -> str:
     """The page: what came of the rows, then of the mistakes at random."""
     table = [_line(_COLUMNS), "|---" * len(_COLUMNS) + "|", *map(_line, kept["rows"])]
-    parts = "\n".join(table), f"Tried on {when([kept])}.", _RANDOM, random_cases.counts()
+    wrong = [_line(tried_mistakes.COLUMNS), "|---" * len(tried_mistakes.COLUMNS) + "|", *map(_line, kept["mistakes"])]
+    parts = (
+        "\n".join(table), f"Tried on {when([kept])}.", _MISTAKES, "\n".join(wrong), _FINDINGS, findings.counts(),
+        _RANDOM, random_cases.counts(),
+    )  # fmt: skip
     return _HEAD + "\n\n".join(parts)
 
 
@@ -88,10 +102,13 @@ def main() -> None:
                     print(f"{group}: {case.name}: {wrong}")
             lines.append(row(group, found))
             every += found
+        wrong = list(tried_mistakes.rows(Path(place)))
     rows = ",\n".join(map(json.dumps, [*lines, row("all", every)]))
-    KEPT.write_text(f'{json.dumps(measured())[:-1]}, "rows": [\n{rows}]}}\n', encoding="utf-8")
+    more = ",\n".join(map(json.dumps, wrong))
+    text = f'{json.dumps(measured())[:-1]}, "rows": [\n{rows}], "mistakes": [\n{more}]}}\n'
+    KEPT.write_text(text, encoding="utf-8")
     write()
-    sys.exit(any(one.wrong for one in every))
+    sys.exit(any(one.wrong for one in every) or any(sum(line[4:7]) for line in wrong))
 
 
 if __name__ == "__main__":
