@@ -183,7 +183,7 @@ KINDS = (
     Mistake("one trial in degrees", _in_one(_array("q_motor", lambda q: _DEGREES * q)), "in degrees"),
     Mistake("arm_1 a turn too large in one trial", _in_one(_column(1, lambda q: q + 2.0 * np.pi)),
         "arm_1_joint' reads"),
-    Mistake("gripper 2 and 3 exchanged", _labels(_pairs(("gripper2", "gripper3"))), "from its drawing|from their"),
+    Mistake("gripper 2 and 3 exchanged", _labels(_pairs(("gripper2", "gripper3"))), "drawing|as in a mirror"),
     Mistake("gripper 1 and 2 exchanged in one trial",
         _in_one(_labels(_pairs(("gripper1", "gripper2")))), "a marker moved|from its drawing"),
     Mistake("base and gripper exchanged",
@@ -282,7 +282,8 @@ FITTED = (
     Mistake("lift twice as far", _column(0, lambda q: 2.0 * q), _UP_TO),
     Mistake("arm_7 reversed", _column(7, np.negative), _UP_TO),
     Mistake("arm_6 read 0.3 rad off", _column(6, lambda q: q + 0.3), "arm_6_joint slipped"),
-    Mistake("rounded to a degree", _array("q_motor", lambda q: np.radians(np.round(np.degrees(q)))), ""),
+    Mistake("rounded to a degree", _array("q_motor", lambda q: np.hstack(
+        [q[:, :1], np.radians(np.round(np.degrees(q[:, 1:])))])), "scatter|clock from angular velocity alone"),
     Mistake("radians declared as degrees", _array("q_motor", lambda q: q / _DEGREES), "identifies the robot clock"),
     Mistake("readings of another moment", _array("q_motor", lambda q: np.roll(q, len(q) // 2, axis=0)), _UP_TO),
     Mistake("readings reversed in time", _array("q_motor", lambda q: q[::-1]), _UP_TO),

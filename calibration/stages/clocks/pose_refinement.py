@@ -46,6 +46,7 @@ _SPACING, _PASSED = 0.5, 250  # [s] between postures passed through, at least; s
 _MOVES = 0.05  # [rad, m] a joint must move to count as moving
 _LOADED, _TORQUE = 0.1, 0.3  # a joint is loaded while |tau| exceeds this share of its largest, and this [N.m, N]
 _FREE = 0.02  # [rad, m] random error of a joint that is not loaded: more than any gear's play
+_UNKNOWN = 0.1  # [s] standard deviation of a lag that says less than angular velocities do
 _log = logging.getLogger(__name__)
 
 
@@ -194,8 +195,8 @@ def refined(
     """
     lags: list[TrialLag] = []
     for _ in range(passes):
-        lags = refined_lags(robot, description, trials, clock)
+        lags = [lag for lag in refined_lags(robot, description, trials, clock) if lag.lag.sigma < _UNKNOWN]
         if not lags:
-            raise NotEnoughData("no trial moves a joint that gravity preloads on one flank")
+            raise NotEnoughData("no trial moves a joint that gravity preloads on one flank, or readings are too coarse")
         clock = fit_clock(clock.instrument, lags)[0]
     return lags
