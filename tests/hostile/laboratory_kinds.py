@@ -202,7 +202,7 @@ PLATE = (
     _plate("moments in N.mm", lambda w: w * [1.0, 1.0, 1.0, 1e3, 1e3, 1e3], "plate place"),
     _plate("forces in kgf", lambda w: w / 9.81, "plate scale"),
     _plate("reaction", np.negative, "plate sign: Fz"),
-    _plate("moments first", lambda w: np.roll(w, 3, axis=2), "plate scale"),
+    _plate("moments first", lambda w: np.roll(w, 3, axis=2), "plate scale|plate sign: Fz"),
     _plate("plate upside down", lambda w: w * [1.0, -1.0, -1.0, 1.0, -1.0, -1.0], "plate sign: Fz"),
     _plate("plate turned by half", lambda w: w * [-1.0, -1.0, 1.0, -1.0, -1.0, 1.0], "plate rotated by"),
     _plate("Mx reversed", lambda w: w * [1.0, 1.0, 1.0, -1.0, 1.0, 1.0], "Mx mirror"),
