@@ -83,21 +83,21 @@ def calibrate(
         NotEnoughData: There is none from which the clocks can be estimated.
         NumericalFailure: The numbers of a stage broke down.
     """
-    with Breakdowns("reading", progress) as tell:
-        return _calibrated(dataset, stages, tell, options, plan_next, cross_validate)
+    with Breakdowns("reading", progress) as report:
+        return _calibrated(dataset, stages, report, options, plan_next, cross_validate)
 
 
 def _calibrated(
     dataset: Dataset,
     stages: Sequence[str] | None,
-    tell: Progress,
+    report: Progress,
     options: Options | None,
     plan_next: bool,
     cross_validate: bool,
 ) -> Estimate:
     wanted = _wanted(_usual(dataset) if stages is None else stages)
     lab = Laboratory(dataset.urdf, dataset.description)
-    tell("reading", 0.0)
+    report("reading", 0.0)
     pairs, means, findings = _read(dataset, lab)
     data = StageInput(
         lab,
@@ -108,28 +108,28 @@ def _calibrated(
     context = Context(data, _empty(dataset, data.options)).with_findings(*findings)
     if context.data.rejected:
         return _explained(context, means).estimate
-    tell("clocks", 0.2)
+    report("clocks", 0.2)
     context = _synchronised(context, means)
     if context.data.rejected and not context.data.clocks:
         return context.estimate
     fits = [stage for stage in _STAGES if stage.name in wanted]
     if not fits:
         return context.estimate
-    tell("postures", 0.5)
+    report("postures", 0.5)
     context = replace(context, data=with_postures(context.data, pairs, means))
     for k, stage in enumerate(fits):
-        tell(stage.name, 0.55 + 0.45 * k / len(fits))
+        report(stage.name, 0.55 + 0.45 * k / len(fits))
         context = _after(context, stage)
     if context.data.rejected:
         context = _explained(context, means)
     if plan_next:
-        tell("next experiments", 0.95)
+        report("next experiments", 0.95)
         context = _with_plans(context, wanted)
     estimate = _concluded(context)
     if cross_validate and estimate.calibrated and context.data.postures is not None:
-        tell("cross-validation", 0.97)
+        report("cross-validation", 0.97)
         estimate = _cross_validated(estimate, context.data)
-    tell("done", 1.0)
+    report("done", 1.0)
     return replace(estimate, verdicts=(*estimate.verdicts, *conclusion(estimate)))
 
 

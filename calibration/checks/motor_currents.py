@@ -20,7 +20,7 @@ from calibration.robot.chain import Chain
 _WINDOW, _STILL = 0.3, 2e-3  # [s] in which no joint moves by more [rad, m]
 _ANOTHER = 0.02  # [rad, m] some joint moves by, between postures that count as two
 _FEWEST = 12  # postures
-_LOADED = 1.0  # [N.m, N] range of a torque that tells anything
+_LOADED = 1.0  # [N.m, N] range of a torque that shows anything
 _AGAINST, _FOLLOWS, _OWN = -0.8, 0.9, 0.5  # correlations
 
 

@@ -41,7 +41,7 @@ _SHIFTED, _TWISTED = 15e-3, 0.1  # rest pose after against before: slip alone re
 _NAMES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
-class Felt(Protocol):
+class Wrenched(Protocol):
     """A wrench on the floor in one trial, as `suspension.base_response.Forcing`: see there."""
 
     @property
@@ -90,7 +90,7 @@ def saturated(trial: Trial) -> Iterator[str]:
                 yield f"plate: {name} stays at {end:.4g} in {100.0 * share:.0f} % of the samples: saturated, or stuck"
 
 
-def wrong_plate(lab: Laboratory, plate: Sequence[Felt], dynamics: Sequence[Felt]) -> Iterator[Verdict]:
+def wrong_plate(lab: Laboratory, plate: Sequence[Wrenched], dynamics: Sequence[Wrenched]) -> Iterator[Verdict]:
     """What is wrong with the plate's wrench; trials in the same order in both, or no dynamics at all."""
     rest = np.median([f.rest for f in plate], axis=0)
     if rest[2] > 0.0:
@@ -105,7 +105,7 @@ def wrong_plate(lab: Laboratory, plate: Sequence[Felt], dynamics: Sequence[Felt]
 
 
 def _against_dynamics(
-    lab: Laboratory, rest: np.ndarray, plate: Sequence[Felt], dynamics: Sequence[Felt]
+    lab: Laboratory, rest: np.ndarray, plate: Sequence[Wrenched], dynamics: Sequence[Wrenched]
 ) -> Iterator[Verdict]:
     weight = -float(np.median([f.rest[2] for f in dynamics]))
     if not 1.0 / _WEIGHT < -rest[2] / weight < _WEIGHT:
@@ -116,7 +116,7 @@ def _against_dynamics(
     yield from _driven(lab, rest, _slow(plate, dynamics))
 
 
-def _weighed(lab: Laboratory, rest: np.ndarray, dynamics: Sequence[Felt], weight: float) -> Iterator[Verdict]:
+def _weighed(lab: Laboratory, rest: np.ndarray, dynamics: Sequence[Wrenched], weight: float) -> Iterator[Verdict]:
     """A load that is not the robot's, whose nominal weight is given [N]."""
     spread = weight_spread(lab)
     missing = rest - np.median([f.rest for f in dynamics], axis=0)
@@ -182,7 +182,7 @@ def moved_by(after: np.ndarray) -> str:
     return f"{1e3 * shift:.1f} mm, {1e3 * turn:.0f} mrad" if shift > _SHIFTED or turn > _TWISTED else ""
 
 
-def _slow(plate: Sequence[Felt], dynamics: Sequence[Felt]) -> list[tuple[np.ndarray, np.ndarray]]:
+def _slow(plate: Sequence[Wrenched], dynamics: Sequence[Wrenched]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Slow changes of both wrenches (n, 6) as the plate reads them, about its centre, at common times, by trial."""
     rows = []
     for p, d in zip(plate, dynamics, strict=True):

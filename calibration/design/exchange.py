@@ -4,7 +4,7 @@
     E   least variance of the worst direction,  the largest eigenvalue of C        (in units of the tolerances)
     G   least worst-case error of the hand,  max_e trace(P_e C P_e'); its 8th power mean is what is minimised
 
-With nuisances that no parameter stands for (`information`), C + C m (C m)' takes the place of C, and the hand's error
+With nuisances that no parameter describes (`information`), C + C m (C m)' takes the place of C, and the hand's error
 has their share. Each candidate's value comes from the updates  C <- C - C B' (I + B C B')^-1 B C  and
 C m <- C m + C B' (I + B C B')^-1 (H - B C m)  for all candidates at once. The largest eigenvalue is bounded from
 below on the directions that are the worst now. An exchange is kept only if the criterion itself falls.

@@ -18,7 +18,7 @@ What a robot does that its calibration does not ask for, as nuisances z ~ N(0, I
     placement of joint j    turned by  b_j M_j z        bending under the moment M_j across its axis
 
 It is a function of the posture, not noise: the fit takes it for geometry, and a design that knows only noise goes
-where it is largest. M is the gravity moment in the joint's frame [N.m]. Play that gravity holds is asked for (`gears`).
+where it is largest. M is the gravity moment in the joint's frame [N.m]. Gravity-loaded backlash is estimated (`gears`).
 """
 
 from dataclasses import dataclass, replace

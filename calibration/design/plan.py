@@ -45,7 +45,7 @@ class Task:
         parameters: To be found, with tolerances.
         reading_sigma: (k,) random error of each joint's reading [rad, m].
         known: (p, p) covariance of the scaled parameters by what is recorded already; None: nothing is.
-        departures: What the robot does and no parameter stands for; None: nothing.
+        departures: What the robot does and no parameter describes; None: nothing.
         work: Draws postures like those the robot works in; None: anywhere in its room.
     """
 

@@ -26,7 +26,7 @@ from calibration.inference.residual import Linearised, Noise, Residual, stacked,
 
 _OUTER = 15
 _DECREASE = 1e-3  # the last Gauss-Newton step promises a smaller decrease of the cost [-], the one after it 1e-7
-_SAME = 1e-2  # outer iterations stop below this change of log s [-], a fraction of what 160 postures tell
+_SAME = 1e-2  # outer iterations stop below this change of log s [-], a fraction of what 160 postures determine
 _COARSE, _COARSE_DECREASE = 0.1, 1.0
 _MANY = 960  # components the evidence is asked with: standard deviations to 4 %
 _LEVERAGE = 20.0  # components per parameter above which a posture hardly moves its own prediction
@@ -142,7 +142,7 @@ def solve(
     Args:
         problem: What is to be fitted.
         at: The problem where to start.
-        weigh: Weights (n,) from squared distances (n,) as `distances` gives them; one where it is not given.
+        weigh: Weights (n,) from squared distances (n,) as `distances` gives them; one where there is none.
         coarse: Be content with widths to a tenth and theta to a sigma, as a start for all postures.
     """
     same, predicted_decrease = (_COARSE, _COARSE_DECREASE) if coarse else (_SAME, _DECREASE)

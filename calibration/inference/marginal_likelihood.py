@@ -5,7 +5,7 @@
 
 theta is integrated out. Each source of noise b_m (n, d) has the variance v of its group: one of a joint's reading, of
 the hand's position, of its rotation, of the markers. Variances take Fisher scoring steps down to a floor, prior
-factors f MacKay's fixed point, kept near 1 as by `_HELD` parameters that deviate by exactly their tolerance.
+factors f MacKay's fixed point, kept near 1 as by `_NEAR_ONE` parameters that deviate by exactly their tolerance.
 References: MacKay, Neural Computation 1992; Patterson, Thompson, Biometrika 1971 (restricted likelihood).
 """
 
@@ -17,9 +17,9 @@ from scipy.linalg import blas, lapack
 from calibration.inference.parameters import Prior
 from calibration.inference.residual import Linearised, Noise
 
-_HELD = 20.0
+_NEAR_ONE = 20.0
 _STEPS = 30
-_UNDAMPED = 1e-3  # of a step's curvature: too little to tell
+_UNDAMPED = 1e-3  # of a step's curvature: too little to matter
 _LARGEST = 1.0  # of a standard deviation [rad, m]: data that ask for more do not belong to the model
 _NEGLIGIBLE = 10.0  # standard deviations below this many floors need not stand still
 
@@ -73,7 +73,7 @@ def _prior_factors(prior: Prior, now: LogMarginal, f: np.ndarray) -> np.ndarray:
         mine = prior.group == h
         unit = prior.tolerance[mine] ** 2
         known = max(0.0, float((1.0 - now.spread[mine] / (f[h] * unit)).sum()))
-        new[h] = (float((now.off[mine] ** 2 / unit).sum()) + _HELD) / (known + _HELD)
+        new[h] = (float((now.off[mine] ** 2 / unit).sum()) + _NEAR_ONE) / (known + _NEAR_ONE)
     return new
 
 
@@ -160,7 +160,7 @@ def log_marginal(
     together = 0.5 * ((np.swapaxes(K, 1, 2) @ K) ** 2).sum(axis=0)
     groups = np.eye(len(noise.floor))[noise.group[free]]
     value = log_det - 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
-    value += float((rest**2).sum() + (precision * off**2).sum()) + prior.held(widths.prior, _HELD)
+    value += float((rest**2).sum() + (precision * off**2).sum()) + prior.constant(widths.prior, _NEAR_ONE)
     v = np.where(noise.free & present, widths.noise, np.inf) ** 2
     value -= float(np.log(v[np.isfinite(v)]).sum())
     by_v, fisher = groups.T @ slope - 0.5 / v, groups.T @ together @ groups + np.diag(0.5 / v**2)

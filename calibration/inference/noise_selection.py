@@ -25,7 +25,7 @@ from calibration.inference.residual import Linearised, Noise
 
 _WORTH = 1e-2  # least gain of a change
 _DOUBT = 2.0  # a group is dropped on trial though this much seems lost
-_TRIALS = 2  # neighbours of a set that are tried before it stands
+_TRIALS = 2  # neighbours of a set that are tried before it is kept
 
 
 @dataclass(frozen=True)

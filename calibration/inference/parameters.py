@@ -163,8 +163,8 @@ class Prior:
         """(p,) inverse variances with factors f (h,) on the squared tolerances."""
         return 1.0 / (self.factor(f) * self.tolerance**2)
 
-    def held(self, f: np.ndarray, strength: float) -> float:
-        """Minus twice the logarithm of the priors' own constant, and of what holds f near 1."""
+    def constant(self, f: np.ndarray, strength: float) -> float:
+        """Minus twice the logarithm of the priors' own constant, and of the penalty that keeps f near 1."""
         sizes = np.bincount(self.group[self.group >= 0], minlength=len(f))
         return float(((sizes + strength) * np.log(f) + strength / f).sum())
 

@@ -26,7 +26,7 @@ from calibration.recording.schema import Body
 from calibration.recording.trial import REST, Trial
 
 _MANY = 200  # postures the first guess is made from
-_FEW = 50  # that tell whether it is to be mirrored
+_FEW = 50  # that show whether it is to be mirrored
 _ODD = 6.0  # a posture's misfit over the median one's beyond which its markers are not that body's [-]
 _FLAT = 1e-3  # third-largest-but-one extent over the largest below which markers stand in line [-]
 

@@ -42,7 +42,7 @@ from calibration.recording.trial import Trial
 
 _LIMIT = 0.1  # of the shortest edge [-]
 _CLEAR = 3.0  # times better than the next permutation [-]
-_NEAR = 1.0  # [s] within which markers seen rightly tell where they are
+_NEAR = 1.0  # [s] within which markers seen rightly show where they are
 _log = logging.getLogger(__name__)
 MOST = 6  # markers of a cluster whose permutations are tried: 720
 _FASTEST = 10.0  # [rad/s] three times an arm joint's highest speed

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 from functools import update_wrapper
-from typing import Any
+from typing import Any, TypeVar, cast
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Kernel:
@@ -30,6 +32,10 @@ class Kernel:
         return self._compiled
 
 
-def njit(**options: Any) -> Any:
+def njit(**options: Any) -> Callable[[F], F]:
     """Decorator like `numba.njit`, which is imported with the first call."""
-    return lambda function: Kernel(function, options)
+
+    def decorated(function: F) -> F:
+        return cast(F, Kernel(function, options))
+
+    return decorated

@@ -56,7 +56,7 @@ class Joint(Declaration):
 class Marker(Declaration):
     """A marker and its nominal position in its body's frame [m]."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}[+]?$")]  # `hand.x+` stands for a pose
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}[+]?$")]  # `hand.x+` is one of a pose
     xyz: Vector3
 
 

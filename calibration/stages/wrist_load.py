@@ -37,7 +37,7 @@ from calibration.verdict import Verdict
 
 _FEWEST = 6  # postures
 _STEPS = 8
-_SPREAD = 0.1  # of gravity: smallest spread of its direction over the sensor's axes that tells all of a centre [-]
+_SPREAD = 0.1  # of gravity: smallest spread of its direction over the sensor's axes that shows all of a centre [-]
 _STAGE = "geometry"
 _CLEAR = 3.0  # standard deviations
 _FEW = 5  # samples of a dwell

@@ -3,7 +3,7 @@
     in     markers of the hand in the base's marker body, means over dwells, and readings; nominal.urdf
     out    T_lab_hand(t) = T_lab_base(t) T_base_hand(predicted markers at q(t))
 
-It runs in an environment of its own (`make peer`), as it stands: nothing of it is installed, read or copied here. It
+It runs in an environment of its own (`make peer`), as published: nothing of it is installed, read or copied here. It
 has no base that moves: where the base's markers are hidden, the base stays as in the first second.
 """
 

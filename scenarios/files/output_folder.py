@@ -69,7 +69,7 @@ _WRITTEN = RUN.entries | ESTIMATE.entries | DATASET.entries | {"truth.json", "tw
 
 @contextmanager
 def replacing(out: Path | str, kind: Kind) -> Iterator[Path]:
-    """Yield an empty folder whose content takes the place of what `out` held when the block ends well.
+    """Yield an empty folder whose content takes the place of what `out` contained when the block ends well.
 
     Raises:
         ScenarioError: `out` is something that must not be overwritten, cannot be written, or another command writes it.

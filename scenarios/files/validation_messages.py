@@ -91,8 +91,8 @@ def _path(values: Any, location: Sequence[str | int], kind: str) -> tuple[str, .
     node: Any = values
     for depth, step in enumerate(location):
         last = depth == len(location) - 1
-        held = range(len(node)) if isinstance(node, list) else node
-        if isinstance(node, (dict, list)) and step in held:
+        known = range(len(node)) if isinstance(node, list) else node
+        if isinstance(node, (dict, list)) and step in known:
             path.append(str(step))
             node = node[step]  # type: ignore[index]
         elif last and kind in MISSING:

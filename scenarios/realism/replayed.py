@@ -85,9 +85,9 @@ def gripping(base: Base, factor: float) -> Base:
 
 def turning(base: Base, weight: float) -> Base:
     """The same base on a floor that holds, its casters turning at the friction of a sixth of the weight [N]."""
-    held = gripping(base, _HOLDS)
+    gripped = gripping(base, _HOLDS)
     kinds = {k: getattr(base, k).friction * weight / 6.0 for k in ("caster_front", "caster_back")}
-    return replace(held, **{k: replace(getattr(held, k), turning_force=f) for k, f in kinds.items()})
+    return replace(gripped, **{k: replace(getattr(gripped, k), turning_force=f) for k, f in kinds.items()})
 
 
 def floor_of(config: TwinConfig, seed: int, condition: Condition, weight: float) -> tuple[Defect, ...]:

@@ -68,7 +68,7 @@ def base_motion(
         out: The folder to write.
         until: End of the fit; the log's end unless given.
         cycles: Steady cycles to leave out in turn.
-        progress: Told what is fitted.
+        progress: Called with what is fitted.
 
     Raises:
         ScenarioError: `out` must not be overwritten, or the mapping is malformed.

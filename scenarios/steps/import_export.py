@@ -45,7 +45,7 @@ def import_files(
         out: The dataset folder; an earlier dataset there is replaced.
         add_to: A dataset imported before whose trials gain these files' channels.
         later: Laboratory of an estimate whose later session this is: its marker bodies, trials for validation.
-        progress: Told which file is read.
+        progress: Called with which file is read.
 
     Raises:
         ScenarioError: The mapping is malformed, or `out` must not be overwritten.

@@ -79,7 +79,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
         scenario: What to run.
         out: The run folder; an earlier run there is replaced once this one is complete.
         quick: Run the scenario's short variant.
-        progress: Told how far each step is.
+        progress: Called with how far each step is.
 
     Raises:
         ScenarioError: `out` must not be overwritten.

@@ -1,6 +1,6 @@
 """Types of the names a scenario uses: joints, links and markers that the robot and its laboratory have.
 
-A name that is not known is refused where it stands, with those that are.
+An unknown name is refused at its line, with the known ones.
 """
 
 from collections.abc import Callable, Collection, Sequence

@@ -35,7 +35,7 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
     """
     inputs = prepare(twin, motion, T_lab_base)
     model, first = inputs.model, inputs.first
-    mujoco.set_mju_user_warning(_log.debug)  # or it writes MUJOCO_LOG.TXT where the user stands
+    mujoco.set_mju_user_warning(_log.debug)  # or it writes MUJOCO_LOG.TXT into the working folder
     after, sensors = rollout.rollout(model, mujoco.MjData(model), first[None], inputs.control[None])
     states = states_with_their_sensors(first, after[0])
     check(inputs, motion, states)

@@ -48,8 +48,8 @@ def on_wrist(model: mujoco.MjModel, sensors: np.ndarray, push: np.ndarray) -> np
         return np.full((len(sensors), 6), np.nan)
     quat, v, w = (sensed(model, sensors, [f"{WRIST}.{kind.name}"]) for kind in _MOVES)
     R = Rotation.from_quat(quat, scalar_first=True).as_matrix()
-    held = RigidBodyInertia.of(model, WRIST).wrench(R, v, w, model.opt.gravity, model.opt.timestep)
-    return push_on(model, WRIST, PUSHED, push) - held
+    carried = RigidBodyInertia.of(model, WRIST).wrench(R, v, w, model.opt.gravity, model.opt.timestep)
+    return push_on(model, WRIST, PUSHED, push) - carried
 
 
 def sensed(model: mujoco.MjModel, sensors: np.ndarray, names: Sequence[str]) -> np.ndarray:

@@ -13,7 +13,7 @@ from calibration.formats.survey.view import FileView
 
 _POSTURES = 3  # rests of a static trial
 _MOVED = 0.05  # [rad, m] a joint has moved
-_SHARE = 0.05  # of the largest motion, below which another joint held its place
+_SHARE = 0.05  # of the largest motion, below which another joint was at rest
 _DRIVEN, _TURNED = 0.1, 0.5  # [m], [rad] a base moved on purpose
 
 

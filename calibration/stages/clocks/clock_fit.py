@@ -22,7 +22,7 @@ delay and spread are the datasheet's (`Tolerances`): 50 us of strain-wave gears 
 of 1.8 either way from cold to worn in, where it has none; wound is the mean lateness of the hysteresis that the fit of
 poses found in the loaded joints. Play operators are not quite what a wound gear does, and what a fit leaves of such a
 term has the sign of what it took: of dry friction alone a tenth was left. Friction never makes a link early: hysteresis
-that the fit finds to be early stands for something else, and only widens.
+that the fit finds to be early is something else, and only widens.
 Short motions do not separate hysteresis from lag: of a winding by the datasheet's `joint_windup`, f / k of such gears
 (0.1 mrad: 0.6 N.m on 9 kN.m/rad to 0.15 on 1), unseen is what the fit of each trial would lay to the clock; it is one
 robot's, and no number of trials averages it.

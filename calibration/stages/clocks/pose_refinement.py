@@ -131,12 +131,12 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     """Lag and drift of one trial around an approximate clock, the nuisances eliminated."""
     hand, columns = robot.hand, robot.hand.chain.columns
     q, v, tau = x.q[:, columns], x.v[:, columns], _gravity_torques(hand, x.q)
-    held = np.abs(tau) > np.maximum(_TORQUE, _LOADED * robot.largest)
-    speaks = held & (np.ptp(np.where(held, q, _median(q, held)), axis=0) > _MOVES)
+    loaded = np.abs(tau) > np.maximum(_TORQUE, _LOADED * robot.largest)
+    speaks = loaded & (np.ptp(np.where(loaded, q, _median(q, loaded)), axis=0) > _MOVES)
     if not speaks.any():
         raise NotEnoughData("no joint moves that gravity preloads on one flank")
     at = hand.poses_and_derivatives(x.q, tau, robot.names)
-    moved = at.J_joint * np.where(held, robot.reading_sigma, np.maximum(robot.reading_sigma, _FREE))[:, None]
+    moved = at.J_joint * np.where(loaded, robot.reading_sigma, np.maximum(robot.reading_sigma, _FREE))[:, None]
     W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
     J = W @ at.J_joint
     shapes = (tau > 0.0, tau < 0.0, q - q.mean(axis=0), tau)
@@ -157,9 +157,9 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     return replace(_estimated(change, C, x.t, middle, trial_id, clock), wound=late, unseen=unseen)
 
 
-def _median(q: np.ndarray, held: np.ndarray) -> np.ndarray:
+def _median(q: np.ndarray, loaded: np.ndarray) -> np.ndarray:
     """Median (k,) of each joint's preloaded readings (n, k); of all of them where it never is."""
-    return np.nanmedian(np.where(held | ~held.any(axis=0), q, np.nan), axis=0)
+    return np.nanmedian(np.where(loaded | ~loaded.any(axis=0), q, np.nan), axis=0)
 
 
 def _estimated(  # noqa: PLR0913  the parts of one line
@@ -191,7 +191,7 @@ def refined(
     """Lags from poses; each pass starts from the clock of the one before.
 
     Raises:
-        NotEnoughData: No trial moves a joint that gravity holds.
+        NotEnoughData: No trial moves a joint that gravity preloads.
     """
     lags: list[TrialLag] = []
     for _ in range(passes):

@@ -135,8 +135,8 @@ def best_train(problem: Problem, coarse: JointData, backlash: float, deflection:
     whole = replace(richer, data=coarse)
     roughly = [fit_train(whole, theta, _ROUGH[1:]) for theta in _hinted(problem, richer, coarse, plain.fit.theta)]
     found = [judged(fit_train(richer, fit.theta, _FINE)) for fit in roughly]
-    held = min(found, key=lambda candidate: candidate.score, default=plain)
-    return held if held.score < plain.score - _BETTER else plain
+    richest = min(found, key=lambda candidate: candidate.score, default=plain)
+    return richest if richest.score < plain.score - _BETTER else plain
 
 
 def _hinted(problem: Problem, richer: Problem, coarse: JointData, theta: np.ndarray) -> list[np.ndarray]:

@@ -25,7 +25,7 @@ _ECCENTRIC = np.array([3e-3, 3e-3, 1e-3, 1e-3])  # [rad] prior of once and twice
 GAMMA_INFORMATION = np.append(0.0, _ECCENTRIC**-2.0)  # [1/rad2]
 _PARAMETERS = ("half_gap", "compliance", "coulomb", "viscous", "link_inertia")
 _RELAXATION = 1.5e-3  # [s] of a steel mesh; readings at 100 Hz hardly show it
-_HELD = ("spring", "slip")
+_MESH = ("spring", "slip")
 _STEPS = 6
 _OPEN = 0.5  # of the prior's standard deviation: more, and a parameter is not known
 _RUBS = 2.0  # [N.m] friction of a link that friction holds
@@ -84,15 +84,15 @@ class Problem:
     @property
     def names(self) -> tuple[str, ...]:
         """Of theta."""
-        held = _HELD if self.form == "friction_held" else ()
-        return (*_PARAMETERS, *held, *(f"mode_{i}" for i in range(self.data.modes.shape[1])))
+        mesh = _MESH if self.form == "friction_held" else ()
+        return (*_PARAMETERS, *mesh, *(f"mode_{i}" for i in range(self.data.modes.shape[1])))
 
     def train(self, theta: np.ndarray) -> DriveTrain:
         """The drive train with parameters theta (p,)."""
         n = len(_PARAMETERS)
-        held = theta[n : n + 2] if self.form == "friction_held" else np.zeros(2)
+        mesh = theta[n : n + 2] if self.form == "friction_held" else np.zeros(2)
         return DriveTrain(
-            self.joint, self.form, np.concatenate([theta[:4], [_RELAXATION], held]), float(theta[4]), self.dynamic
+            self.joint, self.form, np.concatenate([theta[:4], [_RELAXATION], mesh]), float(theta[4]), self.dynamic
         )
 
     def modes(self, theta: np.ndarray) -> np.ndarray:

@@ -101,14 +101,14 @@ def residuals(
     twist_d = np.zeros((len(E), 6, 3))
     twist_d[:, :3, :2], twist_d[:, 5, 2] = np.swapaxes(E[:, :3, :3], 1, 2)[:, :, :2], 1.0
     twist_tilt = np.vstack([np.zeros((3, 2)), pin.Jexp3(turn)[:, :2]])
-    stands = np.zeros((len(E), 6, len(vectors), 3))
+    standing = np.zeros((len(E), 6, len(vectors), 3))
     own = np.array([local_twist(s)[:, _STANDS] for s in vectors])
-    stands[np.arange(len(E)), :, stations.trial] = own[stations.trial]
+    standing[np.arange(len(E)), :, stations.trial] = own[stations.trial]
     local = np.concatenate(
         [
             np.broadcast_to(local_twist(common.base), (len(E), 6, 6)),
             adjoint(inverse(E @ S_B)) @ twist_tilt,
-            adjoint(inverse(T_base_B)) @ stands.reshape(len(E), 6, -1),
+            adjoint(inverse(T_base_B)) @ standing.reshape(len(E), 6, -1),
             adjoint(inverse(S_B)) @ twist_d,
         ],
         axis=2,

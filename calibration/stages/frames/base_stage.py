@@ -43,8 +43,8 @@ def locate_base(lab: Laboratory, stations: Stations) -> tuple[Model | None, tupl
 
 def _model(description: Description, found: BaseFrame, nominal: np.ndarray, free: np.ndarray) -> Model:
     tol = description.tolerances
-    held = np.repeat([tol.body_translation, tol.body_rotation], 3)
-    covariance = max(1.0, found.chi2) * found.covariance[:6, :6] + np.diag(np.where(free, STANDING, held) ** 2)
+    tolerance = np.repeat([tol.body_translation, tol.body_rotation], 3)
+    covariance = max(1.0, found.chi2) * found.covariance[:6, :6] + np.diag(np.where(free, STANDING, tolerance) ** 2)
     status: tuple[Status, ...] = tuple("estimated" if f else "not_identifiable" for f in free)
     rows = zip(AXES, nominal, found.common.base, np.sqrt(np.diag(covariance)), status, strict=True)
     prefix = frame_names()[0]

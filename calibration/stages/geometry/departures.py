@@ -1,6 +1,6 @@
 """How robots depart from a rigid chain with constant zeros, as far as a hand model leaves it out; see `misfit`.
 
-    load         dq_j = s tau_j / max |tau_j|                       gears that give under gravity
+    load         dq_j = s tau_j / max |tau_j|                       compliance of the gears
     side         dq_j = s tanh(10 tau_j / max |tau_j|)              backlash and friction on the side of the load
     bending      frame j turned by s M_j / max |M|                  links, by gravity's moments across their joints;
                                                                     columns where they slid to

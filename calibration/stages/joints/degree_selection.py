@@ -25,7 +25,7 @@ from calibration.stages.joints.separable_fit import RANK, RHO, Problem, Projecti
 HIGHEST = 5
 _WORTH = 0.95  # a model that leaves more than this share of the mean square is not worth its coefficients [-]
 _CLEAR = 1e3 * RANK  # least over largest of R's diagonal, above which columns are clearly of full rank [-]
-_TIE = 1.3  # scores within this factor of the best are as good: a handful of trials tells no better [-]
+_TIE = 1.3  # scores within this factor of the best are as good: a handful of trials shows no difference [-]
 
 
 @dataclass(frozen=True)

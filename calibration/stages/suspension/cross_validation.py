@@ -16,7 +16,7 @@ import numpy as np
 from calibration.stages.suspension.base_response import BaseResponse
 from calibration.stages.suspension.modal_response import predicted
 
-_WORTH = 0.05  # R2 below which an axis is left still [-]
+_WORTH = 0.05  # R2 below which an axis is not predicted [-]
 _NOISE = 1.25  # how much more than expected the noise may be, known from one second a trial [-]
 _SLIP = 0.1  # share of the motion [-]
 _UNKNOWN = 0.05  # of what is left, noise included [-]

@@ -56,7 +56,7 @@ class Headline:
     Attributes:
         badge: `calibrated`, `not calibrated` or, of an evaluation without estimate, `evaluated`.
         sentence: The error on unseen motion, before and after.
-        shares: What it consists of, the largest first; empty without the rows to tell it from.
+        shares: What it consists of, the largest first; empty without the rows that show it.
         next_steps: At most three, the largest gain first.
         notices: Every finding, the worst first.
     """

@@ -92,8 +92,8 @@ class Regime(Entry):
     outside_percent: float = 0.0
 
 
-class Said(Entry):
-    """What the evaluation has to say of its trials; see `calibration.verdict`."""
+class Finding(Entry):
+    """A finding of the evaluation on its trials; see `calibration.verdict`."""
 
     stage: str
     verdict: str
@@ -141,7 +141,7 @@ class Evaluation(Entry):
     regimes: tuple[Regime, ...] = ()
     protocols: tuple[Protocol, ...] = ()
     comparisons: tuple[Compared, ...] = ()
-    verdicts: tuple[Said, ...] = ()
+    verdicts: tuple[Finding, ...] = ()
 
 
 class BaseScore(Entry):

@@ -106,8 +106,8 @@ class AxisMotion:
         spread: Peak to peak of what was measured.
         shifted: Measured displacement at the end.
         noise: Rms of the markers' noise.
-        found: By source of the wrench: R2 and that of the middle half, None where the axis is left still, and the rms
-            that is left.
+        found: By source of the wrench: R2 and that of the middle half, None where the axis is not predicted, and the
+            rms that is left.
     """
 
     axis: str

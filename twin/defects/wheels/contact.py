@@ -61,8 +61,8 @@ class Contact:
         """
         geom, step, shared = model.geom(geom_name), model.opt.timestep, torsion is None
         iw = float(model.body_invweight0[geom.bodyid[0], 0])
-        held = self.damping * iw * step
-        d = max(held / (1.0 + held), _LEAST) if shared else _ON_BUSHING
+        damped = self.damping * iw * step
+        d = max(damped / (1.0 + damped), _LEAST) if shared else _ON_BUSHING
         scale, hops = (1.0 - d) * iw, _BASE_HOPS if shared else _HOPS
         if shared:
             does, most = "the base heavier", _HEAVY / (1.0 - _HEAVY) / iw
