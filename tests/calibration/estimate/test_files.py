@@ -3,6 +3,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -79,6 +80,27 @@ def test_what_pals_publisher_adds_to_the_origins_is_the_same_robot(estimate, cha
     hand = hand_of(estimate.model("model_2"), chain, np.zeros(12))
     np.testing.assert_allclose(
         published.poses(readings), hand.in_base_frame(readings) @ inverse_of_hand(hand), atol=1e-9
+    )
+
+
+def test_another_reader_of_urdf_finds_every_link_of_the_calibrated_robot_where_ours_does(estimate, tmp_path):
+    save_estimate(estimate, tmp_path)
+    text = (tmp_path / "calibrated.urdf").read_text()
+    whole = '<mujoco><compiler fusestatic="false"/></mujoco></robot>'
+    model = mujoco.MjModel.from_xml_string(text.replace("</robot>", whole))
+    data, ours = mujoco.MjData(model), chain_of(text, rigid_robot.described())
+    q = rigid_robot.random_angles(np.random.default_rng(0), 5)
+    links = [f"arm_{k}_link" for k in range(1, 8)]
+    for readings in q:
+        for name, value in zip(rigid_robot.JOINTS, readings, strict=True):
+            data.joint(name).qpos = value
+        mujoco.mj_kinematics(model, data)
+        for link in links:
+            (T,) = ours.poses(readings[None], link)
+            np.testing.assert_allclose(data.body(link).xpos, T[:3, 3], atol=1e-9)
+            np.testing.assert_allclose(data.body(link).xmat.reshape(3, 3), T[:3, :3], atol=1e-9)
+    assert {j.get("type") for j in ET.fromstring(text).findall("joint")} <= set(
+        "revolute continuous prismatic fixed".split()
     )
 
 
