@@ -8,7 +8,7 @@ On real postures this, by cross-validation, is what reaches furthest; a URDF hol
 motion is needed: where sweeps are recorded it is a row beside those with joint models.
 
 A fit averaged over which gears are compliant: most of a robot's are not, and estimating all of them costs accuracy.
-Neither a compliance nor a gap is negative: where the fit finds one below zero by more than two standard deviations, the
+Neither a compliance nor a gap is negative: where the fit finds one below zero by more than 2.5 standard deviations, the
 postures show another effect, and that gear is fitted without it and named.
 """
 
@@ -45,7 +45,7 @@ from calibration.verdict import Verdict
 
 _HAND = np.array([5e-4, 1e-3])  # random errors of the hand's position [m] and rotation [rad] to begin with
 _SPREAD = 720  # components from which rank and combinations are found
-_BELOW = 2.0  # standard deviations below zero at which a compliance or a gap is none [-]
+_BELOW = 2.5  # standard deviations below zero at which a compliance or a gap is none [-]
 _OTHER_SIDE = 0.05  # share of postures whose backlash may lie against its load
 _STRONG = np.log(20.0)  # evidence called strong by Kass and Raftery, JASA 1995
 
@@ -150,7 +150,7 @@ def without(negative: Sequence[tuple[str, float]]) -> Iterator[Verdict]:
     """Which compliances and gaps the fit is without because they came out negative."""
     if negative:
         values = ", ".join(f"{name} {1e3 * value:+.1f}e-3" for name, value in negative)
-        message = f"fitted without what came out below zero by more than {_BELOW:.0f} standard deviations: {values}"
+        message = f"fitted without what came out below zero by more than {_BELOW:.1f} standard deviations: {values}"
         yield Verdict(STAGE, "ok", f"{message}; these postures show an effect the model does not have")
 
 
