@@ -74,7 +74,7 @@ class GearFit:
         parameters: With backlash, unless the postures are strong evidence against it.
         known: Rank and combinations.
         rejected: Why it must not be used.
-        negative: Compliances and gaps it is without, with the values below zero that they had [rad/(N.m), rad; m].
+        negative: Compliances and gaps it is without, with the values below zero that they had.
     """
 
     fit: Fit
@@ -82,30 +82,28 @@ class GearFit:
     parameters: ParameterSet
     known: Identifiability
     rejected: tuple[str, ...]
-    negative: tuple[tuple[str, float], ...] = ()
+    negative: tuple[str, ...] = ()
 
 
 def fit_gears(
     hand: HandModel, parameters: ParameterSet, more: ParameterSet, postures: Postures, errors: NoiseModel
 ) -> GearFit:
     """Fit `parameters`, and `more` of them, with backlash, unless the postures are strong evidence against it."""
-    found, negative = _fitted(hand, parameters, more, postures, errors), dict[str, float]()
-    while not found.rejected and (below := _below_zero(found, hand)):
-        negative |= below
-        parameters, more = parameters.without(below), more.without(below)
+    found, negative = _fitted(hand, parameters, more, postures, errors), list[str]()
+    while not found.rejected and (worst := _below_zero(found, hand)) is not None:
+        below, name = found.parameters, found.parameters.names[worst]
+        negative.append(f"{name} {1e3 * found.robust.fit.theta[worst]:+.1f} m{below.units[worst]}")
+        parameters, more = parameters.without([name]), more.without([name])
         found = _fitted(hand, parameters, more, postures, errors)
-    return replace(found, negative=tuple(negative.items()))
+    return replace(found, negative=tuple(negative))
 
 
-def _below_zero(found: GearFit, hand: HandModel) -> dict[str, float]:
-    """The compliance or gap farthest below zero in standard deviations, before averaging, where it is too far."""
+def _below_zero(found: GearFit, hand: HandModel) -> int | None:
+    """Index of the compliance or gap farthest below zero in standard deviations, before averaging, if it is too far."""
     asked = found.parameters.indices(averaged_names(hand))
     fit = found.robust.fit
     z = fit.theta[asked] / np.sqrt(np.diag(fit.covariance)[asked])
-    if z.min(initial=0.0) >= -_BELOW:
-        return {}
-    worst = asked[int(z.argmin())]
-    return {found.parameters.names[worst]: float(fit.theta[worst])}
+    return asked[int(z.argmin())] if z.min(initial=0.0) < -_BELOW else None
 
 
 def _fitted(
@@ -146,11 +144,10 @@ def _findings(model: Model, hand: HandModel) -> Iterator[Verdict]:
             yield Verdict(STAGE, "ok", f"{what}: {sizes or 'none'}")
 
 
-def without(negative: Sequence[tuple[str, float]]) -> Iterator[Verdict]:
+def without(negative: Sequence[str]) -> Iterator[Verdict]:
     """Which compliances and gaps the fit is without because they came out negative."""
     if negative:
-        values = ", ".join(f"{name} {1e3 * value:+.1f}e-3" for name, value in negative)
-        message = f"fitted without what came out below zero by more than {_BELOW:.1f} standard deviations: {values}"
+        message = f"fitted without what was below zero by {_BELOW} standard deviations: {', '.join(negative)}"
         yield Verdict(STAGE, "ok", f"{message}; these postures show an effect the model does not have")
 
 
