@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "runs/claims.jsonl"
 RESULTS = ROOT / "docs/results/claims.json"
 SENTENCES = Path(__file__).with_name("claims.toml")
+_MOST = 100  # figures that are kept one by one
 
 
 def measured() -> dict[str, str]:
@@ -39,9 +40,12 @@ def when(figures: list[dict]) -> str:
 
 
 def keep(name: str, figures: np.ndarray | float) -> None:
-    """Add the figures of a claim, one a robot, to runs/claims.jsonl."""
+    """Add the figures of a claim, one a robot, to runs/claims.jsonl; of more than a hundred their percentiles."""
     KEPT.parent.mkdir(exist_ok=True)
-    content = {**measured(), "figures": [float(x) for x in np.atleast_1d(figures)]}
+    content, found = measured(), np.atleast_1d(figures)
+    if len(found) > _MOST:
+        content, found = {**content, "n": len(found)}, np.percentile(found, np.arange(_MOST + 1))
+    content = {**content, "figures": [float(x) for x in found]}
     with KEPT.open("a", encoding="utf-8") as file:
         file.write(json.dumps({name: content}) + "\n")
 
@@ -71,7 +75,8 @@ def _section(section: dict, results: dict) -> list[str]:
         lines += [f"| {' | '.join((section['rows'], *columns, 'measured on'))} |", "|---" * (len(columns) + 2) + "|"]
         for name, x in figures.items():
             shown = [f"{value:.{section.get('decimals', 2)}f}" for value in (np.median(x), x.min(), x.max())]
-            cells = shown[:1] if single else [str(len(x)), *shown]
+            n = sum(r.get("n", len(r["figures"])) for r in rows[name])
+            cells = shown[:1] if single else [str(n), *shown]
             label = name.strip("/ []").replace("/", ", ")
             lines.append(f"| {' | '.join((label, *cells, when(rows[name])))} |")
         lines.append("")

@@ -27,6 +27,13 @@ def overwrite_with_noise(path, rng):
                 variable[:] = rng.normal(size=variable.shape)
 
 
+def test_it_calibrates_while_no_trial_kept_aside_can_be_read(quick_run):
+    """`quick_run` is made so, see `watched`; with noise that can be read: below."""
+    assert quick_run.estimate.status == "calibrated"
+    assert len([t for t in quick_run.evaluation.predicted if t.kind != "static"]) >= 2
+
+
+@pytest.mark.slow
 def test_a_dataset_alone_with_noise_or_garbage_for_validation_trials_gives_the_same_estimate(quick_run, tmp_path):
     dataset = copied(quick_run, tmp_path)
     path, rng = dataset / "dataset.json", np.random.default_rng(0)

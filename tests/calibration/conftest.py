@@ -11,6 +11,7 @@ from calibration import Dataset, Estimate, calibrate, load
 from calibration.pipeline import STAGES
 from calibration.robot.chain import Chain, chain_of
 from tests.doubles import rigid_robot
+from tests.doubles.made_once import made_once
 
 
 @pytest.fixture(scope="session")
@@ -19,9 +20,9 @@ def truth() -> rigid_robot.Truth:
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory: pytest.TempPathFactory, truth: rigid_robot.Truth) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory, worker_id: str, truth: rigid_robot.Truth) -> Path:
     """A dataset folder; copy it before changing anything."""
-    return rigid_robot.campaign(tmp_path_factory.mktemp("matched") / "dataset", truth)
+    return made_once(tmp_path_factory, worker_id, "matched", lambda out: rigid_robot.campaign(out / "dataset", truth))
 
 
 @pytest.fixture(scope="session")
@@ -30,9 +31,10 @@ def dataset(folder: Path) -> Dataset:
 
 
 @pytest.fixture(scope="session")
-def estimate(dataset: Dataset) -> Estimate:
+def estimate(tmp_path_factory: pytest.TempPathFactory, worker_id: str, dataset: Dataset) -> Estimate:
     """Without the drive trains, which take the hand's markers half a minute: no joint has a link encoder."""
-    return calibrate(dataset, [s for s in STAGES if s not in ("base_frame", "arm_tool", "bundle")])
+    stages = [s for s in STAGES if s not in ("base_frame", "arm_tool", "bundle")]
+    return made_once(tmp_path_factory, worker_id, "estimate", lambda _: calibrate(dataset, stages))
 
 
 @pytest.fixture(scope="session")
