@@ -1,5 +1,7 @@
 """Nuisances of a design: their effect on the hand, the pull on a fit that does not ask for them, the rules' updates."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -15,45 +17,55 @@ from calibration.stages.geometry.parameters import geometry_parameters, reading_
 from scenarios import load
 from twin.campaign import describe_dataset
 
-DESCRIBED = describe_dataset(load("humanoids2024").twin, ())
-CHAIN = chain_of(mjcf.urdf(), DESCRIBED)
-PARAMETERS = geometry_parameters(CHAIN, DESCRIBED)
-HAND = nominal_hand(CHAIN, PARAMETERS.nominal[:12])
-PLAY = reading_sigma(CHAIN, DESCRIBED)
-Q = np.random.default_rng(0).uniform(*(np.clip(x, -2.0, 2.0) for x in CHAIN.limits), size=(40, len(CHAIN.measured)))
-DEPARTURES = departures_of(CHAIN, Q)
+
+@pytest.fixture(scope="module")
+def robot():
+    described = describe_dataset(load("humanoids2024").twin, ())
+    chain = chain_of(mjcf.urdf(), described)
+    parameters, play = geometry_parameters(chain, described), reading_sigma(chain, described)
+    limits = (np.clip(x, -2.0, 2.0) for x in chain.limits)
+    q = np.random.default_rng(0).uniform(*limits, size=(40, len(chain.measured)))
+    hand = nominal_hand(chain, parameters.nominal[:12])
+    return SimpleNamespace(chain=chain, hand=hand, q=q, fitted=(hand, parameters, described, np.maximum(play, 1e-4)))
 
 
-def test_moments_are_those_of_inverse_dynamics_across_the_axis():
-    model, found = CHAIN.nominal, CHAIN.carrying(0.0).gravity_moments(Q[:5])
+def test_moments_are_those_of_inverse_dynamics_across_the_axis(robot):
+    chain, q = robot.chain, robot.q[:5]
+    model, found = chain.nominal, chain.carrying(0.0).gravity_moments(q)
     data = model.createData()
-    for q, of_posture in zip(CHAIN.configurations(Q[:5]), found, strict=True):
-        pin.rnea(model, data, q, np.zeros(model.nv), np.zeros(model.nv))
-        for name, M in zip(CHAIN.joints, of_posture, strict=True):
+    for posture, of_posture in zip(chain.configurations(q), found, strict=True):
+        pin.rnea(model, data, posture, np.zeros(model.nv), np.zeros(model.nv))
+        for name, M in zip(chain.joints, of_posture, strict=True):
             i = model.getJointId(name)
-            axis = CHAIN.nominal_path.axis[CHAIN.joints.index(name)] * (not CHAIN.is_prismatic(name))
+            axis = chain.nominal_path.axis[chain.joints.index(name)] * (not chain.is_prismatic(name))
             force = data.f[i].angular
             R = model.jointPlacements[i].rotation.T @ data.liMi[i].rotation
             np.testing.assert_allclose(M, R @ (force - axis * (axis @ force)), atol=1e-9)
 
 
+@pytest.fixture(scope="module")
+def departures(robot):
+    return departures_of(robot.chain, robot.q)
+
+
 @pytest.mark.parametrize("z", range(8))
-def test_a_nuisance_moves_the_hand_as_the_robot_would(z):
-    q, step = Q[:6], 1e-3
-    G = DEPARTURES.effects(HAND, q)[:, :, z]
-    M, T0 = CHAIN.gravity_moments(q), HAND.poses(q)
+def test_a_nuisance_moves_the_hand_as_the_robot_would(robot, departures, z):
+    hand, q, step = robot.hand, robot.q[:6], 1e-3
+    G = departures.effects(hand, q)[:, :, z]
+    M, T0 = robot.chain.gravity_moments(q), hand.poses(q)
     for k in range(len(q)):
         xi = np.zeros((8, 6))
-        xi[z, 3:] = step * DEPARTURES.bending[z] * M[k, z]
-        T1 = HAND.with_theta(xi.ravel(), HAND.block(Placements).names).poses(q[k : k + 1])
+        xi[z, 3:] = step * departures.bending[z] * M[k, z]
+        T1 = hand.with_theta(xi.ravel(), hand.block(Placements).names).poses(q[k : k + 1])
         moved = log6(np.linalg.inv(T0[k : k + 1]) @ T1)[0] / step
         np.testing.assert_allclose(G[k], moved, atol=1e-6)
 
 
 @pytest.fixture(scope="module")
-def reported():
-    noise = prospect(HAND, PARAMETERS, DESCRIBED, np.maximum(PLAY, 1e-4), Q[:30], Q[30:])
-    return departing(noise, HAND, DESCRIBED, np.maximum(PLAY, 1e-4), DEPARTURES, Q[30:])
+def reported(robot, departures):
+    hand, parameters, described, play = robot.fitted
+    noise = prospect(hand, parameters, described, play, robot.q[:30], robot.q[30:])
+    return departing(noise, hand, described, play, departures, robot.q[30:])
 
 
 def test_the_pull_is_that_of_the_fit(reported):

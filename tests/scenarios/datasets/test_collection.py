@@ -24,6 +24,7 @@ from scenarios.datasets.run_content import recordings, recordings_and_truth
 from scenarios.datasets.run_spec import Magnitude, seed_of
 from scenarios.datasets.workers import Workers
 from scenarios.files.errors import ScenarioError
+from tests.scenarios.datasets import collection_script
 from twin.errors import TwinError
 
 SCRIPT = Path(__file__).parent / "collection_script.py"
@@ -45,9 +46,9 @@ def numbers(scenario, out):
     return (Magnitude("seed_mod_7", float(scenario.seed % 7)),)
 
 
-def made(folder, n=N, produce=numbers, scenario=None):
+def made(folder, n=N, produce=numbers, scenario=None, workers=Workers()):  # noqa: B008  it is frozen
     plan = Plan(scenario or load("humanoids2024"), n, folder, produce)
-    return collect(plan, Workers(), lambda at, share: None)
+    return collect(plan, workers, lambda at, share: None)
 
 
 @dataclass
@@ -78,6 +79,14 @@ def script(out, n=N, workers=0, scheduler="", produce="numbers", **options):
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     out = tmp_path_factory.mktemp("undisturbed") / "c"
+    made(out, produce=collection_script.numbers)
+    return tree(out)
+
+
+@pytest.fixture(scope="module")
+def scripted(tmp_path_factory):
+    """The same by the script, whose functions have another name."""
+    out = tmp_path_factory.mktemp("scripted") / "c"
     code, err = script(out).ended()
     assert code == 0, err
     return tree(out)
@@ -171,7 +180,7 @@ def test_a_mistake_and_a_killed_worker_end_as_rows_and_the_rest_completes(tmp_pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [0, 2])
-def test_killed_at_random_moments_it_resumes_to_the_same_bytes(tmp_path, undisturbed, workers):
+def test_killed_at_random_moments_it_resumes_to_the_same_bytes(tmp_path, scripted, workers):
     rng = random.Random(workers)
     out = tmp_path / "c"
     for _ in range(3):
@@ -182,25 +191,31 @@ def test_killed_at_random_moments_it_resumes_to_the_same_bytes(tmp_path, undistu
             assert all(row.status == "ok" for row in read_index(out / "index.csv"))
     code, err = script(out, workers=workers).ended()
     assert code == 0, err
-    assert tree(out) == undisturbed
+    assert tree(out) == scripted
 
 
-def test_ctrl_c_leaves_an_index_of_what_is_complete_and_workers_go_on_to_the_same_bytes(tmp_path, undisturbed):
+def test_ctrl_c_leaves_an_index_of_what_is_complete_and_workers_go_on_to_the_same_bytes(
+    tmp_path, undisturbed, monkeypatch
+):
+    left = iter(range(10, -1, -1))
+
+    def pause(_):
+        if next(left) == 0:  # in the third run
+            os.kill(os.getpid(), signal.SIGINT)
+
     out = tmp_path / "c"
-    process = script(out)
-    while not list((out / "runs").glob("00000[12]")):
-        time.sleep(0.02)
-    process.process.send_signal(signal.SIGINT)
-    process.ended()
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(collection_script.time, "sleep", pause)
+        made(out, produce=collection_script.numbers)
     rows = read_index(out / "index.csv")
-    assert 0 < len(rows) <= N
+    assert len(rows) == 2
     assert not list((out / "runs").glob(".*"))
-    assert script(out, workers=2).ended()[0] == 0
+    made(out, produce=collection_script.numbers, workers=Workers(2))
     assert tree(out) == undisturbed
 
 
 @pytest.mark.slow
-def test_without_room_it_stops_and_goes_on_later(tmp_path, undisturbed):
+def test_without_room_it_stops_and_goes_on_later(tmp_path, scripted):
     out = tmp_path / "c"
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
     code, err = script(out, preexec_fn=limit).ended()
@@ -209,7 +224,7 @@ def test_without_room_it_stops_and_goes_on_later(tmp_path, undisturbed):
     assert read_index(out / "index.csv") == ()
     assert not list((out / "runs").iterdir())
     assert script(out).ended()[0] == 0
-    assert tree(out) == undisturbed
+    assert tree(out) == scripted
 
 
 def test_two_commands_do_not_write_one_folder(tmp_path):
@@ -252,11 +267,11 @@ def scheduler(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_scheduler_of_ones_own_gives_the_same_bytes_and_may_die(tmp_path, undisturbed, scheduler):
+def test_a_scheduler_of_ones_own_gives_the_same_bytes_and_may_die(tmp_path, scripted, scheduler):
     address, started = scheduler
     code, err = script(tmp_path / "c", scheduler=address).ended()
     assert code == 0, err
-    assert tree(tmp_path / "c") == undisturbed
+    assert tree(tmp_path / "c") == scripted
     process = script(tmp_path / "d", 200, scheduler=address)
     while not list((tmp_path / "d" / "runs").glob("00*")):
         time.sleep(0.05)
@@ -310,13 +325,13 @@ def test_a_collection_is_read_lazily_with_numpy_and_xarray(recorded):
 
 
 def test_a_run_is_repeated_from_its_own_scenario(tmp_path, recorded):
-    from scenarios import steps
     from scenarios.files import yaml_file
+    from twin import record
 
     run = next(recorded.runs())
     scenario = load(run.folder / "scenario.yaml")
     yaml_file.write(tmp_path / "written.yaml", scenario)
     assert (run.folder / "scenario.yaml").read_bytes() == (tmp_path / "written.yaml").read_bytes()
-    steps.simulate(scenario, tmp_path / "again")
+    record(scenario.twin, scenario.seed, tmp_path / "again")
     assert tree(tmp_path / "again" / "dataset") == tree(run.folder / "dataset")
     assert tree(tmp_path / "again" / "truth") == tree(run.folder / "truth")
