@@ -87,7 +87,7 @@ def _shown(description: Description, file: str, trial: Trial | PostureMeans) -> 
     if len(trial.t_robot) < 2 or not len(trial.marker):
         raise NotEnoughData("readings or markers are missing")
     bodies = description.base_body, description.hand_body
-    mended = with_right_labels(bodies, trial)[0]
+    mended = with_right_labels(bodies, trial)
     base, hand = (poses_of(body, mended) for body in bodies)
     return Shown(file, inverse(base.T) @ hand.T, trial.t_mocap, trial.q_motor, trial.t_robot)
 

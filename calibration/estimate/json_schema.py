@@ -157,13 +157,12 @@ def _known(kind: type[T], part: _Part | None, at: str) -> T | None:
 def _suspension_part(suspension: Suspension) -> _Part:
     """Without what is a parameter of model_1."""
     held_out = [{"source": source} | plain(tried) for source, tried in suspension.held_out]
-    return _without(plain(suspension), "sigma_K", "sigma_C", "parameters", "combinations") | {"held_out": held_out}
+    return _without(plain(suspension), "parameters", "combinations") | {"held_out": held_out}
 
 
 def _suspension(part: _Part) -> Suspension:
-    unknown = np.full((6, 6), np.nan).tolist()
     held_out = [(tried["source"], tried) for tried in part["held_out"]]
-    apart = {"held_out": held_out, "sigma_K": unknown, "sigma_C": unknown, "parameters": (), "combinations": ()}
+    apart = {"held_out": held_out, "parameters": (), "combinations": ()}
     return _restored(Suspension, part | apart, "suspension")
 
 

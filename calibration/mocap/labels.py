@@ -25,7 +25,7 @@ A body whose labels are exchanged throughout a trial shows no jump.
 import logging
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations, permutations
 
 import numpy as np
@@ -51,18 +51,9 @@ _CLEAR_JUMP = 3.0  # times nearer than with the labels as they are [-]
 _SURE = 2.0  # times the frames of any other order [-]
 
 
-@dataclass(frozen=True)
-class Relabelled:
-    """What was done to one body in one trial: frames corrected, and frames masked."""
-
-    body: str
-    n_mended: int
-    n_masked: int
-
-
-def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tuple[Relabelled, ...]]:
-    """The trial with exchanged labels corrected, and what was done; the trial itself where nothing was wrong."""
-    position, done = trial.marker_position, []
+def with_right_labels(bodies: Sequence[Body], trial: Trial) -> Trial:
+    """The trial with exchanged labels corrected; the trial itself where nothing was wrong."""
+    position = trial.marker_position
     for body in bodies:
         columns = _columns(body, trial)
         xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
@@ -73,7 +64,6 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
         rows = np.flatnonzero(_changed(before, after).any(axis=1))
         if len(rows):
             n_masked = int(np.isnan(after[rows]).all(axis=(1, 2)).sum())
-            done.append(Relabelled(body.name, len(rows) - n_masked, n_masked))
             text = "%s: labels of body %r exchanged: %d frames corrected, %d masked"
             _log.warning(text, trial.id, body.name, len(rows) - n_masked, n_masked)
         right = without_ghosts(xyz, trial.t_mocap, after)
@@ -82,9 +72,7 @@ def with_right_labels(bodies: Sequence[Body], trial: Trial) -> tuple[Trial, tupl
         if len(rows) or n:
             position = position.copy()
             position[:, columns] = right
-    if position is not trial.marker_position:
-        trial = replace(trial, marker_position=position)
-    return trial, tuple(done)
+    return trial if position is trial.marker_position else replace(trial, marker_position=position)
 
 
 def _changed(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -109,7 +97,7 @@ def relabelled_trials(dataset: Dataset, role: Role, *kinds: str) -> Iterator[tup
 
 
 def _relabelled(description: Description, trial: Trial) -> MeasuredTrial:
-    return MeasuredTrial.of(description, with_right_labels(description.bodies, without_holes(trial))[0])
+    return MeasuredTrial.of(description, with_right_labels(description.bodies, without_holes(trial)))
 
 
 def _of_one_shape(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.estimate.rows import BASELINE, row_of
+from calibration.estimate.rows import row_of
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.labels import relabelled_trial
 from calibration.mocap.postures import dwell_windows
@@ -55,11 +55,6 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
         if bundled is not None and row_of(name).bundle:
             bundled = replace(bundled, hand=models[name])
     return replace(predict, models=models, bundled=bundled)
-
-
-def registration_postures(predict: Predictor, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Mean motor readings (n, n_joints) and measured T_B_H (n, 4, 4), a dwell each."""
-    return _postures(predict, BASELINE, [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)])
 
 
 def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:

@@ -10,9 +10,11 @@ import pytest
 
 from calibration import Compensator, Dataset, calibrate
 from calibration import load as opened
+from calibration.estimate.rows import BASELINE
+from calibration.mocap import relabelled_trial
 from calibration.mocap.postures import dwell_windows, mean_poses, readings_at
 from calibration.prediction.predict import predictor
-from calibration.prediction.second_session import registration_postures, reregistered_compensator
+from calibration.prediction.second_session import _postures, registration_trials, reregistered_compensator
 from calibration.robot.hand_uncertainty import Session
 from scenarios import load
 from tests.acceptance.claims import keep
@@ -62,7 +64,8 @@ def shares(tmp_path_factory) -> np.ndarray:
         estimate = calibrate(dataset)
         predict, robot = predictor(estimate, dataset), Compensator.of(estimate)
         assert estimate.main == "full"
-        again = reregistered_compensator(robot, *registration_postures(predict, dataset), dataset.description)
+        trials = [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)]
+        again = reregistered_compensator(robot, *_postures(predict, BASELINE, trials), dataset.description)
         pairs = ((again, None), (again, Session()), (robot, Session()), (robot, REMOUNTED))
         found.append([inside(r, dataset, predict.robot, session) for r, session in pairs])
     for name, share in zip(BANDS, np.array(found).T, strict=True):

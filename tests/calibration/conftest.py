@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjcf
-from calibration import Dataset, Estimate, calibrate, load
+from calibration import Dataset, Estimate, Evaluation, calibrate, evaluate, load
 from calibration.pipeline import STAGES
 from calibration.robot.chain import Chain, chain_of
 from tests.doubles import rigid_robot
@@ -35,6 +35,13 @@ def estimate(tmp_path_factory: pytest.TempPathFactory, worker_id: str, dataset: 
     """Without the drive trains, which take the hand's markers half a minute: no joint has a link encoder."""
     stages = [s for s in STAGES if s not in ("base_frame", "arm_tool", "bundle")]
     return made_once(tmp_path_factory, worker_id, "estimate", lambda _: calibrate(dataset, stages))
+
+
+@pytest.fixture(scope="session")
+def evaluation(
+    tmp_path_factory: pytest.TempPathFactory, worker_id: str, dataset: Dataset, estimate: Estimate
+) -> Evaluation:
+    return made_once(tmp_path_factory, worker_id, "evaluation", lambda _: evaluate(estimate, dataset))
 
 
 @pytest.fixture(scope="session")

@@ -29,7 +29,6 @@ from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second
 _SLOW, _FAST = 5.0, 12.0  # [Hz] of the base's, from markers: at all times, and where it is jolted
 _JOLT = 0.15  # [s] over which the energy of a jolt is compared with the noise
-_TILTS = 3  # columns of tilt and bending
 _TILT, _BENDING = 5e-3, 1e-4  # [rad], [rad/(N.m)] their prior standard deviations
 
 

@@ -31,8 +31,6 @@ class Suspension:
         form: `printed`, or `compliance` where the printed form was refused.
         K: (6, 6) stiffness [N/m, N, N.m/rad].
         C: (6, 6) damping [N.s/m, N.s, N.m.s/rad].
-        sigma_K: (6, 6) standard deviations; NaN where they are not known.
-        sigma_C: (6, 6).
         tangent: (6, 6) of preload, for wrenches on the floor.
         gravity: (6, 6) stiffness that the robot's weight adds, of the nominal robot; not in K. Zeros where there are no
             joint readings of its posture.
@@ -45,8 +43,6 @@ class Suspension:
     form: Literal["printed", "compliance"]
     K: np.ndarray
     C: np.ndarray
-    sigma_K: np.ndarray
-    sigma_C: np.ndarray
     tangent: np.ndarray
     gravity: np.ndarray
     held_out: tuple[tuple[Source, HeldOut], ...]

@@ -117,7 +117,6 @@ def _fitted(description: Description, responses: BaseResponses, full: bool) -> t
         "compliance" if springs.wheels is None else "printed",
         springs.K,
         springs.C,
-        *springs.sigmas,
         preload,
         np.mean([s.forcing.tangent for s in responses.dynamics], axis=0) - preload
         if responses.dynamics

@@ -14,11 +14,6 @@ from tests.doubles import rigid_robot
 from tests.doubles.edited_dataset import rewritten
 
 
-@pytest.fixture(scope="module")
-def evaluation(estimate, dataset):
-    return evaluate(estimate, dataset)
-
-
 def test_every_model_improves_on_the_one_before_it(evaluation):
     for trials in ("dynamic", "static"):
         for base in ("fixed", "measured"):
@@ -94,11 +89,13 @@ def test_saving_twice_gives_the_same_bytes(evaluation, tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-def test_a_bare_urdf_and_a_foreign_estimate_are_scored_without_a_clock_of_their_own(estimate, dataset, tmp_path):
+def test_a_bare_urdf_and_a_foreign_estimate_are_scored_without_a_clock_of_their_own(
+    estimate, evaluation, dataset, tmp_path
+):
     save_estimate(estimate, tmp_path)
     found = evaluate(load_estimate(tmp_path / "calibrated.urdf"), dataset)
     assert {r.model for r in found.rows} == {"nominal", "calibrated"}
-    mine = evaluate(estimate, dataset).row("nominal", "dynamic")
+    mine = evaluation.row("nominal", "dynamic")
     assert found.row("nominal", "dynamic").metrics.position_rmse_norm_mm == pytest.approx(
         mine.metrics.position_rmse_norm_mm
     )

@@ -30,11 +30,6 @@ def saved(estimate, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def ours(estimate, dataset):
-    return evaluate(estimate, dataset)
-
-
-@pytest.fixture(scope="module")
 def poses(estimate, dataset):
     """Trial, time and pose of one row of ours."""
     return [
@@ -49,10 +44,10 @@ def mm(evaluation, model, base, trials="dynamic"):
     return evaluation.row(model, trials, base).metrics.position_rmse_component_mm
 
 
-def test_our_urdf_with_its_zeros_scores_as_the_estimate(saved, dataset, ours):
+def test_our_urdf_with_its_zeros_scores_as_the_estimate(saved, dataset, evaluation):
     found = evaluate(load_estimate(saved / "calibrated.urdf", saved / "zeros.yaml"), dataset)
     for trials in ("dynamic", "static"):
-        assert mm(found, "calibrated", "measured", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=0.02)
+        assert mm(found, "calibrated", "measured", trials) == pytest.approx(mm(evaluation, *ROW[:2], trials), rel=0.02)
     bare = evaluate(load_estimate(saved / "calibrated.urdf"), dataset)
     assert mm(bare, "calibrated", "measured") > 1.5 * mm(found, "calibrated", "measured"), "zeros count"
     assert any("marker frames registered on" in v.message for v in found.verdicts)
@@ -80,13 +75,13 @@ def written(folder, **models):
     return load_estimate(folder / "estimate.json")
 
 
-def test_another_program_s_models_become_rows_and_agree_with_ours(saved, dataset, ours, tmp_path):
+def test_another_program_s_models_become_rows_and_agree_with_ours(saved, dataset, evaluation, tmp_path):
     parameters = json.loads((saved / "estimate.json").read_text())["models"]["model_2"]["parameters"]
     parameters = [{"name": p["name"], "value": p["value"], "unit": p["unit"]} for p in parameters]
     found = evaluate(replace(written(tmp_path, mine=parameters), clocks=load_estimate(saved).clocks), dataset)
     assert {r.model for r in found.rows} == {"nominal", "mine"}
     for trials in ("dynamic", "static"):
-        assert mm(found, "mine", "measured", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=1e-9)
+        assert mm(found, "mine", "measured", trials) == pytest.approx(mm(evaluation, *ROW[:2], trials), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -137,11 +132,11 @@ def write_netcdf(path, poses):
     return path
 
 
-def test_predicted_poses_score_as_the_row_they_are_of(poses, dataset, ours, tmp_path):
+def test_predicted_poses_score_as_the_row_they_are_of(poses, dataset, evaluation, tmp_path):
     for path in (write_csv(tmp_path / "mine.csv", poses), write_netcdf(tmp_path / "mine.nc", poses)):
         found = evaluate(read_submission(path), dataset)
         for trials in ("dynamic", "static"):
-            assert mm(found, "mine", "submitted", trials) == pytest.approx(mm(ours, *ROW[:2], trials), rel=1e-9)
+            assert mm(found, "mine", "submitted", trials) == pytest.approx(mm(evaluation, *ROW[:2], trials), rel=1e-9)
 
 
 def test_a_urdf_scores_as_its_parameters_and_as_the_poses_that_it_predicts(dataset, tmp_path):

@@ -30,7 +30,7 @@ def source(tmp_path_factory) -> Path:
     trials, start = [], 20.0
     for name, role, kind, motor, rests in (
         ("postures", "calibration", "static", static, dwells),
-        *((f"sweep{j}", "calibration", "sweep", rigid_robot.sweep(j, seconds=6.0), None) for j in (1, 2, 4)),
+        *((f"sweep{j}", "calibration", "sweep", rigid_robot.sweep(j, seconds=6.0), None) for j in (1, 4)),
         ("swing", "validation", "swing", rigid_robot.swing(np.full(8, 0.3), np.full(8, 0.2), 4.0), None),
     ):
         trial = rigid_robot.record(truth, motor, start, rng, rests)

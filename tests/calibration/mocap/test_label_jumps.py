@@ -46,9 +46,8 @@ def test_frames_are_counted_and_reported(truth, caplog):
     position = trial.marker_position.copy()
     position[:, :4] = SQUARE
     wrong = exchanged(position, slice(100, 130), [1, 2, 3, 0, *range(4, 8)])
-    found, done = with_right_labels([body], replace(trial, marker_position=wrong))
+    found = with_right_labels([body], replace(trial, marker_position=wrong))
     np.testing.assert_array_equal(found.marker_position, position)
-    assert [(d.body, d.n_mended, d.n_masked) for d in done] == [("base", 30, 0)]
     assert "'base' exchanged: 30 frames corrected, 0 masked" in caplog.text
 
 

@@ -89,7 +89,7 @@ def test_more_postures_show_the_gain_more_clearly(tmp_path):
 def test_a_matched_robot_is_a_function_of_its_seed_and_its_intervals_hold(tmp_path):
     scenario = load("short", ["twin.campaign.calibration_postures=40"])
     found = []
-    for seed in (0, 0, *range(1, 12)):
+    for seed in (0, 0, *range(1, 7)):
         folder = tmp_path / str(len(found))
         folder.mkdir()
         found.append(matched(scenario.model_copy(update={"seed": seed}), folder))
@@ -97,7 +97,7 @@ def test_a_matched_robot_is_a_function_of_its_seed_and_its_intervals_hold(tmp_pa
     figures = [{m.name: m.value for m in one} for one in found[1:]]
     n = sum(f["n_judged"] for f in figures)
     held = sum(f["coverage_95"] * f["n_judged"] for f in figures)
-    assert n == 12 * 36
+    assert n == 7 * 36
     assert 0.91 < held / n < 0.98
     assert all(f["model_2_mm"] < 0.3 * f["registration_mm"] and f["detected"] == 1.0 for f in figures)
     assert len(json.loads((tmp_path / "0" / "score.json").read_text())["combinations"]) > 10

@@ -82,7 +82,8 @@ def random_base(seed):
     return found
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
 def test_the_springs_and_dampers_of_random_bases_are_found(nominal, seed, claim):
     twin, wheels = standing(nominal, *random_base(seed))
     K, C = spatial_stiffness(wheels)

@@ -32,7 +32,10 @@ def identified(out, settings):
     found = calibrate(load_dataset(out / "dataset"), ("clocks", "registration", "suspension")).suspension
     K = np.array(json.loads((out / "truth/truth.json").read_text())["derived"]["K"])
     q = np.sqrt(np.diag(K))
-    error, sigma = np.abs(found.K - K) / np.outer(q, q), found.sigma_K / np.outer(q, q)
+    error, sigma = np.abs(found.K - K) / np.outer(q, q), np.zeros((6, 6))
+    for p in (p for p in found.parameters if p.name.startswith("suspension.K.")):
+        i, j = (int(digit) - 1 for digit in p.name[-2:])
+        sigma[i, j] = sigma[j, i] = p.sigma / (q[i] * q[j])
     print("error %", (100 * error).round(2), "sigma %", (100 * sigma).round(2))
     return error, sigma
 
