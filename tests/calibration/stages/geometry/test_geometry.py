@@ -175,7 +175,7 @@ def test_registration_does_not_take_samples_of_a_swing_for_independent(chain):
     q = np.concatenate([rigid_robot.near_postures(np.random.default_rng(1), 10), *swings])
     motion, size = np.repeat([-1, 0, 1], [10, 150, 150]), np.repeat([1e-3, 2e-3], 3)
     still = replace(rigid_robot.postures(truth, q), motion=motion)
-    for seed in range(16):
+    for seed in range(40):
         e = np.random.default_rng(seed).normal(size=(len(q), 6))
         for k in range(1, len(q)):
             if motion[k] >= 0 and motion[k] == motion[k - 1]:
