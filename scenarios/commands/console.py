@@ -25,6 +25,7 @@ PLAIN_WIDTH = 120
 PLAIN_PERIOD = 5.0
 """Time between two progress lines of one step where there is no terminal [s]."""
 _MOST = 5  # failed runs that are shown
+_EARLY = 0.02  # share of a step from which the time left is stated [-]
 
 
 @contextmanager
@@ -73,7 +74,8 @@ def _lines(console: Console) -> Progress:
         if step == last_step and now - last_time <= PLAIN_PERIOD:
             return
         start = now if step != last_step else start
-        left = f", {(now - start) * (1.0 / fraction - 1.0):.0f} s left" if now > start and 0.0 < fraction < 1.0 else ""
+        known = now > start and _EARLY < fraction < 1.0
+        left = f", {(now - start) * (1.0 / fraction - 1.0):.0f} s left" if known else ""
         line = f"{step} {fraction:4.0%} {at}{left}" if fraction or at else step
         console.print(line, markup=False, highlight=False, soft_wrap=True)
         last_step, last_time = step, now
