@@ -219,7 +219,7 @@ PLATE = (
         lambda w: np.maximum(w, [-1e9, -1e9, -600.0, -1e9, -1e9, -1e9]),
         "plate: Fz stays at -600",
     ),
-    _plate("Fz of the plate missing", lambda w: w * [1.0, 1.0, np.nan, 1.0, 1.0, 1.0], "samples are missing"),
+    _plate("Fz of the plate missing", lambda w: w * [1.0, 1.0, np.nan, 1.0, 1.0, 1.0], ""),
     _plate("wrench of another moment", lambda w: np.roll(w, len(w) // 2, axis=0), "plate rotated by"),
     _plate("plate reversed in time", lambda w: w[::-1], ""),
     _plate("plate a quarter too heavy", lambda w: 1.25 * w, "plate scale"),
