@@ -275,7 +275,10 @@ PLATE = (
     ),
 )
 
-_UP_TO = "contradict|converge|refused|off in scale|drift|plausible|times their prior|scatter|larger|elsewhere|reads"
+_UP_TO = (
+    "contradict|converge|off in scale|drift|plausible|times their prior|scatter|as large as by|elsewhere|reads|"
+    "where the readings put"
+)
 FITTED = (
     Mistake("arm_3 reads a constant", _column(3, lambda q: 0.0 * q + q.mean()), _UP_TO),
     Mistake("arm_2 saturates", _column(2, lambda q: np.minimum(q, np.median(q))), _UP_TO),
