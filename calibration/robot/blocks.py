@@ -117,7 +117,7 @@ class Placements(ParameterBlock):
     def jacobian(self, at: HandKinematics) -> np.ndarray:
         """By each joint's frame."""
         moved = at.J_frame[:, :, 1:].transpose(2, 0, 1, 3) @ jexp6(self.xi)[:, None]
-        return moved.transpose(1, 2, 0, 3).reshape(len(at.T), 6, -1)
+        return moved.transpose(1, 2, 0, 3).reshape(len(at.T), 6, 6 * len(self.joints))
 
 
 class EncoderZeros(ReadingError):

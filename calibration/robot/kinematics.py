@@ -49,7 +49,7 @@ class Placed:
         lever[:, :, 1:, 0] = lever[:, :, 0] - self.p
         for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             columns[i, :, 1] = columns[j, :, 0] * lever[l] - columns[l, :, 0] * lever[j]
-        turned = np.swapaxes(self.T[:, :3, :3], 1, 2) @ columns.reshape(3, n, -1).transpose(1, 0, 2)
+        turned = np.swapaxes(self.T[:, :3, :3], 1, 2) @ columns.reshape(3, n, 6 * (k + 1)).transpose(1, 0, 2)
         A, L = turned.reshape(3 * n, 2, k + 1, 3).transpose(1, 2, 0, 3)
         linear, angular = twists[:, :3], twists[:, 3:]
         out = np.empty((n, 6, k + 1, c))
