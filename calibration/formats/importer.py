@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from pydantic import ValidationError
 
 from calibration.checks.joint_columns import check_columns
 from calibration.checks.motor_currents import check_currents
@@ -26,6 +27,7 @@ from calibration.recording.posture_means import PostureMeans, write_means
 from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial, write_trial
 from calibration.robot.chain import Chain, chain_of_frames
+from calibration.untrusted import findings
 
 _OURS = {".c3d": "c3d", ".csv": "csv", ".bag": "bag", ".mcap": "bag", ".db3": "bag"}
 _C3D = "export C3D from the program that recorded it: it has the plates' places and units, which this table has not"
@@ -65,10 +67,13 @@ def import_files(
     chain, content = _chain(mapping), mapping.content
     recorded = _read_all(files, reader, mapping)
     calibration = [recorded[t.id] for t in content.trials if t.role == "calibration"]
-    bodies = before.description.bodies if before else placed_bodies(mapping, chain, calibration)
     together = sorted({name for r in recorded.values() for name in r.together} | set(content.setup.mocap_clock))
-    fields = content.setup.model_dump() | {"mocap_clock": together, "bodies": bodies, "trials": ()}
-    description = Description.model_validate(fields)
+    try:
+        bodies = before.description.bodies if before else placed_bodies(mapping, chain, calibration)
+        fields = content.setup.model_dump() | {"mocap_clock": together, "bodies": bodies, "trials": ()}
+        description = Description.model_validate(fields)
+    except ValidationError as error:
+        raise mapping.error("setup, bodies", findings(error, "mapping")) from error
     mass = float(pin.computeTotalMass(pin.buildModelFromXML(mapping.urdf, pin.JointModelFreeFlyer())))
     found, problems = [], []
     for entry in content.trials:

@@ -109,7 +109,7 @@ def uncertain(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarra
     arm = [known.index(f"{PREFIX}.{axis}") for axis in AXES if f"{PREFIX}.x" in known]
     placement = [f"geometry.{first_joint(chain)}.{axis}" for axis in AXES if arm]
     names = tuple(name for name in hand.names if name in known or name in placement)
-    G = np.array([[float(name == other) for other in known] for name in names])
+    G = np.array([[float(name == other) for other in known] for name in names]).reshape(len(names), len(known))
     if arm:
         vector = np.array([model.parameters[i].value for i in arm])
         G[np.ix_([names.index(name) for name in placement], arm)] = placement_derivative(chain, vector)

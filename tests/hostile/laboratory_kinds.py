@@ -288,7 +288,8 @@ FITTED = (
     Mistake("rounded to a degree", _array("q_motor", lambda q: np.hstack(
         [q[:, :1], np.radians(np.round(np.degrees(q[:, 1:])))])), "scatter|clock from angular velocity alone"),
     Mistake("radians declared as degrees", _array("q_motor", lambda q: q / _DEGREES), "identifies the robot clock"),
-    Mistake("readings of another moment", _array("q_motor", lambda q: np.roll(q, len(q) // 2, axis=0)), _UP_TO + "|no pose could be compared"),
+    Mistake("readings of another moment", _array("q_motor", lambda q: np.roll(q, len(q) // 2, axis=0)),
+        _UP_TO + "|no pose could be compared"),
     Mistake("readings reversed in time", _array("q_motor", lambda q: q[::-1]), _UP_TO),
     Mistake("readings with 20 ms of jitter", _array("t_robot", lambda t: np.sort(
         t + np.random.default_rng(0).normal(0.0, 0.02, len(t))) + 1e-6 * np.arange(len(t))), "jitter of the stamps"),

@@ -44,6 +44,12 @@ RESULTS = [
         EVALUATE,
         "do not fit",
     ),
+    Case(
+        "estimate of a model without parameters of the hand",
+        edit(ESTIMATE, lambda e: [m.update(parameters=[], combinations=[]) for m in e["models"].values()]),
+        EVALUATE,
+        codes=(0, 1, 2),
+    ),
     Case("covariance file damaged", text("run/estimate/estimate.nc", b"CDF\x01aaaa"), EVALUATE, "netCDF4"),
     Case("plan that is a list", text("run/estimate/record_next.yaml", "[1]"), EVALUATE, "postures and motions"),
     Case("evaluation {}", text("run/evaluation.json", "{}"), REPORT, "evaluation.json"),
@@ -132,6 +138,14 @@ CSV = [
         replaced(MAP, "dwells:\n", "dwells: [[0.1, 0.5], [0.4, 0.9]]\n"),
         IMPORT,
         "dwell",
+    ),
+    Case(
+        "mapping with wheels of one name",
+        replaced(
+            MAP, "wheels: []", "wheels:" + 2 * "\n  - {name: w, type: drive, centre: [0, 0, 0.1], contact: [0, 0, 0]}"
+        ),
+        IMPORT,
+        "wheels named more than once",
     ),
     Case("mapping with ragged approach", replaced(MAP, "approach:\n", "approach: [[1], [1, 1]]\n"), IMPORT, "approach"),
 ]
