@@ -95,6 +95,9 @@ def load_estimate(path: Path | str, zeros: Path | str | None = None) -> Estimate
     except (ValueError, IndexError, KeyError, TypeError) as error:
         raise InputError(file, f"its arrays do not fit each other ({error}); write the estimate again") from error
     models = tuple(replace(m, random=random.get(m.name, m.random)) for m in estimate.models)
+    for m in models:
+        if any(len(x) and x.shape != 2 * (len(m.parameters),) for x in (m.covariance, m.random)):
+            raise InputError(file, f"{m.name} has {len(m.parameters)} parameters, {COVARIANCES} those of others")
     return replace(estimate, models=models, remedies=remedies)
 
 

@@ -286,7 +286,7 @@ FITTED = (
     Mistake("arm_7 reversed", _column(7, np.negative), _UP_TO),
     Mistake("arm_6 read 0.3 rad off", _column(6, lambda q: q + 0.3), "arm_6_joint slipped"),
     Mistake("rounded to a degree", _array("q_motor", lambda q: np.hstack(
-        [q[:, :1], np.radians(np.round(np.degrees(q[:, 1:])))])), "scatter|clock from angular velocity alone"),
+        [q[:, :1], np.radians(np.round(np.degrees(q[:, 1:])))])), "", 1.6),
     Mistake("radians declared as degrees", _array("q_motor", lambda q: q / _DEGREES), "identifies the robot clock"),
     Mistake("readings of another moment", _array("q_motor", lambda q: np.roll(q, len(q) // 2, axis=0)),
         _UP_TO + "|no pose could be compared"),

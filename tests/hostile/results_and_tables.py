@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import netCDF4
+
 from tests.hostile.case import Case, edit, pipe, put, replaced, text
 from tests.hostile.datasets import EVALUATE, IMPORT, MAP
 
@@ -11,7 +13,16 @@ ESTIMATE = "run/estimate/estimate.json"
 _SUSPENSION = {"form": "printed", "C": [[1.0]], "tangent": [[1.0]], "gravity": [[1.0]], "held_out": []}
 _TWO = {"joints": ["turn"], "base_frame": "base", "tool_frame": "hand"}
 
+
+def _other_covariances(folder: Path) -> None:
+    with netCDF4.Dataset(folder / "run/estimate/estimate.nc", "w") as file:
+        group = file.createGroup("model_2")
+        group.createDimension("parameter", 2)
+        group.createVariable("random", "f8", ("parameter", "parameter"))[:] = [[1.0, 0.0], [0.0, 1.0]]
+
+
 RESULTS = [
+    Case("estimate with covariances of others", _other_covariances, EVALUATE, "those of others"),
     Case("estimate cut off", text(ESTIMATE, "{"), EVALUATE, "broken JSON"),
     Case("estimate {}", text(ESTIMATE, "{}"), EVALUATE, "models"),
     Case(
