@@ -349,7 +349,7 @@ FITTED = (
 UNSEEN = (
     Mistake("validation in degrees", _array("q_motor", lambda q: _DEGREES * q, "validation"), "in degrees"),
     Mistake("validation with gripper 1 and 2 exchanged",
-        _labels(_pairs(("gripper1", "gripper2")), 1.0, "validation"), "drawing|a marker moved"),
+        _labels(_pairs(("gripper1", "gripper2")), 1.0, "validation"), "drawing|a marker moved|as in a mirror"),
     Mistake("validation with base markers exchanged", _labels(
         {f"base{k}": f"base{(k + 1) % 4 + 1}" for k in range(1, 5)}, 1.0, "validation"),
         "elsewhere|the hand is|drawing"),
