@@ -9,8 +9,9 @@ import pytest
 from calibration import load_estimate
 from calibration.recording.trial import Trial
 from scenarios.commands import main
-from tests.calibration.test_pipeline import CALIBRATION
 from tests.doubles.edited_dataset import rewritten
+
+CALIBRATION = ("postures", "sweep1", "sweep2", "sweep4", "swing")
 
 
 def read_on(axes: np.ndarray, trial: Trial) -> Trial:
