@@ -104,7 +104,9 @@ class BundledArm:
     def at_rest(self, q_motor: np.ndarray, T_lab_base: np.ndarray | None = None) -> ArmPositions:
         """Of readings (n, k) at rest, each for itself; the base (4, 4) where it is known."""
         still, base = np.zeros(q_motor.shape[1]), self.proper(T_lab_base)
-        states, angles = zip(*(self._stream.begin(0.0, q, still, still, base) for q in q_motor), strict=True)
+        states, angles = zip(
+            *(self._stream.begin(0.0, np.array([q, still, still]), base) for q in q_motor), strict=True
+        )
         q, variance = (np.concatenate([getattr(f, name) for f in angles]) for name in ("q", "variance"))
         moment, torque = (np.concatenate([getattr(s, name) for s in states]) for name in ("moment", "torque"))
         return ArmPositions(q, variance, moment, torque, np.ones(q.shape, dtype=bool))
@@ -127,9 +129,9 @@ class BundledArm:
     ) -> ArmState:
         """One sample on, `moving` (3, k) as of `moving`, `base` (6,) as of `proper`."""
         if before is None:
-            drives, angles = self._stream.begin(t, moving[0], moving[1], moving[2], base)
+            drives, angles = self._stream.begin(t, moving, base)
         else:
-            drives, angles = self._stream.step(before.drives, t, moving[0], moving[1], moving[2], base)
+            drives, angles = self._stream.step(before.drives, t, moving, base)
         rests = np.abs(moving[1:2]) < _RESTS
         return ArmState(drives, ArmPositions(angles.q, angles.variance, drives.moment, drives.torque, rests))
 

@@ -58,6 +58,9 @@ class Placed:
         return out
 
 
+_STRAIGHT, _UNASKED = np.zeros((0, 3)), (np.zeros((3, 0, 0, 3)), np.zeros((3, 0, 0)))  # of `_walk`
+
+
 @dataclass(frozen=True)
 class Path:
     """A chain of single joints between two frames.
@@ -87,7 +90,7 @@ class Path:
         """Frames at joint positions q (n, k) [rad, m]."""
         T, (n, k) = self._room(q), q.shape
         R, p = np.empty((3, n, k, 3)), np.empty((3, n, k))
-        _walk(self.fixed, self.axis, self.prismatic, np.array(q, dtype=float, order="C"), np.zeros((0, 3)), T, (R, p))
+        _walk(self.fixed, self.axis, self.prismatic, np.ascontiguousarray(q, dtype=float), _STRAIGHT, T, (R, p))
         return Placed(T, R, p)
 
     def poses(self, q: np.ndarray, bend: np.ndarray | None = None) -> np.ndarray:
@@ -95,9 +98,8 @@ class Path:
 
         `bend` (n, 3): rotation vectors [rad] by which all that the first joint carries is turned, in its frame.
         """
-        T, turns = self._room(q), np.zeros((0, 3)) if bend is None else np.array(bend, dtype=float, order="C")
-        angles = np.array(q, dtype=float, order="C")
-        _walk(self.fixed, self.axis, self.prismatic, angles, turns, T, (np.empty((3, 0, 0, 3)), np.empty((3, 0, 0))))
+        T, turns = self._room(q), _STRAIGHT if bend is None else np.ascontiguousarray(bend, dtype=float)
+        _walk(self.fixed, self.axis, self.prismatic, np.ascontiguousarray(q, dtype=float), turns, T, _UNASKED)
         return T
 
     def _room(self, q: np.ndarray) -> np.ndarray:

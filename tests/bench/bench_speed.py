@@ -103,9 +103,9 @@ def test_speed_of_the_compensator(short_run, keep):
 
     def meshes() -> None:
         stream, a = stream_of(compensator.arm.trains), np.gradient(v, t, axis=0)
-        state, _ = stream.begin(t[0], q[0], v[0], a[0])
+        state, _ = stream.begin(t[0], np.array([q[0], v[0], a[0]]))
         for k in range(1, n):
-            state, _ = stream.step(state, t[k], q[k], v[k], a[k])
+            state, _ = stream.step(state, t[k], np.array([q[k], v[k], a[k]]))
 
     for function in (lambda: walk(True), lambda: walk(False), meshes):
         function()

@@ -6,7 +6,7 @@ The geometry keeps the zeros of the readings; it is the one fitted to corrected 
 
 Drive trains sample by sample: the state is passed from one to the next, nothing after a sample is read.
 
-    state, angles = stream.step(state, t, q_motor, velocity, acceleration)
+    state, angles = stream.step(state, t, [q_motor, velocity, acceleration])
 
 Velocities and accelerations are the caller's; with those that `torques.derivatives` has of a recording, the angles are
 those of the recording in one go.
@@ -169,11 +169,9 @@ class Stream:
     work: np.ndarray
     found: TreeDynamics
 
-    def begin(
-        self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None = None
-    ) -> tuple[StreamState, LinkAngles]:
-        """The state at a first sample q, v, a (k,) of an unknown history, and its link angles (1, k)."""
-        state, found, angles = self._room(t, q, v, a)
+    def begin(self, t: float, moving: np.ndarray, base: np.ndarray | None = None) -> tuple[StreamState, LinkAngles]:
+        """The state at a first sample q, v, a (3, k) of an unknown history, and its link angles (1, k)."""
+        state, found, angles = self._room(t, moving)
         robot, drives, states = self.trains.dynamics, self.prepared, state.states
         root = self.at_rest if base is None else robot.root(base[None])
         link_motion.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
@@ -185,10 +183,10 @@ class Stream:
         return state, LinkAngles(*angles)
 
     def step(
-        self, before: StreamState, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None = None
+        self, before: StreamState, t: float, moving: np.ndarray, base: np.ndarray | None = None
     ) -> tuple[StreamState, LinkAngles]:
-        """The state one sample q, v, a (k,) later and its link angles (1, k); base (6,) as `link_angles` has it."""
-        state, found, angles = self._room(t, q, v, a)
+        """The state one sample q, v, a (3, k) later and its link angles (1, k); base (6,) as `link_angles` has it."""
+        state, found, angles = self._room(t, moving)
         robot, drives = self.trains.dynamics, self.prepared
         state.states[:] = before.states
         root = self.at_rest if base is None else robot.root(base[None])
@@ -198,12 +196,10 @@ class Stream:
         )  # fmt: skip
         return state, LinkAngles(*angles)
 
-    def _room(
-        self, t: float, q: np.ndarray, v: np.ndarray, a: np.ndarray
-    ) -> tuple[StreamState, TreeDynamics, np.ndarray]:
-        """A state, dynamics and link angles (5, 1, k) to be filled."""
-        m, moving, scratch = len(self.prepared.columns), np.array([q, v, a], dtype=float), self.found
-        torque, moment, angles = np.empty((1, len(q))), np.empty((1, 2)), np.empty((4, 1, len(q)))
+    def _room(self, t: float, moving: np.ndarray) -> tuple[StreamState, TreeDynamics, np.ndarray]:
+        """A state, dynamics and link angles (4, 1, k) to be filled."""
+        m, k, scratch = len(self.prepared.columns), moving.shape[1], self.found
+        torque, moment, angles = np.empty((1, k)), np.empty((1, 2)), np.empty((4, 1, k))
         found = TreeDynamics(
             torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.regressor
         )

@@ -66,7 +66,7 @@ def test_play_and_compliance_of_a_joint_are_the_truths():
     "frictions",
     [
         (GearFriction("pitch", 500.0, 1.2, 0.0), GearFriction("roll", 800.0, 0.4, 0.0)),
-        (GearFriction("roll", 500.0, 0.8, 0.0),),
+        pytest.param((GearFriction("roll", 500.0, 0.8, 0.0),), marks=pytest.mark.slow),
     ],
 )
 def test_friction_of_a_joint_is_the_truths(frictions):

@@ -100,6 +100,7 @@ def test_a_wheel_on_the_seam_of_a_turned_plate_is_refused(config, motion):
         simulate(lab.twin, motion, lab.T_lab_base)
 
 
+@pytest.mark.slow
 def test_a_campaign_on_turned_plates_goes_out_as_c3d_comes_back_and_calibrates_the_same(config, tmp_path):
     only = ("postures", "x_fold")
     short = replace(config.campaign, calibration_swing=4.0, calibration_postures=1, only=only)

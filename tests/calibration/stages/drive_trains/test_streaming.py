@@ -90,10 +90,10 @@ def test_samples_one_by_one_are_the_recording_in_one_go() -> None:
     smooth, v, a = derivatives(T, Q, 20.0)
     loads = replace(of.dynamics.loads("", T, Q), q=smooth)
     batch, stream = of.of_loads(loads), stream_of(of)
-    state, angles = stream.begin(T[0], smooth[0], v[0], a[0])
+    state, angles = stream.begin(T[0], np.array([smooth[0], v[0], a[0]]))
     found = [angles]
     for i in range(1, len(T)):
-        state, angles = stream.step(state, T[i], smooth[i], v[i], a[i])
+        state, angles = stream.step(state, T[i], np.array([smooth[i], v[i], a[i]]))
         found.append(angles)
     for name in ("q", "low", "high", "variance"):
         one_by_one = np.concatenate([getattr(x, name) for x in found])
@@ -102,9 +102,9 @@ def test_samples_one_by_one_are_the_recording_in_one_go() -> None:
 
 def test_a_step_leaves_the_state_before_it_as_it_was() -> None:
     stream = stream_of(trains())
-    state, _ = stream.begin(0.0, Q[0], np.zeros(2), np.zeros(2))
+    state, _ = stream.begin(0.0, np.array([Q[0], np.zeros(2), np.zeros(2)]))
     kept = state.states.copy()
-    stream.step(state, 0.01, Q[1], np.ones(2), np.zeros(2))
+    stream.step(state, 0.01, np.array([Q[1], np.ones(2), np.zeros(2)]))
     assert (state.states == kept).all()
 
 
