@@ -85,7 +85,7 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
     shares = shares or coarse
     gains = tuple(NextStep(s.remedy, s.gain_mm) for s in budget.next_steps) if budget else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
-    others = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, coarse)) or tuple(_to_record(found))
+    others = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, coarse)) or tuple(to_record(found))
     ranked = (*refused, *others)[:_STEPS]
     return Headline(badge, _sentence(steps, best), shares, ranked, found)
 
@@ -138,7 +138,7 @@ def _next_steps(
     return (*found, *asked)
 
 
-def _to_record(notices: Sequence[Notice]) -> Iterator[NextStep]:
+def to_record(notices: Sequence[Notice]) -> Iterator[NextStep]:
     """What the stages that had no data ask for."""
     for text in dict.fromkeys(n.message.rpartition("; ")[2] for n in notices if n.level == "missing"):
         if text.startswith("record "):

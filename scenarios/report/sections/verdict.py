@@ -91,4 +91,14 @@ class Fitted:
         for v in estimate.verdicts:
             stages[v.stage] = min(stages.get(v.stage, "ok"), v.verdict, key=_WORST.index)
         errors = [v.message for v in estimate.verdicts if "left-out" in v.message]
-        return {"extent": estimate.extent, "errors": errors, "stages": stages, "verdicts": estimate.verdicts}
+        found = [Notice(v.verdict, v.stage, v.message) for v in estimate.verdicts]
+        asked = [
+            n for n in found if n.level == "refused" or "record_next" in n.message or "to record next" in n.message
+        ]
+        return {
+            "extent": estimate.extent,
+            "errors": errors,
+            "stages": stages,
+            "asked": [f"{n.stage}: {n.message.removeprefix('to record next: ')}" for n in asked],
+            "missing": [step.text for step in headline.to_record(found)],
+        }

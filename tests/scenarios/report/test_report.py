@@ -17,7 +17,7 @@ from scenarios.files.errors import ScenarioError
 from scenarios.report import write, write_refusal
 from scenarios.report.results import figures
 from scenarios.report.results.formatting import cell, count, decimals, error, fixed, readable, significant
-from scenarios.report.results.headline import Notice, _to_record, headline
+from scenarios.report.results.headline import Notice, headline, to_record
 from scenarios.report.results.ladder import Step, headline_model
 from scenarios.report.results.ladder import ladder as ordered
 from scenarios.report.results.run_results import read
@@ -132,9 +132,9 @@ def test_next_steps_are_ranked_by_what_they_gain(whole):
     assert "measure the base" in first.text
 
 
-def test_without_gains_stages_without_data_say_what_to_record():
+def test_without_gains_stages_without_data_say_whatto_record():
     ask = [Notice("missing", s, f"no {s}: {why}") for s, why in (("clocks", "no time"), ("joints", "x; record both"))]
-    assert [step.text for step in _to_record(ask)] == ["for joints: record both"]
+    assert [step.text for step in to_record(ask)] == ["for joints: record both"]
 
 
 def test_sections_are_numbered_and_named_by_the_page_alone(whole):
