@@ -132,9 +132,25 @@ def test_next_steps_are_ranked_by_what_they_gain(whole):
     assert "measure the base" in first.text
 
 
-def test_without_gains_stages_without_data_say_whatto_record():
+def test_without_gains_stages_without_data_say_what_to_record():
     ask = [Notice("missing", s, f"no {s}: {why}") for s, why in (("clocks", "no time"), ("joints", "x; record both"))]
     assert [step.text for step in to_record(ask)] == ["for joints: record both"]
+
+
+def test_a_fit_of_postures_says_its_error_and_what_to_record(tmp_path):
+    error = "full: hand error at left-out postures 2 mm rms (95 % interval 1 to 3), model_2 4 mm; 37 postures"
+    next_ = "to record next: twice as many postures would leave 1 mm"
+    missing = Verdict("joints", "missing", "no joints: x; record link readings")
+    write_estimate(tmp_path, Verdict("geometry", "ok", error), Verdict("geometry", "ok", next_), missing)
+    write(tmp_path)
+    shown = Page(tmp_path / "report.html").text
+    for text in (
+        "(95 % interval 1 to 3).",
+        "Beside it: model_2 4 mm",
+        "leave 1 mm.",
+        "for joints: record link readings.",
+    ):
+        assert text in shown
 
 
 def test_sections_are_numbered_and_named_by_the_page_alone(whole):
