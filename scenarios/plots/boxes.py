@@ -42,8 +42,7 @@ def error_boxes(samples: Sequence[Sample], quantity: str, floor: float | None, a
         floor: Root mean square that no model can undercut, in the unit of the samples; None where not known.
         ax: Where to draw.
     """
-    for y, sample in enumerate(samples):
-        _box(y, sample, ax)
+    _boxes(samples, ax)
     if floor is not None:
         ax.axvline(floor, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=0.9)
     ax.set_yticks(range(len(samples)), [s.label for s in samples])
@@ -67,21 +66,24 @@ def _limits(samples: Sequence[Sample], floor: float | None) -> tuple[float, floa
     return 0.8 * max(low, 1e-3 * high), 1.3 * high
 
 
-def _box(y: float, sample: Sample, ax: Axes) -> None:
-    low, first, median, third, high = np.percentile(sample.values, _SHARES)
-    half = _HEIGHT / 2.0
-    ax.hlines(y, low, high, color=sample.colour, linewidth=1.0)
-    ax.vlines([low, high], y - half / 2, y + half / 2, color=sample.colour, linewidth=1.0)
+def _boxes(samples: Sequence[Sample], ax: Axes) -> None:
+    low, first, median, third, high = np.array([np.percentile(s.values, _SHARES) for s in samples]).T
+    y, half, colours = np.arange(len(samples)), _HEIGHT / 2.0, [s.colour for s in samples]
+    ax.hlines(y, low, high, colors=colours, linewidth=1.0)
+    ends = np.tile(y, 2)
+    ax.vlines(np.append(low, high), ends - half / 2, ends + half / 2, colors=2 * colours, linewidth=1.0)
     ax.barh(
         y,
         third - first,
         _HEIGHT,
         left=first,
-        facecolor="white" if sample.hollow else sample.colour,
-        edgecolor=sample.colour,
+        facecolor=["white" if s.hollow else s.colour for s in samples],
+        edgecolor=colours,
         linewidth=1.1,
         zorder=2,
     )
-    ax.vlines(median, y - half, y + half, color=sample.colour if sample.hollow else "white", linewidth=1.6, zorder=3)
-    rms = float(np.sqrt((sample.values**2).mean()))
-    ax.plot(rms, y, marker="o", color="black", markersize=3.2, markeredgecolor="white", markeredgewidth=0.6, zorder=4)
+    inside = [s.colour if s.hollow else "white" for s in samples]
+    ax.vlines(median, y - half, y + half, colors=inside, linewidth=1.6, zorder=3)
+    rms = [float(np.sqrt((s.values**2).mean())) for s in samples]
+    dot = {"color": "black", "markersize": 3.2, "markeredgecolor": "white", "markeredgewidth": 0.6}
+    ax.plot(rms, y, "o", **dot, zorder=4)

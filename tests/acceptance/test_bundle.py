@@ -67,12 +67,13 @@ def test_a_base_on_springs_alone_is_off_by_what_slips(quick_run):
 
 
 def test_the_estimate_reads_back_and_predicts_the_same(quick_run):
-    from calibration import load, load_estimate
+    """`run` evaluates what it has saved."""
+    from calibration import load
     from calibration.prediction import predict
 
     dataset = load(quick_run.folder / "dataset")
-    saved = load_estimate(quick_run.folder / "estimate")
-    for own, read in zip(predict(quick_run.estimate, dataset), predict(saved, dataset), strict=True):
+    for own, read in zip(predict(quick_run.estimate, dataset), quick_run.evaluation.predicted, strict=True):
+        assert own.trial_id == read.trial_id
         for a, b in zip(own.rows, read.rows, strict=True):
             if a.model == "full":
                 np.testing.assert_allclose(a.T_lab_hand, b.T_lab_hand, rtol=0.0, atol=1e-9)

@@ -30,7 +30,7 @@ def example(name):
     ("name", "share"),
     [
         pytest.param("constant_offset", 0.95, marks=pytest.mark.slow),
-        ("least_squares", 0.5),
+        pytest.param("least_squares", 0.5, marks=pytest.mark.slow),
         ("residual_model", 0.95),
     ],
 )

@@ -210,7 +210,7 @@ def test_ctrl_c_leaves_an_index_of_what_is_complete_and_workers_go_on_to_the_sam
     rows = read_index(out / "index.csv")
     assert len(rows) == 2
     assert not list((out / "runs").glob(".*"))
-    made(out, produce=collection_script.numbers, workers=Workers(2))
+    made(out, produce=collection_script.numbers, workers=Workers(1))
     assert tree(out) == undisturbed
 
 

@@ -38,7 +38,7 @@ def test_boxes_show_quartiles_median_and_root_mean_square_of_each_row(ax):
     assert ax.yaxis_inverted(), "the first row is on top"
     boxes = [(p.get_x(), p.get_width()) for p in ax.patches]
     np.testing.assert_allclose(boxes, [(25.0, 50.0), (2.5, 5.0)])
-    dots = [line.get_xdata()[0] for line in ax.lines if line.get_marker() == "o"]
+    (dots,) = (line.get_xdata() for line in ax.lines if line.get_marker() == "o")
     np.testing.assert_allclose(dots, [np.sqrt((values**2).mean()), 0.1 * np.sqrt((values**2).mean())])
     (floor,) = (line for line in ax.lines if line.get_color() == TRUTH)
     np.testing.assert_allclose(floor.get_xdata(), 0.5)
