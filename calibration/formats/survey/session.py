@@ -126,7 +126,7 @@ def _view(path: Path, robot: UrdfRobot) -> FileView:
 
 
 def sigmas_of(session: Session) -> dict[str, float]:
-    """Standard deviations of a sample [m, rad, N, N.m], in the two digits that seconds of rest show."""
+    """Standard deviations of a sample [m, rad, N, N.m]: of noise two digits, as rests show it, of a resolution four."""
     found: dict[str, list[float]] = {name: [] for name in _SIGMAS}
     for r in session.trials.values():
         if r.markers is not None:
@@ -142,7 +142,9 @@ def sigmas_of(session: Session) -> dict[str, float]:
             found["plate_force"].append(float(np.median(sigma[:3])))
             found["plate_moment"].append(float(np.median(sigma[3:])))
     return {
-        name: float(f"{max(float(np.median(x)), _LEAST[name]) if x else _SIGMAS[name]:.2g}")
+        name: float(
+            f"{max(float(np.median(x)), _LEAST[name]) if x else _SIGMAS[name]:.{4 if name == 'encoder' else 2}g}"
+        )
         for name, x in found.items()
     }
 
