@@ -27,7 +27,6 @@ Role = Literal["calibration", "validation", "confirmation"]
 Kind = Literal["static", "sweep", "swing", "spin", "drive"]
 _ORTHOGONAL = 1e-3  # axes of a plate may be rounded [-]
 _GRAVITY = (0.5, 30.0)  # [m/s2]
-_FLAT = 1e-6  # second extent of markers over the first below which they stand in a line [-]
 _MOST_JOINTS, _MOST_BODIES, _MOST_MARKERS, _MOST_TRIALS = 100, 100, 1000, 10_000
 
 
@@ -74,9 +73,7 @@ class Body(Declaration):
     @field_validator("markers")
     @classmethod
     def _are_not_in_line(cls, markers: tuple[Marker, ...]) -> tuple[Marker, ...]:
-        x = np.array([m.xyz for m in markers]).reshape(-1, 3)
-        spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False) if len(x) >= 3 else np.ones(2)
-        if spread[1] < _FLAT * spread[0] or spread[0] == 0.0:
+        if len(markers) >= 3 and np.linalg.matrix_rank(np.diff([m.xyz for m in markers], axis=0), rtol=1e-6) < 2:
             raise ValueError("are drawn in a line: they have no rotation; draw them where they are")
         return markers
 
@@ -294,8 +291,7 @@ class Description(Setup):
     @property
     def hand_body(self) -> Body:
         """The marker body at the hand, whose frame is the pose predicted and scored."""
-        found = body_on(self.bodies, self.tool_frame, self.base_frame)
-        return self._found(found, f"tool_frame {self.tool_frame!r}")
+        return self._found(body_on(self.bodies, self.tool_frame, self.base_frame), f"tool_frame {self.tool_frame!r}")
 
     def _found(self, body: Body | None, wanted: str) -> Body:
         if body is None:

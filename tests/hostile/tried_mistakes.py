@@ -70,7 +70,7 @@ def rows(place: Path) -> Iterator[list[str | int]]:
 
 
 def _row(name: str, mistakes: Sequence[Mistake], outcome: Callable[[Mistake, Path], Tried], at: Path) -> list:
-    faults, kept = [], [0.0]
+    faults, kept = [], []
     for mistake in mistakes:
         found = outcome(mistake, at)
         shutil.rmtree(at, ignore_errors=True)
@@ -81,4 +81,4 @@ def _row(name: str, mistakes: Sequence[Mistake], outcome: Callable[[Mistake, Pat
             kept.append(found.error / found.clean)
     counts = [faults.count(what) for what in COLUMNS[4:7]]
     harmless = sum(not m.says for m in mistakes) - counts[1]
-    return [name, len(mistakes), len(mistakes) - harmless - sum(counts), harmless, *counts, f"{max(kept):.2f}"]
+    return [name, len(mistakes), len(mistakes) - harmless - sum(counts), harmless, *counts, f"{max(kept):.2f}" if kept else ""]
