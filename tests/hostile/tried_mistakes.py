@@ -81,4 +81,5 @@ def _row(name: str, mistakes: Sequence[Mistake], outcome: Callable[[Mistake, Pat
             kept.append(found.error / found.clean)
     counts = [faults.count(what) for what in COLUMNS[4:7]]
     harmless = sum(not m.says for m in mistakes) - counts[1]
-    return [name, len(mistakes), len(mistakes) - harmless - sum(counts), harmless, *counts, f"{max(kept):.2f}" if kept else ""]
+    largest = f"{max(kept):.2f}" if kept else ""
+    return [name, len(mistakes), len(mistakes) - harmless - sum(counts), harmless, *counts, largest]
