@@ -219,13 +219,13 @@ def test_the_sigma_of_rho_is_that_of_simulated_sweeps():
 
 def scattering(slip: bool, n: int = 6) -> Suspension:
     """A suspension whose x y element scatters a little too much between trials."""
-    K, none, rest = np.diag([1e5, 1e5, 1e6, 2e4, 2e4, 1e4]), np.full((6, 6), np.nan), np.zeros((6, 6))
+    K, rest = np.diag([1e5, 1e5, 1e6, 2e4, 2e4, 1e4]), np.zeros((6, 6))
     error = np.zeros((n, 6))
     error[:, 1] = 0.9 * slip
     held = HeldOut(error, np.ones((n, 6)), np.zeros((n, 6)), np.full(n, 100.0))
     p = Parameter("suspension.K.12", "N/m", 0.0, 0.0, 4e4, "not_identifiable")
     q = Parameter("suspension.K.11", "N/m", 0.0, 1e5, 1e3, "estimated")
-    return Suspension("compliance", K, 0.01 * K, none, none, rest, rest, (("plate", held),), (q, p), ())
+    return Suspension("compliance", K, 0.01 * K, rest, rest, (("plate", held),), (q, p), ())
 
 
 def test_elements_that_scatter_ask_for_as_many_swings_as_would_tell_them():

@@ -63,7 +63,7 @@ def known_suspension() -> Suspension:
     motion = np.tile([4.0, 4.0, 4.0, 9.0, 9.0, 9.0], (3, 1)) * 1e-6
     held_out = HeldOut(np.where(MOVES, 0.05, 1.1) * motion, motion, 1e-12 + 0.0 * motion, np.full(3, 900.0))
     zero = np.zeros((6, 6))
-    return Suspension("compliance", K, C, zero, zero, zero, zero, (("plate", held_out),), (), ())
+    return Suspension("compliance", K, C, zero, zero, (("plate", held_out),), (), ())
 
 
 def known_estimate(**changes) -> Estimate:

@@ -57,7 +57,7 @@ def suspension():
     K, C = stiffness()
     none, sums = np.zeros((6, 6)), np.ones((3, 6))
     tried = HeldOut(1e-6 * sums, 1e-6 * sums, 1e-12 * sums, np.ones(3))
-    return Suspension("compliance", K, C, none, none, none, none, (("plate", tried),), (), ())
+    return Suspension("compliance", K, C, none, none, (("plate", tried),), (), ())
 
 
 def fit(trials, suspension, robot=ROBOT, plate=PLATE, description=DESCRIPTION):
