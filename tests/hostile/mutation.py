@@ -5,6 +5,7 @@ A change is a pair of integers, (where, what): the same pair damages the same fi
 
 import json
 from collections.abc import Sequence
+from copy import deepcopy
 from pathlib import Path
 
 import netCDF4
@@ -54,7 +55,7 @@ def of_json(path: Path, changes: Sequence[Change]) -> None:
     for where, what in changes:
         nodes = list(_nodes(tree))
         holder, key = nodes[where % len(nodes)]
-        kind, value = what % 8, VALUES[what // 8 % len(VALUES)]
+        kind, value = what % 8, deepcopy(VALUES[what // 8 % len(VALUES)])
         if kind == 0:
             del holder[key]
         elif kind == 1 and isinstance(holder, list):
