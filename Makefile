@@ -93,7 +93,7 @@ $(READY): requirements.txt pyproject.toml scenarios/testing/pytest_plugin.py
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \
 	  echo "Python 3.11 to 3.14 is needed; $(PYTHON) is $$($(PYTHON) --version 2>&1 | head -1)."; \
 	  echo "Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
-	@echo "Installing the pinned packages into .venv (once, about 1 GB)"
+	@echo "Installing the pinned packages into .venv (once, 1.4 GB)"
 	@$(PYTHON) -m venv .venv || { \
 	  echo "$(PYTHON) cannot create a virtual environment; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -r requirements.txt
