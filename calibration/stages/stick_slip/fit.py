@@ -25,9 +25,9 @@ class Fitted:
     """Parameters by one source of the wrench.
 
     Attributes:
-        logarithms: (12,) see `wheels.NAMES`.
-        covariance: (12, 12).
-        others: (k, 12) without each of the trials.
+        logarithms: (13,) see `wheels.NAMES`.
+        covariance: (13, 13).
+        others: (k, 13) without each of the trials.
         cost: -2 log of the posterior.
         starts: Costs to which the starts of the search came.
     """
@@ -45,7 +45,7 @@ class Fitted:
 
 
 def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
-    """The parameters that predict the trials best; from a known start (12,), where there is one, without a search."""
+    """The parameters that predict the trials best; from a known start (13,), where there is one, without a search."""
     best, starts = searched(trials) if start is None else (warmed(trials, start), ())
     H_k, g_k = trials.normal(best.logarithms, best.errors, both=True)
     H = H_k.sum(axis=0) + np.diag(PRIOR_SIGMA**-2.0)
@@ -102,7 +102,7 @@ def _preloaded(trials: Trials, p: SlipParameters, x: np.ndarray) -> np.ndarray:
 
 
 def left_out(trials: Trials, others: np.ndarray) -> np.ndarray:
-    """Positions (n, 3) of each trial by the parameters (k, 12) of the others."""
+    """Positions (n, 3) of each trial by the parameters (k, 13) of the others."""
     return np.concatenate([trials.alone(k).simulated(own[None])[0][0] for k, own in enumerate(others)])
 
 

@@ -2,11 +2,14 @@
 
     M(t) dv/dt + sum_i A_i' f_i + B v = w(t),     dx/dt = v,     x = (x, y, yaw),   A_i = [1 0 -y_i; 0 1 x_i]
     f_i = K_i e_i + C_i de_i/dt + N_i (-ry, rx),   |f_i| <= mu_i N_i             e_i = A_i x - s_i, s_i the slider
-    N_i = n_i + G_i (-Fz, My, -Mx)                                               shares of the vertical load
+    N_i = n_i + G_i (-Fz, My, -Mx)                                               shares of the load about the base
 
 f_i is wheel i's action on the floor [N, frame 0]. The bushings turn with the tilt (rx, ry), which brings a share of
 N_i into the floor's plane. A wheel whose force would exceed mu_i N_i slides: the force is cut to that length, and e_i
 is what its spring and damper then hold, implicit in time. The rest is explicit, velocity first (symplectic Euler).
+
+A force plate stands still: (My, -Mx) about the base is R(yaw)' ((My, -Mx)_0 + Fz (x, y)). Seven millimetres move 10 N
+from one drive to the other.
 
 With a force plate, F its reading of sum_i A_i' f_i, the position is corrected at the rate g,
 
@@ -138,9 +141,13 @@ def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         s[_D * LANES + l] = h * s[_V * LANES + l] + s[_DX * LANES + l]
         s[(_D + 1) * LANES + l] = h * s[(_V + 1) * LANES + l] + s[(_DX + 1) * LANES + l]
         s[(_D + 2) * LANES + l] = h * s[(_V + 2) * LANES + l] + s[(_DX + 2) * LANES + l]
+        moved = 1.0 if s[(_BODY + 2) * LANES + l] > 0.0 else 0.0
+        ax = my + my0 * a0 + my1 * a1 + my2 * a2 - moved * z * s[_X * LANES + l]
+        ay = mx + mx0 * a0 + mx1 * a1 + mx2 * a2 - moved * z * s[(_X + 1) * LANES + l]
+        yaw = moved * s[(_X + 2) * LANES + l]
         s[(_D + 3) * LANES + l] = z + z0 * a0 + z1 * a1 + z2 * a2
-        s[(_D + 4) * LANES + l] = my + my0 * a0 + my1 * a1 + my2 * a2
-        s[(_D + 5) * LANES + l] = mx + mx0 * a0 + mx1 * a1 + mx2 * a2
+        s[(_D + 4) * LANES + l] = ax + yaw * ay
+        s[(_D + 5) * LANES + l] = ay - yaw * ax
         s[_F * LANES + l] = s[_BODY * LANES + l] * s[_V * LANES + l]
         s[(_F + 1) * LANES + l] = s[_BODY * LANES + l] * s[(_V + 1) * LANES + l]
         s[(_F + 2) * LANES + l] = s[(_BODY + 1) * LANES + l] * s[(_V + 2) * LANES + l]

@@ -1,10 +1,11 @@
-"""Search for the stick-slip parameters: Gauss-Newton with Levenberg's damping, and scans of the frictions.
+"""Search for the stick-slip parameters: Gauss-Newton with Levenberg's damping, and scans of frictions and stiffnesses.
 
     step = -(H + l diag H)^-1 g,     H = sum_k H_k + S^-2,   g = sum_k g_k + S^-2 (p - p_0)
 
 Whether a wheel slides in a jolt at all is a threshold: far from the right friction the cost has valleys of its own.
-So a few steps are made from several starts, one of which hardly slips, and whenever the search ends, each friction is
-tried at other values; it goes on from a better one.
+So a few steps are made from several starts, one of which hardly slips, and whenever the search ends, each friction and
+each stiffness, which a wheel that slides at every turn shows little of, is tried at other values; it goes on from a
+better one.
 
 Where wheels are declared is not fitted, but looked for: of each wheel alone, by a step from the best point in the
 parameters and its place, whose prior is PLACE wide. Right places seem off by up to 14 mm on robots of development,
@@ -28,6 +29,7 @@ _PLACE_STEP = 0.003  # [m] for derivatives
 _SPREAD = (0.0, -0.5, 1.5)  # of the frictions' logarithms between starts: at the last one hardly a wheel slips
 _SCAN = tuple(np.log([0.6, 0.8, 0.92, 1.15, 1.5]))
 _FRICTIONS = tuple(i for i, name in enumerate(NAMES) if name.endswith("_mu"))
+_SCANNED = (*_FRICTIONS, *(i for i, name in enumerate(NAMES) if "_k" in name))
 
 
 @dataclass(frozen=True)
@@ -75,9 +77,9 @@ def descended(trials: Trials, best: Point) -> Point:
 
 
 def scanned(trials: Trials, at: Point) -> Point:
-    """The point with other frictions, one after the other, where that is better by more than a step's least gain."""
+    """The point with another friction or stiffness, one after the other, where that gains more than a step's least."""
     best = at
-    for i in _FRICTIONS:
+    for i in _SCANNED:
         new = min(
             tried(trials, [best.logarithms + step * np.eye(len(NAMES))[i] for step in _SCAN]), key=lambda p: p.cost
         )

@@ -1,7 +1,7 @@
 """Wheels of the stick-slip base: stiffness, damping, friction and share of the vertical load, tied by type.
 
     k = (kx, ky) of a drive, (k, k) of a front or back caster       c of drives, of casters      mu of the three types
-    N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i, y_i) = (-Fz, My, -Mx)        k_i 1; load share of a drive
+    N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i, y_i) = (-Fz, My, -Mx)        k_i 1 of a front caster
 
 A wheel carries its own weight n_i, of the nominal robot; the base's weight is shared as by vertical springs under a
 rigid base, and a wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors
@@ -21,9 +21,10 @@ from calibration.stages.stick_slip.kernel import solved
 NAMES = (
     "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
     "drive_c", "caster_c", "body_c", "body_cr", "drive_load",
+    "back_load",
 )  # fmt: skip
-PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0])
-PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.15])
+PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0])
+PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.25, 0.25])
 PRELOADS = 8  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
 _LEGS = 3  # wheels that a base stands on
@@ -46,7 +47,8 @@ class SlipParameters:
         caster_c: Of a caster [N.s/m].
         body_c: Damper of the base against the floor [N.s/m].
         body_cr: The same about the vertical [N.m.s/rad].
-        drive_load: Share of the base's weight on a drive wheel, over what a caster in its place would bear [-].
+        drive_load: Share of the base's weight on a drive wheel, over what a front caster in its place would bear [-].
+        back_load: The same of a back caster [-].
     """
 
     drive_kx: float
@@ -61,15 +63,16 @@ class SlipParameters:
     body_c: float
     body_cr: float
     drive_load: float
+    back_load: float
 
     @classmethod
     def of(cls, logarithms: np.ndarray) -> "SlipParameters":
-        """From logarithms (12,) in the order of NAMES."""
+        """From logarithms (13,) in the order of NAMES."""
         return cls(*(float(v) for v in np.exp(logarithms)))
 
     @property
     def logarithms(self) -> np.ndarray:
-        """(12,) in the order of NAMES."""
+        """(13,) in the order of NAMES."""
         return np.log([getattr(self, name) for name in NAMES])
 
 
@@ -94,13 +97,13 @@ class WheelSet:
         k = {"drive": (p.drive_kx, p.drive_ky), "front": (p.front_k, p.front_k), "back": (p.back_k, p.back_k)}
         mu = {"drive": p.drive_mu, "front": p.front_mu, "back": p.back_mu}
         c = [p.drive_c if kind == "drive" else p.caster_c for kind in self.types]
-        n, G = self.loads(p.drive_load)
+        n, G = self.loads(p.drive_load, p.back_load)
         columns = self.position, [k[kind] for kind in self.types], c, [mu[kind] for kind in self.types], n, G
         return np.ascontiguousarray(np.column_stack(columns))
 
-    def loads(self, drive_load: float) -> tuple[np.ndarray, np.ndarray]:
+    def loads(self, drive_load: float, back_load: float) -> tuple[np.ndarray, np.ndarray]:
         """n (m,) [N] and G (m, 3) of N = n + G (-Fz, My, -Mx)."""
-        share = np.where([kind == "drive" for kind in self.types], drive_load, 1.0)
+        share = np.array([{"drive": drive_load, "front": 1.0, "back": back_load}[kind] for kind in self.types])
         A = np.column_stack([np.ones(len(share)), self.position])
         G = share[:, None] * (A @ np.linalg.pinv(A.T @ (share[:, None] * A)))
         return self.weight - G @ (A.T @ self.weight), G
@@ -118,7 +121,7 @@ class WheelSet:
     @cached_property
     def standing(self) -> np.ndarray:
         """(m, 3) x, y and n of wheels that share the load alike."""
-        return np.column_stack([self.position, self.loads(1.0)[0]])
+        return np.column_stack([self.position, self.loads(1.0, 1.0)[0]])
 
     def stiffness(self, p: SlipParameters) -> np.ndarray:
         """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""

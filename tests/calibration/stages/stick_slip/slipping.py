@@ -18,7 +18,7 @@ WHEELS = WheelSet(
     POSITION,
     np.array([40.0, 40.0, 0.0, 0.0, 0.0, 0.0]),
 )
-TRUTH = SlipParameters(4200.0, 7700.0, 14e3, 24e3, 0.55, 0.24, 0.065, 140.0, 70.0, 3.0, 0.5, 1.05)
+TRUTH = SlipParameters(4200.0, 7700.0, 14e3, 24e3, 0.55, 0.24, 0.065, 140.0, 70.0, 3.0, 0.5, 1.05, 0.95)
 MASS = np.array([[74.0, 0.0, -1.5], [0.0, 74.0, 2.0], [-1.5, 2.0, 3.5]])
 WEIGHT = np.array([730.0, 20.0, 3.0])  # -Fz, My, -Mx
 
@@ -34,8 +34,17 @@ class Motion:
     slides: np.ndarray
 
 
-def literal(w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.ndarray | None = None) -> Motion:
-    """The equations of `kernel` without a plate, under w (n, 3), as its docstring has them."""
+def about(x: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """-Fz, My, -Mx about the axes of a base that moved by x (3,), of those about where it was."""
+    c, s = np.cos(x[2]), np.sin(x[2])
+    first, second = load[1] - load[0] * x[0], load[2] - load[0] * x[1]
+    return np.array([load[0], c * first + s * second, c * second - s * first])
+
+
+def literal(
+    w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.ndarray | None = None, plate: bool = False
+) -> Motion:
+    """The equations of `kernel` as its docstring has them, under w (n, 3); a plate reads the load, corrects nothing."""
     rows = WHEELS.rows(p)
     x, v, e = np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
     out = []
@@ -45,7 +54,7 @@ def literal(w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.
         slides = np.zeros(len(rows), dtype=bool)
         for i, (px, py, kx, ky, c, mu, n, *G) in enumerate(rows):
             A = np.array([[1.0, 0.0, -py], [0.0, 1.0, px]])
-            N, K = max(n + np.dot(G, WEIGHT), 0.0), np.array([kx, ky])
+            N, K = max(n + np.dot(G, about(x, WEIGHT) if plate else WEIGHT), 0.0), np.array([kx, ky])
             q = N * np.array([-ry, rx])
             new = e[i] + A @ v * h
             f = K * new + c * (A @ v) + q

@@ -6,8 +6,9 @@ import pytest
 from calibration.stages.stick_slip.forcing import STEP, STEPS
 from calibration.stages.stick_slip.kernel import LANES, advance, at_rest, simulated
 from calibration.stages.stick_slip.likelihood import bases_of
+from calibration.stages.stick_slip.poses import about_base
 from tests.calibration.stages.stick_slip import slipping
-from tests.calibration.stages.stick_slip.slipping import MASS, TRUTH, WEIGHT, WHEELS
+from tests.calibration.stages.stick_slip.slipping import MASS, POSITION, TRUTH, WEIGHT, WHEELS
 
 STUCK = replace(TRUTH, drive_mu=1e3, front_mu=1e3, back_mu=1e3)
 
@@ -27,6 +28,23 @@ def test_the_kernel_is_the_equations_of_its_docstring():
     np.testing.assert_allclose(x, true.x[STEPS - 1 :: STEPS], atol=1e-12)
     np.testing.assert_allclose(share, true.slides.reshape(-1, STEPS * 6).mean(axis=1))
     assert 0.01 < share.mean() < 0.9
+
+
+def test_a_base_that_moved_on_its_plate_bears_on_other_wheels():
+    w = slipping.push(np.random.default_rng(0), seconds=3.0)
+    true, fixed, one = slipping.literal(w, plate=True), slipping.literal(w), slipping.forcing(w)
+    wheels, bodies = WHEELS.rows(TRUTH)[None], np.array([[TRUTH.body_c, TRUTH.body_cr, 1e-12, 0.1]])
+    (x,), _ = simulated(np.array([0, len(one.inertia)]), one.drive, one.inertia, at_rest(wheels, bodies), STEP, 1)
+    own = np.abs(x - true.x[STEPS - 1 :: STEPS]).max(axis=0)
+    assert np.all(own < 0.05 * np.abs(fixed.x - true.x).max(axis=0))  # to first order in the yaw
+
+
+def test_loads_about_a_moved_base_are_those_of_wheels_that_moved():
+    x, N = np.array([8e-3, -5e-3, 0.06]), np.array([130.0, 150.0, 170.0, 140.0, 30.0, 60.0])
+    at = POSITION @ np.array([[np.cos(x[2]), np.sin(x[2])], [-np.sin(x[2]), np.cos(x[2])]]) + x[:2]
+    read = np.array([N.sum(), *(N @ at)])
+    np.testing.assert_allclose(slipping.about(x, read), [N.sum(), *(N @ POSITION)])
+    np.testing.assert_allclose(about_base(read[None], x[None])[0], slipping.about(x, read))
 
 
 def test_wheels_that_stick_answer_a_steady_force_by_their_stiffness():
@@ -112,7 +130,7 @@ def test_bases_side_by_side_do_not_know_of_each_other():
     rng = np.random.default_rng(5)
     w = slipping.push(rng, seconds=3.0)
     one, k = slipping.forcing(w, w), LANES + 3
-    p, e = TRUTH.logarithms + 0.2 * rng.normal(size=(k, 12)), 1e-4 * rng.normal(size=(k, 6, 2))
+    p, e = TRUTH.logarithms + 0.2 * rng.normal(size=(k, 13)), 1e-4 * rng.normal(size=(k, 6, 2))
     starts = np.array([0, len(one.inertia)])
     x, share = simulated(starts, one.drive, one.inertia, bases_of(WHEELS, p, True, e), STEP, k)
     for i in range(k):

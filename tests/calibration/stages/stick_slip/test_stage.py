@@ -19,7 +19,7 @@ from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved
 DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
 RECORDED = rigid_robot.Truth(marker_sigma=1e-5, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))
 ROBOT, PLATE = (Clock(i, 0.0, 0.0, np.zeros((2, 2)), 0.0, 1e-4) for i in ("robot", "plate"))
-STUCK = SlipParameters(5e3, 9e3, 12e3, 20e3, 9.0, 9.0, 9.0, 100.0, 80.0, 1.0, 0.1, 1.0)
+STUCK = SlipParameters(5e3, 9e3, 12e3, 20e3, 9.0, 9.0, 9.0, 100.0, 80.0, 1.0, 0.1, 1.0, 1.0)
 
 
 def stiffness():
@@ -67,7 +67,7 @@ def fit(trials, suspension, robot=ROBOT, plate=PLATE, description=DESCRIPTION):
 def test_without_joints_the_plate_alone_moves_the_base(recorded, suspension):
     model, said = fit([r[0] for r in recorded[:3]], suspension, robot=None)
     assert [d.source for d in model.directions] == ["plate"] and said[0].verdict == "ok"
-    assert "yaw 0.9" in said[0].message
+    assert model.directions[0].held_out.r2[2] > 0.9
     new, x, t = recorded[3]
     lab = laboratory(mjcf.urdf(), DESCRIPTION, None, PLATE)
     found = slipping_base_poses(model, lab, new, "plate")
@@ -134,7 +134,7 @@ def test_what_is_missing_is_named(recorded, suspension):
 def test_trials_that_contradict_the_wheels_are_named(recorded, suspension):
     """Forces along the floor and the moment about the vertical have the wrong sign: they correct nothing."""
     signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, -1.0])
-    trials = [replace(r[0], plate_wrench=signs * r[0].plate_wrench) for r in recorded[:2]]
+    trials = [replace(r[0], plate_wrench=signs * r[0].plate_wrench) for r in recorded[:3]]
     model, said = fit(trials, suspension)
     assert [d.source for d in model.directions] == ["plate", "dynamics"]
     assert said[0].verdict == "warning" and "plate's axes" in said[0].message

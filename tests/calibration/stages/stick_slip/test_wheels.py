@@ -9,15 +9,16 @@ from tests.doubles.moving_base import WHEELS as DECLARED
 def test_parameters_are_their_logarithms():
     assert SlipParameters.of(TRUTH.logarithms) == SlipParameters.of(SlipParameters.of(TRUTH.logarithms).logarithms)
     np.testing.assert_allclose(SlipParameters.of(PRIOR).logarithms, PRIOR)
-    assert len(NAMES) == len(PRIOR) == 12
+    assert len(NAMES) == len(PRIOR) == 13
 
 
 def test_the_wheels_bear_the_weight_where_it_is():
-    n, G = WHEELS.loads(1.1)
+    n, G = WHEELS.loads(1.1, 0.9)
     N = n + G @ WEIGHT
     np.testing.assert_allclose([N.sum(), N @ POSITION[:, 0], N @ POSITION[:, 1]], WEIGHT)
-    lighter = np.subtract(*(WHEELS.loads(share)[0] + WHEELS.loads(share)[1] @ WEIGHT for share in (1.2, 1.0)))
-    assert np.all(lighter[:2] > 0.0) and np.all(lighter[2:] < 0.0)
+    equal, drives, backs = (n + G @ WEIGHT for n, G in (WHEELS.loads(*s) for s in ((1.0, 1.0), (1.2, 1.0), (1.0, 1.2))))
+    assert np.all(drives[:2] > equal[:2]) and np.all(drives[2:] < equal[2:])
+    assert np.all(backs[4:] > equal[4:]) and np.all(backs[:2] < equal[:2])
 
 
 def test_stiffness_is_the_sum_over_wheels():
@@ -47,7 +48,7 @@ def test_a_wheel_weighs_what_the_nominal_robot_says():
 
 
 def test_wheels_that_would_pull_lift_off_and_the_others_bear_the_load():
-    n, G = WHEELS.loads(1.0)
+    n, G = WHEELS.loads(1.0, 1.0)
     light, tipped = np.array([730.0, 20.0, 3.0]), np.array([730.0, 75.0, 20.0])
     wrenches = np.zeros((2, 6))
     wrenches[:, (2, 4, 3)] = np.array([light, tipped]) * [-1.0, 1.0, -1.0]
