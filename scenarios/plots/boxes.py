@@ -85,5 +85,4 @@ def _boxes(samples: Sequence[Sample], ax: Axes) -> None:
     inside = [s.colour if s.hollow else "white" for s in samples]
     ax.vlines(median, y - half, y + half, colors=inside, linewidth=1.6, zorder=3)
     rms = [float(np.sqrt((s.values**2).mean())) for s in samples]
-    dot = {"color": "black", "markersize": 3.2, "markeredgecolor": "white", "markeredgewidth": 0.6}
-    ax.plot(rms, y, "o", **dot, zorder=4)
+    ax.plot(rms, y, "o", color="black", markersize=3.2, markeredgecolor="white", markeredgewidth=0.6, zorder=4)
