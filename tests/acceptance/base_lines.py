@@ -89,7 +89,7 @@ def _wheels(scores: Sequence[dict]) -> Iterator[Line]:
     rows = [p for s in scores for p in _slip_parameters(s) if p["name"] in (*TYPES.values(), *OTHERS)]
     inside = [abs(p["estimate"] - p["truth"]) <= 1.96 * p["sigma"] for p in rows if p["status"] == "estimated"]
     if inside:  # 97 at most is of 200 robots and more
-        yield Line(f"95 % intervals of {len(inside)} wheel parameters", _share(inside), least=0.93)
+        yield Line("95 % intervals of wheel parameters", _share(inside), least=0.93)
 
 
 def _trials(score: dict, source: str, kind: str) -> list[dict]:
