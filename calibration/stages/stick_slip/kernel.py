@@ -142,12 +142,12 @@ def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         s[(_D + 1) * LANES + l] = h * s[(_V + 1) * LANES + l] + s[(_DX + 1) * LANES + l]
         s[(_D + 2) * LANES + l] = h * s[(_V + 2) * LANES + l] + s[(_DX + 2) * LANES + l]
         moved = 1.0 if s[(_BODY + 2) * LANES + l] > 0.0 else 0.0
-        ax = my + my0 * a0 + my1 * a1 + my2 * a2 - moved * z * s[_X * LANES + l]
-        ay = mx + mx0 * a0 + mx1 * a1 + mx2 * a2 - moved * z * s[(_X + 1) * LANES + l]
+        pitching = my + my0 * a0 + my1 * a1 + my2 * a2 - moved * z * s[_X * LANES + l]
+        rolling = mx + mx0 * a0 + mx1 * a1 + mx2 * a2 - moved * z * s[(_X + 1) * LANES + l]
         yaw = moved * s[(_X + 2) * LANES + l]
         s[(_D + 3) * LANES + l] = z + z0 * a0 + z1 * a1 + z2 * a2
-        s[(_D + 4) * LANES + l] = ax + yaw * ay
-        s[(_D + 5) * LANES + l] = ay - yaw * ax
+        s[(_D + 4) * LANES + l] = pitching + yaw * rolling
+        s[(_D + 5) * LANES + l] = rolling - yaw * pitching
         s[_F * LANES + l] = s[_BODY * LANES + l] * s[_V * LANES + l]
         s[(_F + 1) * LANES + l] = s[_BODY * LANES + l] * s[(_V + 1) * LANES + l]
         s[(_F + 2) * LANES + l] = s[(_BODY + 1) * LANES + l] * s[(_V + 2) * LANES + l]
