@@ -70,7 +70,7 @@ def with_postures(
     found, passing = [mean_postures(description, m) for m in means], None
     if robot is not None:
         if any(len(trial.dwell_start) for trial in data.trials) or not found:
-            found.append(static_postures(description, data.trials, robot))
+            found.append(static_postures(description, data.trials, robot, data.lab.chain.poses))
         swings = [trial for entry, trial in pairs if entry.kind == "swing"]
         passing = passing_postures(description, swings, robot, _SPACING) if swings else None
     return replace(data, postures=reduce(Postures.joined, found) if found else None, passing=passing)

@@ -10,15 +10,24 @@ correlated in time, and motion that has not died out.
 """
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from calibration.errors import NotEnoughData
-from calibration.mocap.cluster_pose import BodyPoses, point_of_means, poses_as_seen, poses_of_means, still_poses
+from calibration.mocap.cluster_pose import (
+    BodyPoses,
+    body_poses,
+    point_of_means,
+    poses_as_seen,
+    poses_of_means,
+    shown_shape,
+    still_poses,
+)
 from calibration.mocap.dwells import inner_windows
 from calibration.mocap.measured_trial import MeasuredTrial, hand_covariance
+from calibration.mocap.partly_seen import Markers, completed
 from calibration.numerics.lie import compose, inverse, skew, to_vector
 from calibration.numerics.signals import GAP, interpolate_columns
 from calibration.recording.clock import Clock
@@ -26,6 +35,7 @@ from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import REST, Trial
 
+Nominal = Callable[[np.ndarray], np.ndarray]
 BLOCKS = 4
 _SEEN = 0.2  # share of a dwell in which a marker must be seen
 _log = logging.getLogger(__name__)
@@ -85,13 +95,18 @@ def dwell_windows(trial: Trial) -> np.ndarray:
     return inner_windows(np.stack([trial.dwell_start, trial.dwell_stop], axis=1))
 
 
-def static_postures(description: Description, trials: Iterable[Trial], robot: Clock) -> Postures:
+def static_postures(
+    description: Description, trials: Iterable[Trial], robot: Clock, nominal: Nominal | None = None
+) -> Postures:
     """Postures of all dwells of these trials.
+
+    nominal: Where the robot has its tool by its drawing, (n, 4, 4) at readings (n, n_measured) [rad, m]. With it a
+    dwell that shows two markers of base or hand counts in what they determine, see `mocap.partly_seen`.
 
     Raises:
         NotEnoughData: There is none with both clusters visible.
     """
-    found = [p for trial in trials for p in _of_trial(description, trial, robot)]
+    found = [p for trial in trials for p in _of_trial(description, trial, robot, nominal)]
     if not found:
         raise NotEnoughData("no static calibration posture shows base and hand; record a static trial with dwells")
     q, T, quarters, unit, misfit, label = (np.array(x) for x in zip(*found, strict=True))
@@ -163,7 +178,9 @@ def readings_at(trial: Trial, robot: Clock, t: np.ndarray, readings: np.ndarray)
     return found
 
 
-def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[tuple[np.ndarray | str, ...]]:
+def _of_trial(
+    description: Description, trial: Trial, robot: Clock, nominal: Nominal | None
+) -> Iterator[tuple[np.ndarray | str, ...]]:
     t_robot = robot.to_mocap(trial.t_robot)
     dwells = []
     for k, (start, stop) in enumerate(dwell_windows(trial)):
@@ -177,6 +194,9 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
         return
     groups = [part for _, _, seen in dwells for part in (seen, *np.array_split(seen, BLOCKS))]
     base, hand = (mean_poses(body, trial, groups) for body in (description.base_body, description.hand_body))
+    if nominal is not None:
+        q = np.array([trial.q_motor[rows].mean(axis=0) for _, rows, _ in dwells])
+        base, hand = _partly_seen(description, trial, groups, nominal(q), (base, hand))
     found = inverse(base.T) @ hand.T
     for i, (k, rows, seen) in zip(range(0, len(groups), BLOCKS + 1), dwells, strict=True):
         T = found[i : i + BLOCKS + 1]
@@ -195,21 +215,63 @@ def _of_trial(description: Description, trial: Trial, robot: Clock) -> Iterator[
         )
 
 
+def _partly_seen(
+    description: Description,
+    trial: Trial,
+    groups: list[np.ndarray],
+    tool: np.ndarray,
+    poses: tuple[BodyPoses, BodyPoses],
+) -> tuple[BodyPoses, BodyPoses]:
+    """Poses of base and hand, with those of dwells, the first of each `BLOCKS` + 1 groups, that show two markers."""
+    dwells = slice(None, None, BLOCKS + 1)
+    if all(np.isfinite(one.T[dwells]).all() for one in poses):
+        return poses
+    bodies = []
+    for body, one in zip((description.base_body, description.hand_body), poses, strict=True):
+        xyz, means, p = _mean_markers(body, trial, groups[dwells])
+        of_dwells = BodyPoses(one.T[dwells], one.residual[dwells], one.covariance[dwells])
+        bodies.append(Markers(shown_shape(xyz, p), means, of_dwells))
+    samples = float(np.mean([len(rows) for rows in groups[dwells]]))
+    filled = []
+    for one, more in zip(poses, completed(*bodies, tool, description.sigmas.marker**2 / samples), strict=True):
+        filled.append(BodyPoses(one.T.copy(), one.residual.copy(), np.array(one.covariance)))
+        filled[-1].T[dwells], filled[-1].residual[dwells] = more.T, more.residual
+        filled[-1].covariance[dwells] = more.covariance
+    return filled[0], filled[1]
+
+
 def mean_poses(body: Body, trial: Trial, groups: list[np.ndarray]) -> BodyPoses:
     """Poses of a body from its markers averaged over each group of samples."""
-    if not body.markers:
-        return still_poses(len(groups))
+    return poses_as_seen(*_mean_markers(body, trial, groups)) if body.markers else still_poses(len(groups))
+
+
+def _mean_markers(body: Body, trial: Trial, groups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Markers drawn (m, 3) [m, body], their means over groups (n, m, 3) and all samples (k, m, 3) [m, lab]."""
     names = [m.name for m in body.markers if m.name in trial.marker]
-    xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker])
-    if len(names) < 3:
+    xyz = np.array([m.xyz for m in body.markers if m.name in trial.marker]).reshape(-1, 3)
+    if body.markers and len(names) < 3:
         raise NotEnoughData(f"{trial.id}: body {body.name!r} needs 3 markers, {names} are recorded")
     p = trial.marker_position[:, [trial.marker.index(name) for name in names]]
     seen = np.isfinite(p).all(axis=2)
+    shape = xyz if seen.all() else shown_shape(xyz, p)
     means = np.full((len(groups), *xyz.shape), np.nan)
     for k, rows in enumerate(groups):
         often = seen[rows].sum(axis=0) > _SEEN * len(rows)
-        means[k, often] = np.nanmean(p[rows][:, often], axis=0)
-    return poses_as_seen(xyz, means, p)
+        means[k, often] = np.nanmean(_of_whole_frames(shape, p[rows])[:, often], axis=0)
+    return xyz, means, p
+
+
+def _of_whole_frames(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Markers (n, m, 3) [m, lab] of a body, hidden ones where those seen with them have it; p where few frames do.
+
+    A body that still settles would be bent by means of its markers over different times.
+    """
+    if np.isfinite(p).all():
+        return p
+    found = body_poses(xyz, p)
+    fitted = (found.T[:, :3, :3] @ xyz.T + found.T[:, :3, 3:]).swapaxes(1, 2)
+    whole = np.isfinite(fitted).all(axis=(1, 2))
+    return np.where(np.isfinite(p), p, fitted)[whole] if whole.mean() > _SEEN else p
 
 
 def inflation(quarters: np.ndarray, unit: np.ndarray) -> float:

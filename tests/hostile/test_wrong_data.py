@@ -1,15 +1,11 @@
 """Mistakes of a laboratory are named, good data are kept."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from calibration import load
 from calibration.checks import judged
 from calibration.mocap import relabelled_trials
-from calibration.mocap.postures import static_postures
-from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from tests.hostile import random_cases, tried_mistakes
 from tests.hostile.campaign import hidden, scaled
@@ -61,20 +57,14 @@ def test_a_mistake_is_named_or_costs_little(twin, mistake, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 2])
-def test_hidden_markers_cost_no_more_than_the_postures_they_hide(twin, seed, tmp_path):
-    good, campaign, _ = twin
-    dataset = load(hidden(0.2, 2.0, seed)(campaign).written(tmp_path / "hidden"))
-    estimate = calibrated(dataset)
-    trials = [trial for _, trial in relabelled_trials(dataset, "calibration")]
-    label = static_postures(dataset.description, trials, estimate.clock("robot")).label
-    left = np.array([int(name.split()[-1]) for name in label])
-
-    def shortened(t: Trial, _: str) -> Trial:
-        return replace(t, dwell_start=t.dwell_start[left], dwell_stop=t.dwell_stop[left], approach=t.approach[left])
-
-    same = load(campaign.changed("calibration", shortened).written(tmp_path / "same"))
-    assert len(left) < 20 and error_of(estimate, good) < 1.1 * error_of(calibrated(same), good)
+def test_hidden_markers_cost_no_posture_and_hardly_any_error(twin, tmp_path):
+    good, campaign, (clean, _) = twin
+    ratios = []
+    for seed in range(5):
+        estimate = calibrated(load(hidden(0.2, 2.0, seed)(campaign).written(tmp_path / str(seed))))
+        assert any(v.message.startswith("marker frames from 20 postures") for v in estimate.verdicts)
+        ratios.append(error_of(estimate, good) / clean)
+    assert np.mean(ratios) < 1.05 and max(ratios) < 1.2
 
 
 @pytest.mark.slow

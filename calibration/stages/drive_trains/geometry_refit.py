@@ -220,7 +220,7 @@ def _postures(  # noqa: PLR0913  the parts of one line
     """Static postures, then those passed; at_rest (n_joints,) widens the static ones [rad]."""
     for k, one in enumerate(corrected):
         if len(one.trial.dwell_start):
-            found = static_postures(description, [one.trial], robot)
+            found = static_postures(description, [one.trial], robot, hand.chain.poses)
             yield _widened(one, found, robot, hand, bending, at_rest)
         elif np.ptp(one.loads.q, axis=0).max() > _MOVES:
             found = passing_postures(description, [one.trial], robot, _SPACING)
