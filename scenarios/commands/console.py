@@ -126,13 +126,14 @@ def summary(run: Path) -> list[str]:
     )
     worst = [f"{n.level}, {n.stage}: {n.message}" for n in found.notices] or ["none"]
     more = f" ({len(worst) - 1} more in the report)" if len(worst) > 1 else ""
-    following = [step.text for step in found.next_steps] or ["nothing more from these recordings"]
+    steps = (f"-{s.gain:.2f} mm: {s.text}" if s.gain else s.text for s in found.next_steps)
+    following, budget = "; ".join(steps) or "nothing more from these recordings", view.results.evaluation.budget
     lines = (
         f"{found.badge.capitalize()}. {found.sentence}",
         f"RMSE per component [mm], of orientation [deg]: {'; '.join(figures)}",
-        *([budget.sentence] if (budget := view.results.evaluation.budget) else []),
+        *([budget.sentence.partition("; next:")[0].rstrip(".") + "."] if budget else []),
         f"Worst finding: {worst[0]}{more}",
-        f"Next: {following[0]}",
+        f"Next: {following}",
         f"Report: {run / 'report.html'}",
     )
     return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]

@@ -18,7 +18,7 @@ from calibration.untrusted import read_json
 from scenarios.datasets import datasheet
 from scenarios.datasets.index import Row, write_index, write_whole
 from scenarios.datasets.run_one import PARTIAL, perform
-from scenarios.datasets.run_spec import Order, Produce, digest_of
+from scenarios.datasets.run_spec import Order, Produce, digest_of, run_name
 from scenarios.datasets.workers import Done, NoRoom, Task, Workers, compute
 from scenarios.files import output_folder as folder
 from scenarios.files.errors import ScenarioError
@@ -93,19 +93,21 @@ def collect(
 def _reported(
     done: Iterator[Done], plan: Plan, workers: Workers, progress: Progress, announce: Callable[[str], None]
 ) -> Iterator[Row]:
-    """Pass the rows on; say from the first one what the others will cost, then the rate and the time that is left."""
+    """Pass the rows on; state from the first new one what the others will cost, then the rate and the time left."""
     progress("timing the first run", 0.0)
-    start, width = time.monotonic(), max(1, workers.number)
+    there = {path.name for path in (plan.folder / "runs").iterdir()}  # checked, not made: they say nothing of the time
+    start, width, made = time.monotonic(), max(1, workers.number), 0
     for k, one in enumerate(done, 1):
         yield one.row
-        left = plan.n - k
-        if k == 1:
+        left, is_new = plan.n - k, run_name(one.row.id) not in there
+        made += is_new
+        if made == 1 and is_new:
             _check_room(plan.folder, one.row.bytes * left)
             size = f"{_bytes(one.row.bytes * plan.n)} in all, {_hours(one.seconds * left / width)}"
             announce(f"{size} left with {width} worker{'s' if width > 1 else ''}")
             start = time.monotonic()
-        else:
-            rate = (k - 1) / (time.monotonic() - start)
+        elif made:
+            rate = max(made - 1, 1) / (time.monotonic() - start)
             progress(f"{k} of {plan.n} runs, {rate:.2g} a second, {_hours(left / rate)} left", k / plan.n)
 
 

@@ -48,7 +48,7 @@ class Workers:
     """Who computes.
 
     Attributes:
-        number: Processes of our own; 0: in this one.
+        number: Worker processes; 0: this one.
         scheduler: Address of a running scheduler, `tcp://host:port`; None: our own.
     """
 

@@ -1,7 +1,7 @@
 """What trying the program found, and the row or test that shows it mended: `findings.csv`, checked against both.
 
-A finding's letters and numbers are its trial's: A to E by part, u units, a axes, o order, n names, c clocks, d and e
-data, f hand-overs.
+A finding's letters and numbers are its trial's: `use` and a section of friendly use, A to E by part, u units, a axes,
+o order, n names, c clocks, d and e data, f hand-overs.
 """
 
 import csv

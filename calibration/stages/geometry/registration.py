@@ -3,7 +3,7 @@
     minimise  sum_i mean_m |p_m + phi_i x c_m|^2 / tolerance^2                                      12 parameters
               (p_m, phi_i) = log6(T_measured_i^-1 T_base_B^-1 T_base_tool(q_i) T_tool_H),   c_m markers in H
 
-The honest baseline, plain least squares of the hand's markers: what is left after it is geometry, zeros, backlash and
+The baseline, plain least squares of the hand's markers: what is left after it is geometry, zeros, backlash and
 the base. Those errors are millimetres where the markers' noise is a tenth of one, so all markers weigh alike, and
 postures passed through in swings count beside the static ones: a baseline must not hang on where the statics lie.
 A posture much farther from the others' fit than they are, `_OUTLIER` times their median squared distance, is excluded

@@ -77,7 +77,7 @@ def compliance_springs(description: Description, responses: Sequence[BaseRespons
 
 
 def not_positive(springs: Springs) -> str:
-    """Why a fit, or one without a trial, is at its bounds or cannot be run forward at all; empty where it can."""
+    """Why a fit, or one without a trial, is at its bounds or cannot be integrated at all; empty where it can."""
     if springs.bound:
         return f"at its bound, {springs.bound} would be negative"
     scale = np.outer(*[np.array([1.0] * 3 + [1.0 / _LEVER] * 3)] * 2)
@@ -96,10 +96,10 @@ def refusal(springs: Springs, tried: HeldOut, reduced: HeldOut) -> str:
         return f"it drifts, its slowest mode takes {settling:.1f} s to settle"
     worse = _axes((tried.r2 < 0.0) & ~np.isnan(tried.explained))
     if worse:
-        return f"run forward it is worse than a base at rest along {worse}"
+        return f"integrated in time it predicts worse than a base at rest along {worse}"
     worse = _axes((tried.r2 < reduced.r2 - _WORSE) & ~np.isnan(tried.explained))
     if worse:
-        return f"run forward it is worse than the compliance along {worse}"
+        return f"integrated in time it predicts worse than the compliance along {worse}"
     return ""
 
 

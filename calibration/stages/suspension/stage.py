@@ -1,7 +1,7 @@
 """Stage `suspension`: the base's springs from the base markers and the wrench on the floor, calibration trials alone.
 
     1  wrong data are named (checks.plates)
-    2  the printed form, displacement -> wrench; refused unless K > 0, C >= 0, it settles, and, run forward on trials it
+    2  the printed form, displacement -> wrench; refused unless K > 0, C >= 0, it settles, and, integrated on trials it
        was not fitted to, it is on no axis worse than a base that stays nor, by 2 % of the motion, than
     3  the reduced 6x6 compliance, fitted wrench -> displacement, which then takes its place
     4  each axis is predicted or taken at rest, by leave-one-trial-out, for each source of the wrench
@@ -148,8 +148,8 @@ def _chosen(
             STAGE, "ok", f"printed form with r_i the wheels' {point} points, displacement to wrench"
         )
     message = (
-        f"printed form (r_i the wheels' {point} points, displacement to wrench) refused: {why}; the 6x6 compliance "
-        "fitted wrench to displacement takes its place"
+        f"the paper's form (springs at the wheels' {point} points) rejected: {why}; a 6x6 compliance fitted to the "
+        "wrench is used instead"
     )
     return reduced, Verdict(STAGE, "warning", message)
 

@@ -153,7 +153,7 @@ def _worth(steps: Sequence[Step], best: Step | None, shares: Sequence[Share]) ->
             whole = best.main.position_rmse_component_mm
             left = (whole**2 - share.size**2) ** 0.5
             advice = _ADVICE["base" if share.cause == _BASE else "arm"]
-            yield NextStep(f"at most: {advice} ({error(left)}{_NBSP}mm would be left)", whole - left)
+            yield NextStep(f"{advice} (at best {error(left)}{_NBSP}mm would be left)", whole - left)
 
 
 def _gains(steps: Sequence[Step], best: Step) -> Iterator[NextStep]:

@@ -98,7 +98,12 @@ def test_a_run_ends_in_six_lines(tmp_path):
     write_score(tmp_path)
     write_estimate(tmp_path / "estimate", Verdict("geometry", "warning", "arm_3 never moved"))
     evaluation = json.loads((tmp_path / "evaluation.json").read_text())
-    evaluation["budget"] = {"whole_mm": 3.0, "shares": [], "next_steps": [], "sentence": "Of the 3.00 mm: joints 3.00."}
+    evaluation["budget"] = {
+        "whole_mm": 3.0,
+        "shares": [],
+        "next_steps": [],
+        "sentence": "Of the 3.00 mm: joints 3.00; next: x.",
+    }
     (tmp_path / "evaluation.json").write_text(json.dumps(evaluation))
     lines = console.summary(tmp_path)
     assert len(lines) == 6

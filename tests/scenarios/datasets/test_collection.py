@@ -129,6 +129,15 @@ def test_what_is_right_stays_and_what_is_not_is_made_again(tmp_path):
     assert not list(runs.glob(".*"))
 
 
+def test_the_first_run_that_is_made_says_how_long_the_others_take(tmp_path):
+    made(tmp_path / "c", 3)
+    said, at = [], []
+    plan = Plan(load("humanoids2024"), 6, tmp_path / "c", numbers)
+    collect(plan, Workers(), lambda text, share: at.append(text), announce=said.append)
+    assert len(said) == 1 and said[0].endswith("left with 1 worker")
+    assert [text.split(",")[0] for text in at] == ["timing the first run", "5 of 6 runs", "6 of 6 runs"]
+
+
 def test_a_collection_can_grow_but_not_shrink_or_change(tmp_path):
     made(tmp_path / "c", 3)
     made(tmp_path / "c", 5)
