@@ -111,5 +111,5 @@ def test_a_run_ends_in_six_lines(tmp_path):
     assert re.match(r"RMSE per component .*\[deg\]: nominal [\d.]+, [\d.]+; .*model_2 [\d.]+, [\d.]+", lines[1])
     assert lines[2] == "Of the 3.00 mm: joints 3.00."
     assert lines[3] == "Worst finding: warning, geometry: arm_3 never moved"
-    assert lines[4].startswith("Next: measure the base")
+    assert re.match(r"Next: -[\d.]+ mm: measure the base", lines[4])
     assert lines[5] == f"Report: {tmp_path / 'report.html'}"
