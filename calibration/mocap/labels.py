@@ -212,6 +212,8 @@ def without_jumps(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 def _completed(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Markers (n, m, 3) with the hidden ones where the body's pose puts them; hidden where it has none."""
+    if np.isfinite(p).all():
+        return p
     T = body_poses(xyz, p).T
     return np.where(np.isfinite(p), p, np.einsum("nij,mj->nmi", T[:, :3, :3], xyz) + T[:, None, :3, 3])
 

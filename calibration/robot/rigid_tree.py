@@ -149,7 +149,8 @@ def _dot(x: np.ndarray, i: int, y: np.ndarray, j: int) -> float:
 def _place(tree: RigidTree, j: int, angle: float, up: np.ndarray, me: np.ndarray) -> None:
     """Orientation, origin and unit twist of joint j at an angle, from the body `up` that carries it."""
     fixed, axis, w = tree.fixed[j], tree.axis[j], np.empty(3)
-    me[:_V] = 0.0
+    for i in range(_V):
+        me[i] = 0.0
     for i in range(3):
         for c in range(3):
             for r in range(3):
@@ -175,7 +176,8 @@ def _place(tree: RigidTree, j: int, angle: float, up: np.ndarray, me: np.ndarray
 @njit(cache=True, error_model="numpy")
 def _move(me: np.ndarray, up: np.ndarray, v: float, a: float) -> None:
     """Twist and acceleration of a body from those of the one that carries it."""
-    me[_X:_I] = 0.0
+    for i in range(6):
+        me[_X + i] = 0.0
     _cross(up, _V + 3, me, _S, me, _X)
     _cross(up, _V, me, _S + 3, me, _X)
     _cross(up, _V + 3, me, _S + 3, me, _X + 3)
@@ -189,21 +191,23 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
     """Inertia of body b about the root's origin, and the wrench that moves it."""
     m, inertia, h = tree.mass[b], tree.inertia[b], np.zeros(3)
     _turned(me, tree.moment[b], h, _R)
-    p, I, square = me[_P:_S], me[_I:_ROW].reshape(6, 6), 0.0
-    me[_I:_ROW] = 0.0
+    square, at = 0.0, _I + 21  # of the angular part
+    for i in range(36):
+        me[_I + i] = 0.0
     for i in range(3):
-        square += p[i] * (2.0 * h[i] + m * p[i])
-        I[i, i] = m
+        p = me[_P + i]
+        square += p * (2.0 * h[i] + m * p)
+        me[_I + 7 * i] = m
         for c in range(3):
             for r in range(3):
                 for s in range(3):
-                    I[3 + i, 3 + c] += me[3 * i + r] * inertia[r, s] * me[3 * c + s]
-            I[3 + i, 3 + c] -= h[i] * p[c] + p[i] * h[c] + m * p[i] * p[c]
+                    me[at + 6 * i + c] += me[3 * i + r] * inertia[r, s] * me[3 * c + s]
+            me[at + 6 * i + c] -= h[i] * me[_P + c] + p * h[c] + m * p * me[_P + c]
     for i in range(3):
-        I[3 + i, 3 + i] += square
-        j, k, first = (i + 1) % 3, (i + 2) % 3, h[i] + m * p[i]
-        I[3 + k, j] = I[j, 3 + k] = first
-        I[3 + j, k] = I[k, 3 + j] = -first
+        me[at + 7 * i] += square
+        j, k, first = (i + 1) % 3, (i + 2) % 3, h[i] + m * me[_P + i]
+        me[at - 3 + 6 * k + j] = me[at - 18 + 6 * j + k] = first
+        me[at - 3 + 6 * j + k] = me[at - 18 + 6 * k + j] = -first
     _times(me, _A, me, _F)
     _times(me, _V, me, _X)
     _cross(me, _V + 3, me, _X, me, _F)
@@ -214,11 +218,13 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
 @njit(cache=True, error_model="numpy")
 def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
     """Wrenches (4, 6) about the root's origin by unit mass and first moments of a body that moves: a(r) = a + B r."""
-    B, axis, w, square = np.zeros((3, 3)), np.empty(3), me[_V + 3 : _A], 0.0
+    B, axis, w, square = np.zeros((3, 3)), np.empty(3), np.empty(3), 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
+        w[i] = me[_V + 3 + i]
         square += w[i] ** 2
-        out[:, i] = out[:, 3 + i] = 0.0
+        for c in range(4):
+            out[c, i] = out[c, 3 + i] = 0.0
         B[k, j], B[j, k] = me[_A + 3 + i], -me[_A + 3 + i]
     for i in range(3):
         B[i, i] -= square
@@ -254,6 +260,17 @@ def _regress(tree: RigidTree, work: np.ndarray, out: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def _relieve(me: np.ndarray, root: np.ndarray) -> None:
+    """Take what pushes a body, root[12:18], off the wrench that moves it."""
+    push = np.zeros(6)
+    _turned(me, root[12:15], push, _R)
+    _turned(me, root[15:], push, _R + 3)
+    _cross(me, _P, push, _R, push, _R + 3)
+    for c in range(6):
+        me[_F + c] -= push[c]
+
+
+@njit(cache=True, error_model="numpy")
 def sample(
     tree: RigidTree, q: np.ndarray, v: np.ndarray, a: np.ndarray, root: np.ndarray, work: np.ndarray, out: TreeDynamics
 ) -> None:  # fmt: skip
@@ -261,7 +278,8 @@ def sample(
     k = len(tree.parent)
     work[0, 0] = work[0, 4] = work[0, 8] = 1.0
     for i in range(len(q)):
-        work[0, _V:_F] = root[min(i, len(root) - 1), :12]
+        for c in range(12):
+            work[0, _V + c] = root[min(i, len(root) - 1), c]
         for b in range(k + 1):
             if b > 0:
                 me, up, column = work[b], work[tree.parent[b - 1]], tree.column[b - 1]
@@ -269,11 +287,7 @@ def sample(
                 _move(me, up, v[i, column], a[i, column])
             _weigh(tree, b, work[b])
         if root.shape[1] > 12:
-            push = np.zeros(6)
-            _turned(work[k], root[i, 12:15], push, _R)
-            _turned(work[k], root[i, 15:], push, _R + 3)
-            _cross(work[k], _P, push, _R, push, _R + 3)
-            work[k, _F:_X] -= push
+            _relieve(work[k], root[i])
         if out.regressor.shape[2]:
             _regress(tree, work, out.regressor[i])
         for j in range(k - 1, -1, -1):
@@ -281,8 +295,10 @@ def sample(
             out.torque[i, column] = _dot(me, _S, me, _F)
             _times(me, _S, me, _X)
             out.inertia[i, column] = _dot(me, _S, me, _X)
-            out.coupling[i, column] = me[_X : _X + 3]
-            up[_F:] += me[_F:]  # the twist between is scratch
+            for c in range(3):
+                out.coupling[i, column, c] = me[_X + c]
+            for c in range(_F, _ROW):  # the twist between is scratch
+                up[c] += me[c]
         _borne(work, out, i)
 
 
@@ -291,9 +307,10 @@ def _borne(work: np.ndarray, out: TreeDynamics, i: int) -> None:
     """What the root and the first joint bear."""
     first, bears = work[min(1, len(work) - 1)], np.zeros(3)
     _cross(first, _F, first, _P, bears, _R)
-    out.root[i] = work[0, _F:_X]
     for r in range(6):
-        out.composite[i, r] = work[0, _I + 6 * r : _I + 6 * r + 6]
+        out.root[i, r] = work[0, _F + r]
+        for c in range(6):
+            out.composite[i, r, c] = work[0, _I + 6 * r + c]
     for c in range(2):
         out.moment[i, c] = 0.0
         for r in range(3):

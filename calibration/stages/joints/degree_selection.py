@@ -3,16 +3,17 @@
     score = sum_trials |y_t - model fitted to the other trials (x_t)|^2 / sum_trials |y_t|^2
 
 Each left-out trial is asked inside the others' domain, rho is theirs too. One QR per trial and rho serves all folds
-and degrees: R_t' R_t = [M_t, y_t]' [M_t, y_t], and the lower degrees are columns of the highest one. A degree whose
-coefficients the trials do not all fix is no candidate: a joint that never moves shows both flanks at once, and neither.
-The choice "none" scores 1 and stays unless a degree does clearly better.
+and degrees: R_t' R_t = [M_t, y_t]' [M_t, y_t], the lower degrees are columns of the highest one, and a fold joins the R
+of all trials before its own with that of all behind. A degree whose coefficients the trials do not all fix is no
+candidate: a joint that never moves shows both flanks at once, and neither. The choice "none" scores 1 and stays unless
+a degree does clearly better.
 
 The printed model of one joint from its samples, its degree chosen: A, B and rho with their covariance.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -58,7 +59,12 @@ def candidates(samples: Sequence[Samples], terms: Terms, highest: int = HIGHEST)
     factors = [[_factor(basis, s, rho) for rho in rho_grid()] for s in samples]
     new = (d for d, powers in enumerate(sets) if powers and (d == 0 or powers != sets[d - 1]))
     degrees = [d for d in new if _is_fixed(basis, sets[d], factors)]
-    folds = [_left_out(basis, [sets[d] for d in degrees], samples, factors, k) for k in range(len(samples))]
+    order = list(dict.fromkeys(c for d in degrees for c in _columns(basis, sets[d])))  # those of lower degrees first
+    by_rho = [_of_others([F[:, [*order, -1]] for F in of_rho]) for of_rho in zip(*factors, strict=True)]
+    folds = [
+        _left_out(basis, [sets[d] for d in degrees], samples, order, k, of_others)
+        for k, of_others in enumerate(zip(*by_rho, strict=True))
+    ]
     for degree, left_out in zip(degrees, zip(*folds, strict=True), strict=True):
         missed = sum(float(((s.y - p) ** 2).sum()) for s, p in zip(samples, left_out, strict=True))
         found.append(Candidate(degree, sets[degree], left_out, missed / total))
@@ -90,20 +96,34 @@ def _factor(basis: Basis, samples: Samples, rho: float) -> np.ndarray:
     return np.asarray(np.linalg.qr(np.column_stack([M, samples.y]), mode="r"))
 
 
+def _of_others(factors: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """R of all trials but one, for each, from those of every trial."""
+    before = list(accumulate(factors, _joined, initial=factors[0][:0]))
+    behind = list(accumulate(reversed(factors), _joined, initial=factors[0][:0]))[::-1]
+    return [_joined(before[k], behind[k + 1]) for k in range(len(factors))]
+
+
+def _joined(R: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """R of the QR of both."""
+    return np.asarray(np.linalg.qr(np.vstack([R, other]), mode="r"))
+
+
 def _left_out(
     basis: Basis,
     sets: Sequence[tuple[Exponent, ...]],
     samples: Sequence[Samples],
-    factors: Sequence[Sequence[np.ndarray]],
+    order: Sequence[int],
     k: int,
+    of_others: Sequence[np.ndarray],
 ) -> list[np.ndarray]:
-    """Discrepancy (n,) of trial k by the models of the others, one for each set of powers."""
+    """Discrepancy (n,) of trial k by the models of the others, one for each set of powers.
+
+    `of_others` are their R at every rho, columns of the design in `order`.
+    """
     others = [t for t in range(len(samples)) if t != k]
-    order = list(dict.fromkeys(c for powers in sets for c in _columns(basis, powers)))  # those of lower degrees first
     ends = [2 * len(powers) for powers in sets]
     best = [(np.inf, 0.0, np.zeros((0, 0)))] * len(sets)
-    for rho, of_others in zip(rho_grid(), zip(*(factors[t] for t in others), strict=True), strict=True):
-        R = np.asarray(np.linalg.qr(np.vstack(of_others)[:, [*order, -1]], mode="r"))
+    for rho, R in zip(rho_grid(), of_others, strict=True):
         best = [min(b, (_square(R, p), float(rho), R), key=lambda b: b[0]) for b, p in zip(best, ends, strict=True)]
     domain, s = box(pooled([samples[t] for t in others])), samples[k]
     whole = Problem(basis(np.clip(s.theta, *domain[0]), np.clip(s.tau, *domain[1])), s.velocity, s.y)
@@ -119,8 +139,8 @@ def _square(R: np.ndarray, p: int) -> float:
 
 
 def _solution(R: np.ndarray, p: int) -> np.ndarray:
-    """The least x of M x = y in least squares, of p columns M in [M, ..., y]."""
-    return np.asarray(np.linalg.lstsq(R[:, :p], R[:, -1], rcond=RANK)[0])
+    """The least x of M x = y in least squares, of p columns M in triangular [M, ..., y]."""
+    return np.asarray(np.linalg.lstsq(R[:p, :p], R[:p, -1], rcond=RANK)[0])
 
 
 def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:

@@ -14,10 +14,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from calibration.numerics.compiled import njit
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_force
 from calibration.stages.stick_slip.kernel import Bases, at_rest, simulated
-from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, blocks, pooled_noise
+from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, pooled_noise
 from calibration.stages.stick_slip.wheels import PRIOR, PRIOR_SIGMA, SlipParameters, WheelSet
 from calibration.stages.suspension.model import Source
 
@@ -119,12 +120,8 @@ class Trials:
 
     def error(self, x: np.ndarray) -> np.ndarray:
         """Measured minus predicted x (n, 3) by window (w, WINDOW, 3), its mean taken off; 0 where it does not count."""
-        e = self.measured - np.concatenate([blocks(x[a:b]) for a, b in self.spans])
         _, index, counts = self.windows
-        r = np.clip(np.nan_to_num(e, nan=_FAR, posinf=_FAR, neginf=-_FAR), -_FAR, _FAR)[index]
-        mask = counts[..., None]
-        mean = (r * mask).sum(axis=1, keepdims=True) / np.maximum(counts.sum(axis=1), 1)[:, None, None]
-        return np.asarray((r - mean) * mask)
+        return np.asarray(_by_window(np.ascontiguousarray(x), self.starts, self.measured, index, counts))
 
     @cached_property
     def independent(self) -> np.ndarray:
@@ -160,6 +157,40 @@ class Trials:
             A = (J[:, own] * root[own]).reshape(p, -1)
             H[k], g[k] = A @ A.T, A @ (errors[own] * root[own]).ravel()
         return H, g
+
+
+@njit(cache=True, error_model="numpy")
+def _of_blocks(x: np.ndarray, starts: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Measured (b, 3) minus the means of x (n, 3) over blocks, no larger than `_FAR`, which NaN is."""
+    e, b = np.empty(measured.shape), 0
+    for trial in range(len(starts) - 1):
+        for first in range(starts[trial], starts[trial + 1] - BLOCK + 1, BLOCK):
+            for a in range(3):
+                total = x[first, a]
+                for i in range(1, BLOCK):
+                    total += x[first + i, a]
+                off = measured[b, a] - total / BLOCK
+                e[b, a] = min(max(off, -_FAR), _FAR) if off == off else _FAR
+            b += 1
+    return e
+
+
+@njit(cache=True, error_model="numpy")
+def _by_window(
+    x: np.ndarray, starts: np.ndarray, measured: np.ndarray, index: np.ndarray, counts: np.ndarray
+) -> np.ndarray:
+    """`Trials.error`."""
+    e, out = _of_blocks(x, starts, measured), np.zeros((index.shape[0], index.shape[1], 3))
+    for w in range(len(index)):
+        for a in range(3):
+            total, count = 0.0, 0
+            for i in range(index.shape[1]):
+                if counts[w, i]:
+                    total, count = total + e[index[w, i], a], count + 1
+            for i in range(index.shape[1]):
+                if counts[w, i]:
+                    out[w, i, a] = e[index[w, i], a] - total / count
+    return out
 
 
 def body(p: SlipParameters, corrected: bool) -> np.ndarray:
