@@ -6,6 +6,9 @@ Zeros of either side may be anything; a link may be off its motor by its gear's 
     jumps of y from sample to sample, of whole turns where it wraps; q_link at its limit while q_motor moves
     q_link ~ a q_motor + b           a = -1 sign, a = 180 / pi degrees, another scale; by least squares
 
+    |int v - dq_link|^2 < 1/4 |int v - dq_motor|^2      what is in proportion to int v apart, over steps of 0.1 s in
+                                     which dq_link - dq_motor is ten sigma: v is the link's, sides are exchanged
+
 A polynomial of the angle explains such a discrepancy perfectly, so the R2 of a joint model does not show it.
 """
 
@@ -23,6 +26,8 @@ _MARGIN = 0.3  # a reading may be outside its joint's limits by this much [rad, 
 _COPIED = (
     0.01  # of an encoder's noise by which a reading may differ from its command; noise and quantisation are larger
 )
+_LAGS, _BIN = 10.0, 0.1  # sigma by which the sides move apart where they can be judged, in that time [s]
+_FOLLOWS, _TURNS = 0.25, 5  # of the squares; times in which a joint must show its lag
 _SHARE = 0.05  # of the samples that may be farther out
 _NEAR = 0.1  # of a slope, of a turn [-]
 _SCALE, _LEFT = 0.03, 0.3  # a slope is off 1 by more and leaves less of the difference, rms: no backlash is so straight
@@ -68,6 +73,33 @@ def commanded(trial: Trial, sigma: float) -> Iterator[str]:
         yield (
             f"readings of {', '.join(names)} are the commands, to {_COPIED * sigma:.1g} rad in motion: "
             "record what the encoders read, which are noisier"
+        )
+
+
+def exchanged(trial: Trial, sigma: float) -> Iterator[str]:
+    """Joints whose motor velocity is that of the link readings, which are near; sigma of an encoder [rad, m].
+
+    An encoder that reads in steps larger than ten sigma is not judged: it is off its velocity as well.
+    """
+    names = []
+    steps = np.diff(trial.t_robot)
+    width = max(1, round(_BIN / float(np.median(steps)))) if len(steps) else 1
+    for name, q, link, v in zip(trial.joint, trial.q_motor.T, trial.q_link.T, trial.v_motor.T, strict=True):
+        moved = np.stack([0.5 * (v[1:] + v[:-1]) * steps, np.diff(q), np.diff(link)])
+        moved = moved[:, : len(steps) // width * width].reshape(3, -1, width).sum(axis=2)
+        by_v, by_q, by_link = moved[:, np.isfinite(moved).all(axis=0)]
+        in_steps = np.diff(np.unique(q)).min(initial=np.inf) > _LAGS * sigma
+        if len(by_v) < _TURNS or in_steps or _range(np.cumsum(by_link - by_q)) > _APART:
+            continue
+        unit = by_v / max(float(np.linalg.norm(by_v)), np.finfo(float).tiny)
+        off_motor, off_link = (x - unit * (unit @ x) for x in (by_v - by_q, by_v - by_link))
+        rows = np.abs(off_link - off_motor) > _LAGS * sigma
+        if rows.sum() >= _TURNS and (off_link[rows] ** 2).sum() < _FOLLOWS * (off_motor[rows] ** 2).sum():
+            names.append(name)
+    if names:
+        yield (
+            f"motor and link readings of {', '.join(names)} are exchanged, or the motor's are wrong: its velocity is "
+            "that of the link readings; exchange the columns"
         )
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from calibration.checks.joint_readings import commanded, implausible_readings, missing_readings, wrong_sides
+from calibration.checks.joint_readings import commanded, exchanged, implausible_readings, missing_readings, wrong_sides
 from calibration.checks.marker_bodies import implausible_markers, not_rigid, wrong_scale
 from calibration.checks.marker_shapes import STAGE, wrong_shapes
 from calibration.checks.plates import implausible_plates, saturated
@@ -46,7 +46,8 @@ def check(file: str, trial: Trial | PostureMeans, description: Description, chai
     found += [] if found else [*not_rigid(trial, description)]
     if isinstance(trial, Trial):
         weight = mass * float(np.linalg.norm(description.gravity))
-        found += [*wrong_sides(trial), *commanded(trial, description.sigmas.encoder)]
+        sigma = description.sigmas.encoder
+        found += [*wrong_sides(trial), *commanded(trial, sigma), *exchanged(trial, sigma)]
         found += [*_clocks(trial), *implausible_plates(trial, weight)]
     if found:
         raise InputError(file, "; ".join(found))
@@ -64,7 +65,8 @@ def judged(lab: Laboratory, trials: Sequence[Trial | PostureMeans], calibrated: 
     found = [*wrong_shapes(lab, trials), *wrong_dwells(continuous), *holes(continuous)]
     for trial in continuous:
         found += [Verdict(STAGE, "warning", f"{trial.id}: {message}") for message in saturated(trial)]
-        wrong = [*commanded(trial, lab.description.sigmas.encoder)]
+        sigma = lab.description.sigmas.encoder
+        wrong = [*commanded(trial, sigma), *exchanged(trial, sigma)]
         if not calibrated:
             wrong += [*wrong_sides(trial), *implausible_plates(trial, _weight(lab))]
         found += [Verdict(STAGE, "refused", f"{trial.id}: {message}") for message in wrong]
