@@ -12,6 +12,7 @@ from dataclasses import replace
 from calibration.breakdown import Breakdowns
 from calibration.checks.changes import changes, exchanged_sides, wrong_mounts
 from calibration.checks.joint_columns import wrong_columns
+from calibration.checks.plates import by_scale
 from calibration.checks.recordings import judged, listed_twice, unused_plates
 from calibration.checks.unexplained import passed, unexplained
 from calibration.conclusion import conclusion
@@ -245,11 +246,11 @@ def _with_plans(context: Context, wanted: set[str]) -> Context:
 
 
 def _concluded(context: Context) -> Estimate:
-    """Whether the estimate may be used, and by which row; intervals include what warnings say may have moved."""
+    """Whether the estimate may be used, and by which row; intervals include what its findings say may have moved."""
     estimate = context.estimate
-    moved = [direction for v in estimate.verdicts if v.verdict == "warning" for direction in v.moves]
+    moved = [direction for v in estimate.verdicts if v.verdict != "refused" for direction in v.moves]
     if moved:
-        estimate = replace(estimate, models=tuple(widened(m, moved) for m in estimate.models))
+        estimate = replace(estimate, models=tuple(widened(m, by_scale(m, moved)) for m in estimate.models))
     names = [m.name for m in estimate.models]
     rows = (
         MAIN if _bundled(estimate) or not context.data.moving else MAIN[1:]

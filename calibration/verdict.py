@@ -15,7 +15,8 @@ class Verdict:
         stage: Name of the stage.
         verdict: `ok`; `warning`, usable with care; `missing`, data for it were not there; `refused`, must not be used.
         message: What was found and what to do.
-        moves: Of a warning, what its cause may have moved; intervals include it, see `inference.parameters.widened`.
+        moves: What its cause may have moved; intervals of an estimate that is not refused include it, see
+            `inference.parameters.widened`.
     """
 
     stage: str

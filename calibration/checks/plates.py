@@ -1,6 +1,7 @@
 """Force-plate readings that cannot be what they say, and bases that moved, named before a spring is fitted to them.
 
-samples    whole                                       weight     that of the nominal robot, by its masses' tolerances
+samples    whole
+weight     that of the nominal robot, by its masses' tolerances; what it is off within them is in the springs' intervals
 sign       at rest the robot presses down: Fz < 0 (ACTION on the plate), and each component follows the nominal
            inverse dynamics, not its mirror image
 place      its centre of pressure lies between the wheels' contact points
@@ -15,12 +16,13 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from calibration.inference.parameters import Model
 from calibration.numerics.lie import adjoint
 from calibration.numerics.signals import Signal, interpolate_columns, low_passed
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.verdict import Verdict
+from calibration.verdict import Direction, Verdict
 
 STAGE = "suspension"
 # What the `moves` of a warning say of a plate: error of its scale [-], its angle about the vertical [rad].
@@ -38,6 +40,7 @@ _ALIKE = 0.7  # share of common motion of two pairs of moments between which an 
 _STAYS, _FEW = 0.2, 100  # share of samples at the largest or least reading; samples that show one
 _FAINT = (1.0, 0.5)  # rms force [N] and moment [N.m] that say nothing of a sign
 _SHIFTED, _TWISTED = 15e-3, 0.1  # rest pose after against before: slip alone reaches 6 mm, 30 mrad [m, rad]
+_OF_BASE = ("suspension.", "slip.")  # parameters fitted to the plate's wrench
 _NAMES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
@@ -118,17 +121,16 @@ def _against_dynamics(
 
 def _weighed(lab: Laboratory, rest: np.ndarray, dynamics: Sequence[Wrenched], weight: float) -> Iterator[Verdict]:
     """A load that is not the robot's, whose nominal weight is given [N]."""
-    spread = weight_spread(lab)
-    missing = rest - np.median([f.rest for f in dynamics], axis=0)
-    off = _off_plate(lab.description, missing)
-    if abs(-rest[2] / weight - 1.0) > (min(_BORNE, _SURE * spread) if off else _SURE * spread):
-        message = (
-            f"plate scale: it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} +- "
-            f"{weight * spread:.0f} N: springs would be off by as much; see its gain, or a load nobody declared"
-        )
-        if off:
-            message += f"; what is missing is as if {off} stood off the plate"
-        yield Verdict(STAGE, "warning", message, (((SCALE, float(-rest[2] / weight - 1.0)),),))
+    spread, ratio = weight_spread(lab), float(-rest[2] / weight)
+    off = _off_plate(lab.description, rest - np.median([f.rest for f in dynamics], axis=0))
+    message = f"it carries {-rest[2]:.0f} N, the nominal robot weighs {weight:.0f} +- {weight * spread:.0f} N"
+    moves = (((SCALE, ratio - 1.0),),)
+    if abs(ratio - 1.0) <= (min(_BORNE, _SURE * spread) if off else _SURE * spread):
+        yield Verdict(STAGE, "ok", f"plate: {message}; intervals of springs include the difference", moves)
+        return
+    message = f"plate scale: {message}: springs would be off by as much; see its gain, or a load nobody declared"
+    message += f"; what is missing is as if {off} stood off the plate" if off else ""
+    yield Verdict(STAGE, "warning", message, moves)
 
 
 def _driven(lab: Laboratory, rest: np.ndarray, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Iterator[Verdict]:
@@ -174,6 +176,13 @@ def _off_plate(description: Description, missing: np.ndarray) -> str:
 
 def _misplaced(outside: float) -> str:
     return f"plate place: its centre of pressure is {1e3 * outside:.0f} mm outside the wheels; see plate_centre"
+
+
+def by_scale(model: Model, moved: Sequence[Direction]) -> tuple[Direction, ...]:
+    """Directions in which a plate's scale is that of every stiffness and damping of the base."""
+    scales = [size for direction in moved for name, size in direction if name == SCALE]
+    forces = [p for p in model.parameters if p.name.startswith(_OF_BASE) and p.unit.startswith("N")]
+    return (*moved, *(tuple((p.name, size * p.value) for p in forces) for size in scales))
 
 
 def moved_by(after: np.ndarray) -> str:

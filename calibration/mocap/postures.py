@@ -233,7 +233,8 @@ def _partly_seen(
         bodies.append(Markers(shown_shape(xyz, p), means, of_dwells))
     samples = float(np.mean([len(rows) for rows in groups[dwells]]))
     filled = []
-    for one, more in zip(poses, completed(*bodies, tool, description.sigmas.marker**2 / samples), strict=True):
+    found = completed(bodies[0], bodies[1], tool, description.sigmas.marker**2 / samples)
+    for one, more in zip(poses, found, strict=True):
         filled.append(BodyPoses(one.T.copy(), one.residual.copy(), np.array(one.covariance)))
         filled[-1].T[dwells], filled[-1].residual[dwells] = more.T, more.residual
         filled[-1].covariance[dwells] = more.covariance

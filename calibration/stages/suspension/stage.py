@@ -71,15 +71,15 @@ def fit_suspension(
 def with_springs_moved(
     found: Verdict, description: Description, responses: BaseResponses, suspension: Suspension, full: bool
 ) -> Verdict:
-    """A warning of a plate off by a scale or an angle, with what it moved the springs by.
+    """A finding of a plate off by an angle, with what it moved the springs by: fitted to its wrench turned back.
 
-    Fitted to the plate's wrench turned back they are others; a scale s makes them larger by s.
+    A scale is that of every force: `checks.plates.by_scale`.
     """
     if not found.moves:
         return found
     (((what, size),),) = found.moves
     if what == SCALE:
-        return replace(found, moves=(tuple((p.name, size * p.value) for p in suspension.parameters),))
+        return found
     back = tuple(replace(r, forcing=r.forcing.turned(-size)) for r in responses.plate)
     other = {p.name: p.value for p in _fitted(description, replace(responses, plate=back), full)[0].parameters}
     return replace(found, moves=(tuple((p.name, p.value - other.get(p.name, p.value)) for p in suspension.parameters),))
