@@ -6,7 +6,6 @@ docs/results/base.md     of each scenario that was run: the hand by the predicte
 PROSE                    sentences of other pages that state figures; a test compares them with what is kept
 """
 
-import csv
 import json
 import re
 import sys
@@ -140,7 +139,6 @@ def prose() -> Iterator[tuple[Path, str, str]]:
     mm = runs["payload"]["rows"][-1][1]
     loads = f"0 kg, 2 kg and a push of 20 N, by the plate: {mm} mm; the usual load: {rows[-1][1]}"
     yield limits, r"0 kg, 2 kg and a push [^|]*(?= mm \|)", loads
-    yield limits, r"unnamed in \d+ of \d+ [^|]* clean error", exchanged()
     for pattern, phrase in other_robots(claims):
         yield limits, pattern, phrase
     peer = json.loads((DOCS / "results" / "peer.json").read_text(encoding="utf-8"))["runs"]
@@ -165,16 +163,6 @@ def other_robots(claims: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield r"\d+ to \d+ % inside", f"{100 * min(points):.0f} to {100 * max(points):.0f} % inside"
     few = 100.0 * claims["geometry/few band/12 postures of 6 components"]["figures"][0]
     yield r"12 simulated postures: \d+ % inside", f"12 simulated postures: {few:.0f} % inside"
-
-
-def exchanged() -> str:
-    """Campaigns whose exchanged motor and link readings no verdict names, and by how much the error grew."""
-    with (DOCS / "results" / "random_cases.csv").open(encoding="utf-8", newline="") as table:
-        tried = [row for row in csv.DictReader(table) if row["mistake"].startswith("sides of")]
-    times = [
-        float(r["error [mm]"]) / float(r["clean [mm]"]) for r in tried if r["calibrated"] == "True" and not r["said"]
-    ]
-    return f"unnamed in {len(times)} of {len(tried)} campaigns, up to {max(times):.1f} times the clean error"
 
 
 def beside(lines: list[dict[str, Any]]) -> Iterator[float]:
