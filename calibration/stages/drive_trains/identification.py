@@ -220,8 +220,8 @@ def judged(fit: TrainFit, whole: Problem | None = None) -> Candidate:
     w = weights(problem, r, fit.scales) / problem.correlated
     H = (A.T * w) @ A + prior.information
     known, without = np.where(np.isfinite(r), r, 0.0), []
-    for i in range(len(data.trial_ids)):
-        rows = np.flatnonzero((data.trial == i) & np.isfinite(r))
+    for i in range(data.part[-1] + 1):
+        rows = np.flatnonzero((data.part == i) & np.isfinite(r))
         B = A[rows].T * w[rows]
         step = -np.linalg.solve(H - B @ A[rows] + _DAMPED * np.diag(np.diag(H)), B @ known[rows])
         without.append(np.append(np.maximum(fit.theta + step[:n], prior.least), fit.gamma + step[n:]))
@@ -230,11 +230,13 @@ def judged(fit: TrainFit, whole: Problem | None = None) -> Candidate:
 
 
 def _predicting(fit: TrainFit, without: np.ndarray, covariance: np.ndarray) -> Candidate:
-    """A fit with the score of fits `without` each trial (n_trials, p + 5)."""
+    """A fit with the score of fits `without` each part (n_parts, p + 5)."""
     problem, data, n = fit.problem, fit.problem.data, len(fit.theta)
     left = np.full(len(data.y), np.nan)
     for i, x in enumerate(without):
-        left[data.trial == i] = replace(problem, data=data.only(i)).left(x[:n], x[n:])
+        rows = data.part == i
+        trial = data.trial[rows][0]
+        left[rows] = replace(problem, data=data.only(trial)).left(x[:n], x[n:])[rows[data.trial == trial]]
     size = sizes(problem, left, FLOORS[-1])
     moves = data.known & (data.regime != REST)
     moves = moves if moves.any() else data.known

@@ -20,6 +20,7 @@ CORRELATED = 1.5  # [s] readings' errors hang together
 _START = 0.3  # [s] of a trial's rest that show where delta starts
 REGIMES, REST = 3, 2
 _FEW = 20  # windows
+_PARTS = 4  # of a single trial, left out in turn
 _SLIDES, _RESTS = 0.05, 0.01  # [rad/s] a motor that moves all through a window, or does not
 _STEADY = 1.5  # [rad/s2]
 
@@ -94,6 +95,12 @@ class JointData:
         """Windows (m, ...) in which each trial starts."""
         begins = np.searchsorted(self.trial, np.arange(len(self.trial_ids)))
         return np.minimum(begins[:, None] + np.arange(max(1, round(_START / self.window))), len(self.trial) - 1)
+
+    @cached_property
+    def part(self) -> np.ndarray:
+        """(k,) what is left out with a window: its trial or, of a single trial, a quarter of its time."""
+        k = len(self.trial)
+        return self.trial if len(self.trial_ids) > 1 else np.arange(k) * _PARTS // k
 
     def without(self, trial: int) -> "JointData":
         """The data with the readings of one trial left out."""

@@ -65,10 +65,10 @@ class SteadyContact:
         return np.asarray(C)
 
     def without(self, problem: Problem) -> np.ndarray:
-        """Theta and gamma (n_trials, p + 5) of the windows beside each trial's."""
+        """Theta and gamma (n_parts, p + 5) of the windows beside each part's."""
         found, least = [], np.append(problem.prior.least, np.full(len(self.gamma), -np.inf))
-        for i in range(len(problem.data.trial_ids)):
-            own = self.used & (problem.data.trial == i)
+        for i in range(problem.data.part[-1] + 1):
+            own = self.used & (problem.data.part == i)
             A, w = self.J[own], self.weights[own] / problem.correlated
             step = -np.linalg.solve(self.information - (A.T * w) @ A, A.T @ (w * self.residuals[own]))
             found.append(np.maximum(np.append(self.theta, self.gamma) + step, least))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
-from calibration.stages.drive_trains.identification import loaded
+from calibration.stages.drive_trains.identification import judged, loaded
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.quantities import covariance_of, reported, reverses
 from calibration.stages.drive_trains.steady_contact import slipped_encoder, steady_contact
@@ -120,6 +120,14 @@ def test_a_trial_without_readings_is_left_out() -> None:
     fit = fit_train(problem(of_data), START, FLOORS[:2])
     assert np.isnan(fit.residuals[of_data.trial == 1]).all()
     assert fit.theta[0] == pytest.approx(3e-3, rel=0.05)
+
+
+def test_a_single_trial_is_left_out_by_parts() -> None:
+    of = problem(data().only(0))
+    fit = fit_train(of, START, FLOORS[:2])
+    steady = steady_contact(of, fit.theta, fit.gamma)
+    assert steady is not None and judged(fit).left_out < 1e-3
+    assert np.abs(steady.without(of)[:, :2] - TRUTH.values[:2]).max() < 1e-4
 
 
 def test_the_interval_of_an_unknown_start_closes_once_the_gap_was_crossed() -> None:
