@@ -12,8 +12,10 @@ from concurrent.futures import Future
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
+import psutil
 import pytest
 
 from scenarios import load
@@ -243,6 +245,17 @@ def test_two_commands_do_not_write_one_folder(tmp_path):
         return numbers(scenario, out)
 
     assert [row.status for row in made(tmp_path / "c", 1, produce)] == ["ok"]
+
+
+@pytest.mark.slow
+def test_a_scheduler_of_ours_and_its_workers_listen_on_loopback_alone():
+    with workers._client(Workers(1)) as client:
+        found = client.scheduler_info(n_workers=-1)
+        here = psutil.Process()
+        sockets = [c for p in (here, *here.children(recursive=True)) for c in p.net_connections()]
+    listening = [c.laddr.ip for c in sockets if c.status == psutil.CONN_LISTEN]
+    assert {urlsplit(address).hostname for address in (found["address"], *found["workers"])} == {"127.0.0.1"}
+    assert len(listening) >= 3 and set(listening) == {"127.0.0.1"}
 
 
 def test_a_scheduler_that_is_not_there_is_reported(tmp_path, monkeypatch):
