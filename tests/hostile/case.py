@@ -63,7 +63,7 @@ def judged(case: Case, folder: Path) -> Judged:
         wrong.append(f"outside: {changed[:3]}")
     if outcome.code not in case.codes:
         wrong.append(f"exit {outcome.code}, not {case.codes}")
-    if case.says and not any(words in outcome.said for words in case.says.split("|")):
+    if case.says and not any(words in outcome.output for words in case.says.split("|")):
         wrong.append(f"does not say {case.says!r}")
     left = [p for p in after if outcome.code == 2 and ".partial" in p and p not in before]
     if left:

@@ -25,13 +25,13 @@ class Outcome:
 
     Attributes:
         code: Exit code; minus the signal that ended it.
-        said: What it wrote, both streams.
+        output: What it wrote, both streams.
         memory: The most it had at once [B].
         seconds: What it took of a processor [s].
     """
 
     code: int
-    said: str
+    output: str
     memory: float
     seconds: float
 
@@ -39,10 +39,10 @@ class Outcome:
     def faults(self) -> tuple[str, ...]:
         """What no input may do."""
         found = {
-            "traceback": "Traceback (most recent call last)" in self.said,
+            "traceback": "Traceback (most recent call last)" in self.output,
             "crash": self.code in (-signal.SIGSEGV, -signal.SIGABRT, -signal.SIGBUS, -signal.SIGFPE),
             "time": self.code in (-signal.SIGALRM, -signal.SIGXCPU) or self.seconds > SECONDS,
-            "memory": self.memory > MEMORY or "MemoryError" in self.said,
+            "memory": self.memory > MEMORY or "MemoryError" in self.output,
         }
         return tuple(name for name, is_so in found.items() if is_so)
 
@@ -62,9 +62,9 @@ def forked(work: Callable[[], None], folder: Path | None = None, seconds: int = 
             _child(work, stream.fileno(), folder, seconds)
         _, status, used = os.wait4(child, 0)
         stream.seek(0)
-        said = stream.read(2**20).decode("utf-8", "replace")
+        output = stream.read(2**20).decode("utf-8", "replace")
     code = os.waitstatus_to_exitcode(status)
-    return Outcome(code, said, 1024.0 * used.ru_maxrss, used.ru_utime + used.ru_stime)
+    return Outcome(code, output, 1024.0 * used.ru_maxrss, used.ru_utime + used.ru_stime)
 
 
 def _child(work: Callable[[], None], stream: int, folder: Path | None, seconds: int) -> None:

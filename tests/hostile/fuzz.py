@@ -99,10 +99,10 @@ class Tally:
     causes: dict[str, dict] = field(default_factory=dict)
 
 
-def cause_of(said: str, wrong: Sequence[str]) -> str:
+def cause_of(output: str, wrong: Sequence[str]) -> str:
     """A short name of what went wrong: the last line of ours in a traceback, and the error."""
-    lines = re.findall(r'File "[^"]*/((?:calibration|scenarios|twin|mjcf)/[^"]*)", line (\d+)', said)
-    error = re.findall(r"^([A-Za-z_.]+(?:Error|Exception|Warning)):", said, re.MULTILINE)
+    lines = re.findall(r'File "[^"]*/((?:calibration|scenarios|twin|mjcf)/[^"]*)", line (\d+)', output)
+    error = re.findall(r"^([A-Za-z_.]+(?:Error|Exception|Warning)):", output, re.MULTILINE)
     return " ".join([*(f"{a}:{b}" for a, b in lines[-1:]), *error[-1:]]) or "; ".join(wrong)[:150]
 
 
@@ -128,8 +128,13 @@ def tried(name: str, changes: Sequence[mutation.Change], laboratory: Path, tally
     tally.seconds = max(tally.seconds, found.outcome.seconds)
     if not found.wrong:
         return ""
-    cause = cause_of(found.outcome.said, found.wrong)
-    tally.causes[cause] = {"target": name, "changes": changes, "wrong": found.wrong, "said": found.outcome.said[-1500:]}
+    cause = cause_of(found.outcome.output, found.wrong)
+    tally.causes[cause] = {
+        "target": name,
+        "changes": changes,
+        "wrong": found.wrong,
+        "output": found.outcome.output[-1500:],
+    }
     return cause
 
 

@@ -20,24 +20,24 @@ from calibration import calibrate, load
 from calibration.errors import CalibrationError
 from calibration.evaluation.evaluate import evaluate
 from tests.hostile.spoilt import Tried, reference_of, tried
-from tests.hostile.wrong_data import drawn
+from tests.hostile.wrong_data import at_random
 
 TABLE = Path(__file__).parents[2] / "docs/results/random_cases.csv"
-COLUMNS = ("robot", "mistake", "calibrated", "said", "error [mm]", "clean [mm]")
+COLUMNS = ("robot", "mistake", "calibrated", "message", "error [mm]", "clean [mm]")
 MENDED = (406, 500, 722, 765, 767, 784, 807, 881)
 _LACKS = "not identifiable"  # true of a short campaign
-_SAID = 90  # characters of a verdict in the table
+_WIDTH = 90  # characters of a verdict in the table
 
 
 def clean(dataset) -> tuple[str, ...]:
-    """What is said, wrongly, of a clean campaign: warnings and refusals of all stages and of its evaluation."""
+    """What is found, wrongly, in a clean campaign: warnings and refusals of all stages and of its evaluation."""
     try:
         estimate = calibrate(dataset)
         found = [*estimate.verdicts, *(evaluate(estimate, dataset).verdicts if estimate.calibrated else ())]
     except CalibrationError as error:
         return (str(error),)
-    said = tuple(v.message for v in found if v.verdict in ("warning", "refused") and _LACKS not in v.message)
-    return said if estimate.calibrated else (*said, "not calibrated")
+    messages = tuple(v.message for v in found if v.verdict in ("warning", "refused") and _LACKS not in v.message)
+    return messages if estimate.calibrated else (*messages, "not calibrated")
 
 
 def tried_robot(seed: int, mistakes: int, place: Path) -> Iterator[Tried]:
@@ -49,12 +49,12 @@ def tried_robot(seed: int, mistakes: int, place: Path) -> Iterator[Tried]:
     scenario = run_steps.load("short", [f"seed={seed}"]).quick()
     record(scenario.twin, scenario.seed, place / "run")
     good = load(place / "run/dataset")
-    said = clean(good)
+    messages = clean(good)
     logging.disable(logging.NOTSET)
-    yield Tried("", "not calibrated" not in said, said, np.nan, np.nan)
-    if mistakes and not said:
+    yield Tried("", "not calibrated" not in messages, messages, np.nan, np.nan)
+    if mistakes and not messages:
         campaign, reference = reference_of(good)
-        for mistake in drawn(np.random.default_rng(seed), mistakes):
+        for mistake in at_random(np.random.default_rng(seed), mistakes):
             yield tried(mistake, campaign, good, reference, place / "at")
             shutil.rmtree(place / "at", ignore_errors=True)
 
@@ -68,7 +68,7 @@ def counts() -> str:
     """What came of them, for docs/reliability.md."""
     every = rows()
     spoilt, good = [r for r in every if r[1]], [r for r in every if not r[1]]
-    wrong, said = [r for r in spoilt if silent(r)], [r for r in good if r[3]]
+    wrong, alarms = [r for r in spoilt if silent(r)], [r for r in good if r[3]]
     named = sum(bool(r[3]) for r in spoilt)
     lines = [
         "Kind, size, joint, body and time at random, on campaigns of a minute of sampled robots (`short --quick`);",
@@ -78,10 +78,10 @@ def counts() -> str:
         f"{len(spoilt) - named - len(wrong)} harmless, {len(wrong)} silently wrong",
         "  (no verdict, the error on unseen motion over 1 mm and twice the clean one)",
         *(f"    - robot {r[0]}, {r[1]}: {r[4]} mm, clean {r[5]} mm" for r in wrong),
-        f"- {len(good)} clean campaigns: {len(said)} warned of or refused; not counted are robots whose false alarms",
+        f"- {len(good)} clean campaigns: {len(alarms)} warned of or refused; not counted are robots whose false alarms",
         f"  were mended, others took their place: {', '.join(map(str, MENDED))}",
         "  (links that cross their backlash, or lie alone on its other side; a clock extrapolated by a minute)",
-        *(f"    - robot {r[0]}: {r[3]}" for r in said),
+        *(f"    - robot {r[0]}: {r[3]}" for r in alarms),
     ]
     return "\n".join(lines) + "\n"
 
@@ -102,9 +102,9 @@ def main(first: int, robots: int, mistakes: int) -> None:
         found = [r for r in rows() if r[0] != str(seed)]
         with tempfile.TemporaryDirectory() as place:
             for t in tried_robot(seed, mistakes, Path(place)):
-                said = t.said[0][:_SAID].replace("\n", " ") if t.said else ""
-                found.append([str(seed), t.name, str(t.calibrated), said, f"{t.error:.3f}", f"{t.clean:.3f}"])
-                if (silent(found[-1]) and t.name) or (said and not t.name):
+                message = t.messages[0][:_WIDTH].replace("\n", " ") if t.messages else ""
+                found.append([str(seed), t.name, str(t.calibrated), message, f"{t.error:.3f}", f"{t.clean:.3f}"])
+                if (silent(found[-1]) and t.name) or (message and not t.name):
                     print(*found[-1], flush=True)
         _write(sorted(found, key=lambda r: int(r[0])))
 

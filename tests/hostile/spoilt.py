@@ -26,21 +26,21 @@ class Tried:
     Attributes:
         name: Of it.
         calibrated: Whether the estimate may be used.
-        said: Its warnings and refusals, or those of the command.
+        messages: Its warnings and refusals, or those of the command.
         error: Of the hand on the good campaign's unseen trials, base measured [mm a component]; NaN where not usable.
         clean: The good campaign's own [mm].
     """
 
     name: str
     calibrated: bool
-    said: tuple[str, ...]
+    messages: tuple[str, ...]
     error: float
     clean: float
 
     @property
     def silently_wrong(self) -> bool:
         """Called good without a word though it is worse than twice the clean one, and by more than a millimetre."""
-        return self.calibrated and not self.said and self.error > max(2.0 * self.clean, _LEAST)
+        return self.calibrated and not self.messages and self.error > max(2.0 * self.clean, _LEAST)
 
 
 def calibrated(dataset: Dataset, stages: tuple[str, ...] = STAGES) -> Estimate:
@@ -62,18 +62,18 @@ def tried(mistake: Mistake, campaign: Campaign, good: Dataset, reference: tuple[
     try:
         dataset = load(mistake.spoil(campaign).written(at))
         estimate = calibrated(dataset, mistake.stages)
-        said = _said(estimate.verdicts, known)
+        messages = _bad(estimate.verdicts, known)
         if estimate.calibrated:
-            said += _said(evaluate(estimate, dataset).verdicts, known)
+            messages += _bad(evaluate(estimate, dataset).verdicts, known)
     except CalibrationError as error:
         return Tried(mistake.name, False, (str(error),), np.nan, clean)
     finally:
         logging.disable(logging.NOTSET)
-    error = error_of(estimate, good) if estimate.calibrated and not said else np.nan
-    return Tried(mistake.name, estimate.calibrated, said, error, clean)
+    error = error_of(estimate, good) if estimate.calibrated and not messages else np.nan
+    return Tried(mistake.name, estimate.calibrated, messages, error, clean)
 
 
-def _said(verdicts: Iterable[Verdict], known: frozenset) -> tuple[str, ...]:
+def _bad(verdicts: Iterable[Verdict], known: frozenset) -> tuple[str, ...]:
     """Warnings and refusals that are not those of the good campaign."""
     bad = (v.message for v in verdicts if v.verdict in ("warning", "refused"))
     return tuple(message for message in bad if message[:40] not in known)
@@ -82,5 +82,5 @@ def _said(verdicts: Iterable[Verdict], known: frozenset) -> tuple[str, ...]:
 def reference_of(good: Dataset) -> tuple[Campaign, tuple[float, frozenset]]:
     """The good campaign in memory, its error [mm] and the beginnings of its own warnings."""
     estimate = calibrated(good)
-    said = frozenset(v.message[:40] for v in estimate.verdicts if v.verdict in ("warning", "refused"))
-    return Campaign.of(good, estimate.clock("robot").offset), (error_of(estimate, good), said)
+    messages = frozenset(v.message[:40] for v in estimate.verdicts if v.verdict in ("warning", "refused"))
+    return Campaign.of(good, estimate.clock("robot").offset), (error_of(estimate, good), messages)

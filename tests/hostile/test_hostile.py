@@ -26,7 +26,7 @@ def test_a_hostile_case_ends_as_its_row_says(laboratory, tmp_path, case: Case):
     folder = copied(laboratory, tmp_path / "at")
     found = judged(case, folder)
     shutil.rmtree(folder, ignore_errors=True)
-    assert not found.wrong, f"{found.wrong}\n{found.outcome.said[-3000:]}"
+    assert not found.wrong, f"{found.wrong}\n{found.outcome.output[-3000:]}"
 
 
 def test_every_finding_of_use_is_a_row_a_test_or_argued():

@@ -126,5 +126,5 @@ def test_a_full_disk_is_one_line_and_leaves_what_was_there(tmp_path):
         main.main(["export", "csv", str(tmp_path / "data"), "--out", str(tmp_path / "out")])
 
     found = forked(work)
-    assert found.code == 1 and os.strerror(errno.EFBIG) in found.said and "Traceback" not in found.said
+    assert found.code == 1 and os.strerror(errno.EFBIG) in found.output and "Traceback" not in found.output
     assert sorted(tmp_path.rglob("*")) == before

@@ -11,7 +11,7 @@ from tests.hostile import random_cases, tried_mistakes
 from tests.hostile.campaign import hidden, scaled
 from tests.hostile.laboratory_kinds import KINDS
 from tests.hostile.spoilt import calibrated, error_of, tried
-from tests.hostile.tried_mistakes import IN_CALIBRATION, IN_VALIDATION, fault, said
+from tests.hostile.tried_mistakes import IN_CALIBRATION, IN_VALIDATION, fault, found_in
 from tests.hostile.wrong_data import FAST
 
 
@@ -26,15 +26,15 @@ def twin(tmp_path_factory):
     return tried_mistakes.twin(tmp_path_factory.mktemp("twin") / "run")
 
 
-def test_nothing_is_said_of_good_recordings(rigid):
-    assert not said(rigid[1].folder)
+def test_nothing_is_found_in_good_recordings(rigid):
+    assert not found_in(rigid[1].folder)
 
 
 @pytest.mark.parametrize(
     "mistake", [*FAST, *(pytest.param(m, marks=pytest.mark.slow) for m in KINDS)], ids=lambda m: m.name
 )
 def test_a_mistake_seen_in_the_recordings_is_named(rigid, mistake, tmp_path):
-    found = said(mistake.spoil(rigid[0]).written(tmp_path / "data"))
+    found = found_in(mistake.spoil(rigid[0]).written(tmp_path / "data"))
     assert any(mistake.says in message for message in found), found
 
 
@@ -71,7 +71,7 @@ def test_hidden_markers_cost_no_posture_and_hardly_any_error(twin, tmp_path):
 @pytest.mark.parametrize("seed", random_cases.MENDED)
 def test_a_clean_campaign_that_was_once_named_is_not(seed, tmp_path):
     (clean,) = random_cases.tried_robot(seed, 0, tmp_path)
-    assert not clean.said
+    assert not clean.messages
 
 
 def test_mistakes_at_random_were_hardly_ever_silently_wrong_and_clean_campaigns_hardly_ever_named():

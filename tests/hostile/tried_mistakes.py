@@ -24,8 +24,8 @@ SEED = 5
 IN_RECORDINGS, IN_CALIBRATION, IN_VALIDATION = (*FAST, *KINDS), (*TABLE, *PLATE, *FITTED), (*VALIDATION, *UNSEEN)
 
 
-def said(folder: Path) -> list[str]:
-    """What is said of calibration recordings before anything is fitted."""
+def found_in(folder: Path) -> list[str]:
+    """What is found in calibration recordings before anything is fitted."""
     dataset = load(folder)
     trials = [trial for _, trial in relabelled_trials(dataset, "calibration")]
     return [v.message for v in judged(Laboratory(dataset.urdf, dataset.description), trials, calibrated=True)]
@@ -49,13 +49,13 @@ def twin(folder: Path):
 def fault(mistake: Mistake, found: Tried) -> str:
     """What is wrong with the outcome of a row; empty where it is as the row says."""
     if mistake.says:
-        named = any(words in message for message in found.said for words in mistake.says.split("|"))
-        return "" if named else "silently wrong" if found.silently_wrong or not found.said else "named otherwise"
+        named = any(words in message for message in found.messages for words in mistake.says.split("|"))
+        return "" if named else "silently wrong" if found.silently_wrong or not found.messages else "named otherwise"
     return "" if found.calibrated and found.error < mistake.worst * found.clean else "good data lost"
 
 
 def _in_recordings(campaign: Campaign, mistake: Mistake, at: Path) -> Tried:
-    return Tried(mistake.name, False, tuple(said(mistake.spoil(campaign).written(at))), np.nan, np.nan)
+    return Tried(mistake.name, False, tuple(found_in(mistake.spoil(campaign).written(at))), np.nan, np.nan)
 
 
 def rows(place: Path) -> Iterator[list[str | int]]:

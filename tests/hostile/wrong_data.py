@@ -1,7 +1,7 @@
-"""Recordings that are wrong in a laboratory's way: what is done to a good campaign, how bad, what must be said.
+"""Recordings that are wrong in a laboratory's way: what is done to a good campaign, how bad, what must be named.
 
 A mistake changes trials of a role, or the description, of a campaign in memory. `TABLE` has the rows that are known,
-`drawn` makes others of the same kinds: sizes, joints, bodies and times at random.
+`at_random` makes others of the same kinds: sizes, joints, bodies and times at random.
 """
 
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ class Mistake:
     Attributes:
         name: What is wrong, and how bad.
         spoil: Makes it so.
-        says: Words of a verdict, any of them between `|`; empty where the data remain usable and nothing need be said.
+        says: Words of a verdict, any of them between `|`; empty where the data remain usable and nothing need be named.
         worst: Largest true error of an estimate that is nevertheless called good, times the clean one [-].
         stages: That calibrate.
         judged: Seen in the recordings alone, before anything is fitted: the fast rows.
@@ -126,7 +126,7 @@ VALIDATION = (
 )
 
 
-def drawn(rng: np.random.Generator, n: int) -> Iterator[Mistake]:
+def at_random(rng: np.random.Generator, n: int) -> Iterator[Mistake]:
     """Mistakes at random, of every kind that calibration recordings alone can have."""
 
     def away(size: float) -> list[float]:
