@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", *(f"docs/{p}.md" for p in "tutorials python geometry frames commands scale reality".split()))
+PAGES = tuple(f"docs/{p}.md" for p in "tutorials python geometry frames commands scale reality".split())
 ELSEWHERE = {
+    "README.md": "tests/project/test_wheel.py",
     "docs/recording.md": "tests/acceptance/test_recording_page.py",
     "docs/benchmark.md": "tests/scenarios/benchmarks/test_benchmark_page.py",
     "examples/validate_my_calibration/README.md": "tests/scenarios/testing/test_pytest_plugin.py",
