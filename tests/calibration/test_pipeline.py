@@ -9,6 +9,7 @@ import pytest
 from calibration import calibrate, load, save_estimate
 from calibration.context import Context
 from calibration.errors import InputError, NoSuchElement, NotEnoughData
+from calibration.inference.parameters import Model, Parameter
 from calibration.pipeline import _concluded
 from calibration.recording.trial import sha256
 from calibration.robot.laboratory import Laboratory
@@ -47,6 +48,16 @@ def test_intervals_include_what_a_warning_s_cause_may_have_moved(estimate, datas
     before, after = ({p.name: p for p in e.model("model_2").parameters} for e in (estimate, found))
     assert after[name].sigma == pytest.approx(np.hypot(before[name].sigma, off))
     assert {n for n in before if after[n] != before[n]} == {name}
+
+
+def test_forces_of_the_base_include_what_a_plate_s_weight_is_off(estimate, dataset):
+    springs = (("suspension.K.11", "N/m", 4e4), ("slip.body_c", "N.s/m", 4.0), ("contact.left.mu", "-", 0.5))
+    parameters = tuple(Parameter(n, unit, 0.0, value, 0.0, "estimated") for n, unit, value in springs)
+    weighed = Verdict("suspension", "ok", "plate", ((("plate.scale", -0.1),),))
+    models = (Model("model_1", parameters, covariance=np.zeros((3, 3))),)
+    data = StageInput(Laboratory(dataset.urdf, dataset.description))
+    (after,) = _concluded(Context(data, replace(estimate, models=models, verdicts=(weighed,)))).models
+    np.testing.assert_allclose([p.sigma for p in after.parameters], [4e3, 0.4, 0.0])
 
 
 def test_the_estimate_says_what_it_is(estimate):
