@@ -5,6 +5,9 @@
 H the information and g_k a trial's gradient at the optimum: the second term is what trials disagree about, which no
 curvature shows. p_(-k), the parameters without trial k, is a step of Gauss-Newton from there. The motion predicted
 with them says what the model is worth on an axis of the floor's plane, and how wide its band is.
+
+A wheel that all but slides bounds its friction on one side: the optimum is where sliding starts, and its curvature is
+that of the other side. So a friction's sigma is at least half of how far it may go, alone, for a cost of RISE.
 """
 
 from dataclasses import dataclass
@@ -14,10 +17,14 @@ import numpy as np
 from calibration.stages.stick_slip.band import LeftOut, block_means, ensemble_of, fitted_band, reached
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.model import Direction
-from calibration.stages.stick_slip.search import searched, warmed
-from calibration.stages.stick_slip.wheels import PRIOR_SIGMA, SlipParameters, preloads
+from calibration.stages.stick_slip.search import FRICTIONS, Point, searched, tried, warmed
+from calibration.stages.stick_slip.wheels import SlipParameters, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source
+
+RISE = 4.0  # of -2 log of the posterior: two standard deviations
+_PARTS = (1.0, 0.5, 0.25)  # of a step without a trial
+_REACH = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.4])  # of a friction's logarithm
 
 
 @dataclass(frozen=True)
@@ -48,16 +55,41 @@ def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
     """The parameters that predict the trials best; from a known start (13,), where there is one, without a search."""
     best, starts = searched(trials) if start is None else (warmed(trials, start), ())
     H_k, g_k = trials.normal(best.logarithms, best.errors, both=True)
-    H = H_k.sum(axis=0) + np.diag(PRIOR_SIGMA**-2.0)
+    H = H_k.sum(axis=0) + trials.prior.information
     inverse = np.linalg.inv(H)
     covariance = inverse + inverse @ (g_k.T @ g_k) @ inverse
-    others = np.array([best.logarithms + _without(H, H_k[k], g_k[k]) for k in range(len(g_k))])
-    return Fitted(best.logarithms, covariance, others, best.cost, starts)
+    own = np.diag(covariance)
+    covariance += np.diag(np.maximum(_one_sided(trials, best) ** 2 - own, 0.0))
+    steps = np.array([_without(H, H_k[k], g_k[k], trials.prior.sigma) for k in range(len(g_k))])
+    return Fitted(best.logarithms, covariance, _others(trials, best, steps), best.cost, starts)
 
 
-def _without(H: np.ndarray, H_k: np.ndarray, g_k: np.ndarray) -> np.ndarray:
+def _one_sided(trials: Trials, best: Point) -> np.ndarray:
+    """Standard deviations (13,) by the side on which a friction goes farther alone; 0 of all but frictions."""
+    sigma, n = np.zeros(len(best.logarithms)), len(_REACH)
+    steps = np.concatenate([-_REACH, _REACH])
+    for i in FRICTIONS:
+        points = tried(trials, best.logarithms + np.outer(steps, np.eye(len(sigma))[i]))
+        rise = np.maximum.accumulate(np.reshape([p.cost - best.cost for p in points], (2, n)), axis=1)
+        sigma[i] = 0.5 * max(np.interp(RISE, side, _REACH) for side in rise)
+    return sigma
+
+
+def _without(H: np.ndarray, H_k: np.ndarray, g_k: np.ndarray, longest: np.ndarray) -> np.ndarray:
     """Step of the logarithms when a trial is left out, none longer than its prior is wide."""
-    return np.clip(np.linalg.solve(H - H_k, g_k), -PRIOR_SIGMA, PRIOR_SIGMA)
+    return np.clip(np.linalg.solve(H - H_k, g_k), -longest, longest)
+
+
+def _others(trials: Trials, best: Point, steps: np.ndarray) -> np.ndarray:
+    """Parameters (k, 13) without each trial: as much of its step (k, 13) as the other trials bear best."""
+    found = np.repeat(best.logarithms[None], len(steps), axis=0)
+    least = best.cost - trials.costs(best.errors)
+    for part in _PARTS:
+        points = tried(trials, best.logarithms + part * steps)
+        costs = np.array([p.cost - trials.costs(p.errors)[k] for k, p in enumerate(points)])
+        found[costs < least] = (best.logarithms + part * steps)[costs < least]
+        least = np.minimum(least, costs)
+    return found
 
 
 def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = None) -> Direction:

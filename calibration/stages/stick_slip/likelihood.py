@@ -19,7 +19,7 @@ from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_force
 from calibration.stages.stick_slip.kernel import Bases, at_rest, simulated
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, pooled_noise
-from calibration.stages.stick_slip.wheels import PRIOR, PRIOR_SIGMA, SlipParameters, WheelSet
+from calibration.stages.stick_slip.wheels import WIDE, Prior, SlipParameters, WheelSet
 from calibration.stages.suspension.model import Source
 
 CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel`
@@ -42,6 +42,7 @@ class Trials:
         inertia: (n, 15).
         rest: (n,) True in the first second of a trial.
         motions: Measured.
+        prior: Of the logarithms.
     """
 
     ids: tuple[str, ...]
@@ -52,6 +53,7 @@ class Trials:
     inertia: np.ndarray
     rest: np.ndarray
     motions: tuple[PlanarMotion, ...]
+    prior: Prior = WIDE
 
     @cached_property
     def spans(self) -> tuple[tuple[int, int], ...]:
@@ -99,9 +101,8 @@ class Trials:
         per = len(self.drive) // len(self.inertia)
         drive, inertia, rest = self.drive[a * per : b * per], self.inertia[a:b], self.rest[a:b]
         motions = self.motions[k : k + 1]
-        return Trials(
-            self.ids[k : k + 1], self.wheels, self.corrected, np.array([0, b - a]), drive, inertia, rest, motions
-        )
+        ids, starts = self.ids[k : k + 1], np.array([0, b - a])
+        return Trials(ids, self.wheels, self.corrected, starts, drive, inertia, rest, motions, self.prior)
 
     def simulated(self, logarithms: np.ndarray, preload: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Positions (k, n, 3) since the first second of each trial, and shares of wheels that slid (k, n).
@@ -135,8 +136,12 @@ class Trials:
 
     def cost(self, logarithms: np.ndarray, errors: np.ndarray) -> float:
         """-2 log of the posterior."""
-        prior = (((logarithms - PRIOR) / PRIOR_SIGMA) ** 2).sum()
-        return float((self.independent[:, None] * np.log(self.variances(errors))).sum() + prior)
+        return float(self.costs(errors).sum() + self.prior.cost(logarithms))
+
+    def costs(self, errors: np.ndarray) -> np.ndarray:
+        """-2 log of the likelihood of each trial (k,)."""
+        rows = (self.independent[:, None] * np.log(self.variances(errors))).sum(axis=1)
+        return np.bincount(self.windows[0], rows, len(self.ids))
 
     def normal(self, logarithms: np.ndarray, errors: np.ndarray, both: bool) -> tuple[np.ndarray, np.ndarray]:
         """Information (k, p, p) and gradient (k, p) of half the cost of each trial, prior left out.
@@ -204,7 +209,7 @@ def bases_of(wheels: WheelSet, logarithms: np.ndarray, corrected: bool, preload:
     return at_rest(np.array([wheels.rows(p) for p in each]), np.array([body(p, corrected) for p in each]), preload)
 
 
-def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]]) -> Trials:
+def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], prior: Prior = WIDE) -> Trials:
     """Trials of one source one after the other."""
     forcings, motions = zip(*rows, strict=True)
     return Trials(
@@ -216,4 +221,5 @@ def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]])
         np.ascontiguousarray(np.concatenate([f.inertia for f in forcings])),
         np.concatenate([f.rest for f in forcings]),
         motions,
+        prior,
     )

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.stages.stick_slip.likelihood import DIFFERENCE, Trials
-from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA
+from calibration.stages.stick_slip.wheels import NAMES
 
 _LONGEST = 0.7  # step of a logarithm, at most
 _DAMPING = 1e-2, 6.0, 1e-5, 1e5  # at the start, factor, least, most
@@ -28,8 +28,8 @@ PLACE = 0.05  # [m] standard deviation of a wheel's declared place
 _PLACE_STEP = 0.003  # [m] for derivatives
 _SPREAD = (0.0, -0.5, 1.5)  # of the frictions' logarithms between starts: at the last one hardly a wheel slips
 _SCAN = tuple(np.log([0.6, 0.8, 0.92, 1.15, 1.5]))
-_FRICTIONS = tuple(i for i, name in enumerate(NAMES) if name.endswith("_mu"))
-_SCANNED = (*_FRICTIONS, *(i for i, name in enumerate(NAMES) if "_k" in name))
+FRICTIONS = tuple(i for i, name in enumerate(NAMES) if name.endswith("_mu"))
+_SCANNED = (*FRICTIONS, *(i for i, name in enumerate(NAMES) if "_k" in name))
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class Point:
 
 def searched(trials: Trials) -> tuple[Point, tuple[float, ...]]:
     """The best point, and the costs to which the starts came."""
-    frictions = np.array([float(i in _FRICTIONS) for i in range(len(NAMES))])
-    points = tried(trials, [PRIOR + s * frictions for s in _SPREAD])
+    frictions = np.array([float(i in FRICTIONS) for i in range(len(NAMES))])
+    points = tried(trials, [trials.prior.mean + s * frictions for s in _SPREAD])
     for _ in range(_FIRST):
         points = [p if p.ended else stepped(trials, p) for p in points]
     return descended(trials, scanned(trials, min(points, key=lambda p: p.cost))), tuple(p.cost for p in points)
@@ -88,7 +88,7 @@ def scanned(trials: Trials, at: Point) -> Point:
     return best
 
 
-def tried(trials: Trials, logarithms: Sequence[np.ndarray]) -> list[Point]:
+def tried(trials: Trials, logarithms: Sequence[np.ndarray] | np.ndarray) -> list[Point]:
     """Some starts."""
     errors = trials.errors(np.array(logarithms))
     return [Point(own, e, trials.cost(own, e)) for own, e in zip(logarithms, errors, strict=True)]
@@ -97,8 +97,8 @@ def tried(trials: Trials, logarithms: Sequence[np.ndarray]) -> list[Point]:
 def stepped(trials: Trials, at: Point) -> Point:
     """One step on, or the same point, ended, where no step gains."""
     H_k, g_k = trials.normal(at.logarithms, at.errors, both=False)
-    H = H_k.sum(axis=0) + np.diag(PRIOR_SIGMA**-2.0)
-    g = g_k.sum(axis=0) + (at.logarithms - PRIOR) / PRIOR_SIGMA**2
+    H = H_k.sum(axis=0) + trials.prior.information
+    g = g_k.sum(axis=0) + trials.prior.information @ (at.logarithms - trials.prior.mean)
     damping, factor, least, most = _DAMPING
     damping = at.damping
     while damping < most:
@@ -118,7 +118,7 @@ def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     two degrees of freedom of that place.
     """
     n, m = len(best), len(trials.wheels.position)
-    prior = np.concatenate([PRIOR_SIGMA**-2.0, np.full(2 * m, PLACE**-2)])
+    prior = np.concatenate([np.diag(trials.prior.information), np.full(2 * m, PLACE**-2)])
     (errors,) = trials.errors(best[None])
     weight = np.sqrt(trials.independent / np.maximum(trials.windows[2].sum(axis=1), 1))[:, None]
     weight = (weight / np.sqrt(trials.variances(errors)))[:, None, :]
@@ -126,7 +126,7 @@ def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     moved = zip(steps, np.eye(n + 2 * m), strict=True)
     A = np.array([((_placed(trials, best, h * e) - errors) / h * weight).ravel() for h, e in moved])
     H, g = A @ A.T + np.diag(prior), A @ (errors * weight).ravel()
-    g[:n] += prior[:n] * (best - PRIOR)
+    g[:n] += prior[:n] * (best - trials.prior.mean)
     shift, chi2 = np.empty((m, 2)), np.empty(m)
     for w in range(m):
         own = np.concatenate([np.arange(n), n + 2 * w + np.arange(2)])

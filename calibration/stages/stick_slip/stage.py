@@ -26,10 +26,11 @@ from calibration.stages.stick_slip.forcing import (
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import Trials, joined
+from calibration.stages.stick_slip.load_shares import prior_by_tilt
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.search import descended, displaced, tried
-from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
+from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of
@@ -68,14 +69,15 @@ def fit_stick_slip(
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials)
     by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
-    usable = [(source, rows, joined(wheels, rows)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
+    prior = _prior(wheels, suspension)
+    usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
     if not usable:
         message = "no stick-slip base: it takes two trials that show the base and its wrench"
         return None, (Verdict(STAGE, "missing", message),)
     fits: list[Direction] = []
     for source, _, campaign in usable:
         fits.append(fit_direction(source, campaign, fits[0].logarithms if fits else None))
-    shift, chi2 = _shifts(wheels, usable[0][1], fits[0])
+    shift, chi2 = _shifts(usable[0][2], usable[0][1], fits[0])
     if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
     directions = [_linear(fit, suspension) for fit in fits]
@@ -143,20 +145,26 @@ def _plain(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarFo
     return plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
 
 
+def _prior(wheels: WheelSet, suspension: Suspension) -> Prior:
+    """Shares of the load by the tilt, where a source shows that the compliance predicts it."""
+    tilts = any(suspension.moves(source)[[*HEAVE[1:]]].all() for source in SOURCES)
+    return prior_by_tilt(wheels, suspension.K[np.ix_(HEAVE, HEAVE)]) if tilts else WIDE
+
+
 def _shifts(
-    wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], fit: Direction
+    campaign: Trials, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], fit: Direction
 ) -> tuple[np.ndarray, np.ndarray]:
     """Shifts (m, 2) [m] and chi-squares (m,) of wheels by the trials that are not wild.
 
     About the parameters of all trials and of these alone: the less significant one, as one of some trials is chance.
     """
     wild = fit.held_out.wild
-    calm = joined(wheels, [row for row, far in zip(rows, wild, strict=True) if not far])
+    calm = joined(campaign.wheels, [row for row, far in zip(rows, wild, strict=True) if not far], campaign.prior)
     points = [fit.logarithms]
     if wild.any():
         points.append(descended(calm, tried(calm, points)[0]).logarithms)
     shifts, chi2 = (np.array(column) for column in zip(*(displaced(calm, p) for p in points), strict=True))
-    least, own = chi2.argmin(axis=0), np.arange(len(wheels.names))
+    least, own = chi2.argmin(axis=0), np.arange(len(campaign.wheels.names))
     return shifts[least, own], chi2[least, own]
 
 

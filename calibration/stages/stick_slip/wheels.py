@@ -24,11 +24,31 @@ NAMES = (
     "back_load",
 )  # fmt: skip
 PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0])
-PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.25, 0.25])
+PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5])
 PRELOADS = 8  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
 _LEGS = 3  # wheels that a base stands on
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Normal one of the logarithms: mean and sigma (13,)."""
+
+    mean: np.ndarray
+    sigma: np.ndarray
+
+    def cost(self, logarithms: np.ndarray) -> float:
+        """-2 log of it."""
+        return float((((logarithms - self.mean) / self.sigma) ** 2).sum())
+
+    @cached_property
+    def information(self) -> np.ndarray:
+        """(13, 13)."""
+        return np.diag(self.sigma**-2.0)
+
+
+WIDE = Prior(PRIOR, PRIOR_SIGMA)
 
 
 @dataclass(frozen=True)
