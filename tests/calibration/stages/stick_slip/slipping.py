@@ -107,10 +107,12 @@ def forcing(w: np.ndarray, plate: np.ndarray | None = None) -> PlanarForcing:
     return PlanarForcing("a", source, t, drive, inertia, none, t <= 1.0, none)
 
 
-def recorded(rng: np.random.Generator, noise: float = 2e-5, plate: bool = True) -> tuple[PlanarForcing, PlanarMotion]:
+def recorded(
+    rng: np.random.Generator, noise: float = 2e-5, plate: bool = True, truth: SlipParameters = TRUTH
+) -> tuple[PlanarForcing, PlanarMotion]:
     """A trial and what its markers show."""
     w = push(rng)
-    x, force = slid(w)
+    x, force = slid(w, truth)
     one = forcing(w, force if plate else None)
     sigma = noise * np.array([1.0, 1.0, 4.0])
     x = blocks(x[STEPS - 1 :: STEPS])

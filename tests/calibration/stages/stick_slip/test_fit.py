@@ -72,6 +72,18 @@ def test_a_friction_that_nothing_reaches_keeps_its_prior(trials):
     assert np.sqrt(found.covariance[i, i]) > 0.8 * PRIOR_SIGMA[i]
 
 
+def test_a_friction_that_only_ever_sticks_is_known_on_one_side(trials, found):
+    i, highest = NAMES.index("front_mu"), replace(TRUTH, front_mu=0.9)
+    rng = np.random.default_rng(5)
+    rows = [slipping.recorded(rng, plate=False, truth=highest) for _ in range(3)]
+    stuck = joined(slipping.WHEELS, rows)
+    start = fitted(stuck, highest.logarithms)
+    ends = start.logarithms + np.outer([-0.5, 0.5], np.eye(len(NAMES))[i])
+    below, above = (stuck.cost(p, e) - start.cost for p, e in zip(ends, stuck.errors(ends), strict=True))
+    assert below > 50.0 and above < 5.0
+    assert np.sqrt(start.covariance[i, i]) > 0.3 > 3.0 * np.sqrt(found.covariance[i, i])
+
+
 def test_without_a_trial_the_parameters_are_near_those_of_all(trials, found):
     assert found.others.shape == (len(trials.ids), len(NAMES))
     assert np.abs(found.others - found.logarithms)[:, ROWS].max() < 0.1
