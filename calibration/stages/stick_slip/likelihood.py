@@ -166,7 +166,10 @@ class Trials:
 
 @njit(cache=True, error_model="numpy")
 def _of_blocks(x: np.ndarray, starts: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Measured (b, 3) minus the means of x (n, 3) over blocks, no larger than `_FAR`, which NaN is."""
+    """Measured (b, 3) minus the means of x (n, 3) over blocks.
+
+    A base that no step can follow is `_FAR` off, to one side and the other: no mean of a window takes that away.
+    """
     e, b = np.empty(measured.shape), 0
     for trial in range(len(starts) - 1):
         for first in range(starts[trial], starts[trial + 1] - BLOCK + 1, BLOCK):
@@ -175,7 +178,7 @@ def _of_blocks(x: np.ndarray, starts: np.ndarray, measured: np.ndarray) -> np.nd
                 for i in range(1, BLOCK):
                     total += x[first + i, a]
                 off = measured[b, a] - total / BLOCK
-                e[b, a] = min(max(off, -_FAR), _FAR) if off == off else _FAR
+                e[b, a] = off if abs(off) <= _FAR else _FAR * (1 - 2 * (b % 2))
             b += 1
     return e
 

@@ -42,6 +42,10 @@ class Prior:
         """-2 log of it."""
         return float((((logarithms - self.mean) / self.sigma) ** 2).sum())
 
+    def bounded(self, logarithms: np.ndarray) -> np.ndarray:
+        """Logarithms (..., 13) within three sigmas."""
+        return np.clip(logarithms, self.mean - 3.0 * self.sigma, self.mean + 3.0 * self.sigma)
+
     @cached_property
     def information(self) -> np.ndarray:
         """(13, 13)."""
