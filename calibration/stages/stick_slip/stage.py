@@ -26,11 +26,10 @@ from calibration.stages.stick_slip.forcing import (
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import Trials, joined
-from calibration.stages.stick_slip.load_shares import prior_by_tilt
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.search import descended, displaced, tried
-from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, wheel_set
+from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, prior_by_tilt, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of

@@ -5,7 +5,7 @@
 
 A wheel carries its own weight n_i, of the nominal robot; the base's weight is shared as by vertical springs under a
 rigid base, and a wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors
-are log-normal and wide: nothing here is of a particular robot.
+are log-normal and wide, but for the shares of the load where the tilt shows them: nothing here is of one robot.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import least_squares
 
 from calibration.numerics.compiled import njit
 from calibration.recording.schema import Wheel
@@ -27,6 +28,11 @@ PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0
 PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5])
 PRELOADS = 8  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
+_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 2))
+_KNOWN = np.array([0.3, 0.03, 0.05, 0.04])  # sigmas of the elements: heave hardly moves
+_MODEL = 0.05  # of a logarithm: loads are shared by more than springs
+_TYPES = ("drive", "front", "back")
+_LOADS = [NAMES.index("drive_load"), NAMES.index("back_load")]
 _LEGS = 3  # wheels that a base stands on
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
 
@@ -183,6 +189,39 @@ def bear(standing: np.ndarray, wrench: np.ndarray) -> None:
                 x, y = standing[i, 0], standing[i, 1]
                 share = c0 + c1 * x + c2 * y
                 w[2], w[3], w[4] = w[2] - share, w[3] - share * y, w[4] + share * x
+
+
+def prior_by_tilt(wheels: WheelSet, K: np.ndarray) -> Prior:
+    """The wide prior, its shares of the load by the stiffness K (3, 3) of z, rx, ry [N/m, N, N.m/rad].
+
+        K = sum_i k_i a_i a_i',   a_i = (1, y_i, -x_i)
+
+    Wheels share the load as their vertical springs do. The logarithms of the three types' k are fitted to K_zz, K_rx,
+    K_ry and K_z,ry each relative to sqrt(K_ii K_jj); ratios to front casters have the wide prior too, which decides
+    where a type is missing.
+    """
+    a = np.column_stack([np.ones(len(wheels.position)), wheels.position[:, 1], -wheels.position[:, 0]])
+    rows, columns = np.transpose(_ELEMENTS)
+    size = np.sqrt(np.diag(K))
+    size = size[rows] * size[columns]
+    own = [a[[kind == one for one in wheels.types]] for kind in _TYPES]
+    A = np.stack([(part.T @ part)[rows, columns] for part in own], axis=1) / (size * _KNOWN)[:, None]
+    b = K[rows, columns] / (size * _KNOWN)
+    ratios = np.array([[1.0, -1.0, 0.0], [0.0, -1.0, 1.0]])
+    weighted = ratios / PRIOR_SIGMA[_LOADS][:, None]
+
+    def residuals(log_k: np.ndarray) -> np.ndarray:
+        return np.concatenate([A @ np.exp(log_k) - b, weighted @ log_k])
+
+    def jacobian(log_k: np.ndarray) -> np.ndarray:
+        return np.concatenate([A * np.exp(log_k), weighted])
+
+    start = np.full(3, np.log(K[0, 0] / len(wheels.types)))
+    found = least_squares(residuals, start, jac=jacobian, method="lm")
+    covariance = ratios @ np.linalg.pinv(found.jac.T @ found.jac) @ ratios.T
+    mean, sigma = PRIOR.copy(), PRIOR_SIGMA.copy()
+    mean[_LOADS], sigma[_LOADS] = ratios @ found.x, np.sqrt(np.diag(covariance) + _MODEL**2)
+    return Prior(mean, sigma)
 
 
 @lru_cache(maxsize=8)
