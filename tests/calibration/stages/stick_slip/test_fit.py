@@ -119,3 +119,9 @@ def test_a_wheel_declared_in_a_wrong_place_is_found(trials, found, wheel, axis):
     shift, gain = displaced(wrong, found.logarithms)
     assert gain.argmax() == wheel and np.abs(shift[wheel]).argmax() == axis
     assert -0.036 < shift[wheel, axis] < -0.012
+
+
+def test_a_base_that_no_step_can_follow_is_far_off(trials):
+    last = trials.windows[0] == 3
+    for value in (np.nan, np.inf, 1e9):
+        assert trials.variances(trials.error(np.full((len(trials.inertia), 3), value)))[last].min() > 0.1**2
