@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from calibration.numerics.compiled import njit
+from calibration.numerics.spatial import cross, dot, turned
 from calibration.robot.kinematics import unit_twists
 
 
@@ -111,22 +112,6 @@ def scratch(tree: RigidTree) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def _cross(x: np.ndarray, i: int, y: np.ndarray, j: int, out: np.ndarray, at: int) -> None:
-    """Add x[i:i + 3] x y[j:j + 3] to out[at:at + 3]."""
-    for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        out[at + a] += x[i + b] * y[j + c] - x[i + c] * y[j + b]
-
-
-@njit(cache=True, error_model="numpy")
-def _turned(me: np.ndarray, x: np.ndarray, out: np.ndarray, at: int) -> None:
-    """Add R x to out[at:at + 3], R the orientation of a body."""
-    for i in range(3):
-        for c in range(3):
-            out[at + i] += me[3 * i + c] * x[c]
-
-
-@njit(cache=True, error_model="numpy")
 def _times(me: np.ndarray, at: int, out: np.ndarray, to: int) -> None:
     """out[to:to + 6] = I me[at:at + 6], I the body's inertia."""
     for i in range(6):
@@ -134,15 +119,6 @@ def _times(me: np.ndarray, at: int, out: np.ndarray, to: int) -> None:
         for c in range(6):
             total += me[_I + 6 * i + c] * me[at + c]
         out[to + i] = total
-
-
-@njit(cache=True, error_model="numpy")
-def _dot(x: np.ndarray, i: int, y: np.ndarray, j: int) -> float:
-    """Power of a twist x[i:i + 6] and a wrench y[j:j + 6]."""
-    total = 0.0
-    for c in range(6):
-        total += x[i + c] * y[j + c]
-    return total
 
 
 @njit(cache=True, error_model="numpy")
@@ -158,12 +134,12 @@ def _place(tree: RigidTree, j: int, angle: float, up: np.ndarray, me: np.ndarray
             me[_P + i] += up[3 * i + c] * fixed[c, 3]
         me[_P + i] += up[_P + i]
     if tree.prismatic[j]:
-        _turned(me, axis, me, _S)
+        turned(me, axis, me, _S)
         for i in range(3):
             me[_P + i] += me[_S + i] * angle
         return
-    _turned(me, axis, me, _S + 3)
-    _cross(me, _P, me, _S + 3, me, _S)
+    turned(me, axis, me, _S + 3)
+    cross(me, _P, me, _S + 3, me, _S)
     s, c = np.sin(angle), 1.0 - np.cos(angle)
     for i in range(3):
         for r in range(3):
@@ -178,9 +154,9 @@ def _move(me: np.ndarray, up: np.ndarray, v: float, a: float) -> None:
     """Twist and acceleration of a body from those of the one that carries it."""
     for i in range(6):
         me[_X + i] = 0.0
-    _cross(up, _V + 3, me, _S, me, _X)
-    _cross(up, _V, me, _S + 3, me, _X)
-    _cross(up, _V + 3, me, _S + 3, me, _X + 3)
+    cross(up, _V + 3, me, _S, me, _X)
+    cross(up, _V, me, _S + 3, me, _X)
+    cross(up, _V + 3, me, _S + 3, me, _X + 3)
     for i in range(6):
         me[_V + i] = up[_V + i] + me[_S + i] * v
         me[_A + i] = up[_A + i] + me[_S + i] * a + me[_X + i] * v
@@ -190,7 +166,7 @@ def _move(me: np.ndarray, up: np.ndarray, v: float, a: float) -> None:
 def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
     """Inertia of body b about the root's origin, and the wrench that moves it."""
     m, inertia, h = tree.mass[b], tree.inertia[b], np.zeros(3)
-    _turned(me, tree.moment[b], h, _R)
+    turned(me, tree.moment[b], h, _R)
     square, at = 0.0, _I + 21  # of the angular part
     for i in range(36):
         me[_I + i] = 0.0
@@ -210,9 +186,9 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
         me[at - 3 + 6 * j + k] = me[at - 18 + 6 * k + j] = -first
     _times(me, _A, me, _F)
     _times(me, _V, me, _X)
-    _cross(me, _V + 3, me, _X, me, _F)
-    _cross(me, _V + 3, me, _X + 3, me, _F + 3)
-    _cross(me, _V, me, _X, me, _F + 3)
+    cross(me, _V + 3, me, _X, me, _F)
+    cross(me, _V + 3, me, _X + 3, me, _F + 3)
+    cross(me, _V, me, _X, me, _F + 3)
 
 
 @njit(cache=True, error_model="numpy")
@@ -232,15 +208,15 @@ def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
             B[i, c] += w[i] * w[c]
             out[0, i] += B[i, c] * me[_P + c]
         out[0, i] += me[_A + i]
-    _cross(w, _R, me, _V, out[0], _R)
-    _cross(me, _P, out[0], _R, out[0], _R + 3)
+    cross(w, _R, me, _V, out[0], _R)
+    cross(me, _P, out[0], _R, out[0], _R + 3)
     for c in range(3):
         f = out[1 + c]
         for i in range(3):
             axis[i] = me[3 * i + c]
             for r in range(3):
                 f[i] += B[i, r] * me[3 * r + c]
-        _cross(me, _P, f, _R, f, _R + 3)
+        cross(me, _P, f, _R, f, _R + 3)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             f[3 + i] += axis[j] * out[0, k] - axis[k] * out[0, j]
@@ -255,7 +231,7 @@ def _regress(tree: RigidTree, work: np.ndarray, out: np.ndarray) -> None:
         j = b + 1
         while j > 0:
             for c in range(4):
-                out[tree.column[j - 1], 4 * b + c] = _dot(work[j], _S, forces[c], _R)
+                out[tree.column[j - 1], 4 * b + c] = dot(work[j], _S, forces[c], _R)
             j = tree.parent[j - 1]
 
 
@@ -263,9 +239,9 @@ def _regress(tree: RigidTree, work: np.ndarray, out: np.ndarray) -> None:
 def _relieve(me: np.ndarray, root: np.ndarray) -> None:
     """Take what pushes a body, root[12:18], off the wrench that moves it."""
     push = np.zeros(6)
-    _turned(me, root[12:15], push, _R)
-    _turned(me, root[15:], push, _R + 3)
-    _cross(me, _P, push, _R, push, _R + 3)
+    turned(me, root[12:15], push, _R)
+    turned(me, root[15:], push, _R + 3)
+    cross(me, _P, push, _R, push, _R + 3)
     for c in range(6):
         me[_F + c] -= push[c]
 
@@ -292,9 +268,9 @@ def sample(
             _regress(tree, work, out.regressor[i])
         for j in range(k - 1, -1, -1):
             me, up, column = work[j + 1], work[tree.parent[j]], tree.column[j]
-            out.torque[i, column] = _dot(me, _S, me, _F)
+            out.torque[i, column] = dot(me, _S, me, _F)
             _times(me, _S, me, _X)
-            out.inertia[i, column] = _dot(me, _S, me, _X)
+            out.inertia[i, column] = dot(me, _S, me, _X)
             for c in range(3):
                 out.coupling[i, column, c] = me[_X + c]
             for c in range(_F, _ROW):  # the twist between is scratch
@@ -306,7 +282,7 @@ def sample(
 def _borne(work: np.ndarray, out: TreeDynamics, i: int) -> None:
     """What the root and the first joint bear."""
     first, bears = work[min(1, len(work) - 1)], np.zeros(3)
-    _cross(first, _F, first, _P, bears, _R)
+    cross(first, _F, first, _P, bears, _R)
     for r in range(6):
         out.root[i, r] = work[0, _F + r]
         for c in range(6):
