@@ -173,7 +173,7 @@ def _after(context: Context, stage: Stage) -> Context:
     """The context after a stage, with the advice that follows from its covariance."""
     absent = stage.lacks(context.data)
     if absent:
-        return context.with_findings(Verdict(stage.name, "missing", f"no {stage.name}: {absent}"))
+        return context.with_findings(Verdict(stage.name, "missing", f"not estimated: {absent}"))
     result = stage.run(context.data)
     context = _advised(context.with_result(result), result)
     return context.with_findings(*_changed(context.data)) if stage is GEOMETRY else context

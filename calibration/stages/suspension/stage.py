@@ -58,7 +58,7 @@ def fit_suspension(
     if any(v.verdict == "refused" for v in found) or usable < 2:
         if usable < 2:
             found.append(
-                Verdict(STAGE, "missing", "no suspension: it takes two trials that show the base and its load")
+                Verdict(STAGE, "missing", "not estimated: it takes two trials that show the base and its load")
             )
         return None, tuple(found)
     if not responses.plate:
