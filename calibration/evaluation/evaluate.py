@@ -30,6 +30,7 @@ from calibration.evaluation.submission import Submission
 from calibration.mocap.cluster_pose import point_of_means, poses_of, poses_of_means
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import inverse, mean, places, to_vector
+from calibration.numerics.side_by_side import side_by_side
 from calibration.prediction.foreign import check_names, registered
 from calibration.prediction.predict import predictor
 from calibration.prediction.predicted_trial import BaseMotion, PredictedTrial, Prediction
@@ -99,9 +100,7 @@ def evaluate(
     remarks += redrawn_bodies
     predict, report = predictor(estimate, dataset), progress or (lambda at, share: None)
     remarks += tuple(departures(estimate, dataset, predict.robot, read)) if role == "validation" else ()
-    scored = tuple(
-        _each(predict, Bands(estimate, dataset.description, predict.robot), dataset, read, report, submitted)
-    )
+    scored = _each(predict, Bands(estimate, dataset.description, predict.robot), dataset, read, report, submitted)
     if submitted is not None:
         pairs = (zip(one.predicted.rows, one.errors, strict=True) for one in scored)
         own = [(p, e.errors) for of_trial in pairs for p, e in of_trial if p.base == "submitted"]
@@ -139,13 +138,14 @@ def _each(
     read: tuple[Recorded, ...],
     report: Progress,
     submitted: Submission | None = None,
-) -> Iterator[_Scored]:
-    for k, (entry, trial) in enumerate(read):
+) -> list[_Scored]:
+    def scored(k: int, entry: TrialEntry, trial: MeasuredTrial | PostureMeans) -> _Scored:
         report(f"evaluating {entry.id}", k / len(read))
         if isinstance(trial, PostureMeans):
-            yield _of_means(predict, dataset, (entry, trial), submitted)
-        else:
-            yield _of_trial(predict, promised, dataset, (entry, trial), submitted)
+            return _of_means(predict, dataset, (entry, trial), submitted)
+        return _of_trial(predict, promised, dataset, (entry, trial), submitted)
+
+    return side_by_side(scored, range(len(read)), *zip(*read, strict=True))
 
 
 def _of_trial(

@@ -24,11 +24,11 @@ class Kernel:
         if self._compiled is None:
             from numba import njit as compile_
 
-            self._compiled = compile_(**self._options)(self._function)
+            self._compiled = compile_(nogil=True, **self._options)(self._function)
             known = self._function.__globals__
             for name in (self._function.__name__, *self._function.__code__.co_names):
-                if isinstance(known.get(name), Kernel):
-                    known[name] = known[name].compiled()
+                if isinstance(other := known.get(name), Kernel):  # another thread may replace it
+                    known[name] = other.compiled()
         return self._compiled
 
 

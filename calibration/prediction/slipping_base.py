@@ -216,19 +216,22 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     Returns:
         wrench, y and u, x, moved, acceleration of `BaseState`; row, state, wheels of bases and found of `SlipState`.
     """
-    w, x, own, turn = np.zeros((1, 6)), np.empty(6), np.empty((1, 6)), np.zeros((1, 4, 4))
+    w, x, own, change, turn = np.zeros((1, 6)), np.empty(6), np.empty((1, 6)), np.empty(6), np.zeros((1, 4, 4))
     row, found, driving = np.empty(COLUMNS), np.empty((4, 3)), UNDRIVEN.copy()
     for i in range(6):
         for c in range(6):
             w[0, i] += place.action[i, c] * wrench[c]
     bear(place.standing, w)
-    modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, w[0] - before.wrench, dt, x)
+    for i in range(6):
+        change[i] = w[0, i] - before.wrench[i]
+    modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, change, dt, x)
     if moving.shape[1]:
         driving = driven(tree, (dual, back), place.gravity, moving, work, room)
     after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes)
     readings = w[0], x[3:5], driving, before.rest, before.row, before.found
     step_members(after, readings, fitted, before.band, dt / STEPS, row, found)
-    own[0] = x
+    for i in range(6):
+        own[0, i] = x[i]
     for k in range(3):
         if not fitted.linear[k]:
             own[0, PLANE[k]] = found[1, k] * fitted.moves[k]
@@ -237,8 +240,11 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     shift(moved[0], turn[0], scratch)
     shift(moved[0], place.T_0_lab, scratch)
     for e in range(fitted.members):
+        state, lane = after.state[e // LANES], e % LANES
+        forward = state[ACCELERATION, lane] / fitted.members
+        sideward = state[ACCELERATION + 1, lane] / fitted.members
+        yaw = state[ACCELERATION + 2, lane] / fitted.members
         for i in range(3):
-            forward = after.state[e // LANES, ACCELERATION : ACCELERATION + 3, e % LANES] / fitted.members
-            a[0, i] += place.T_lab_0[i, 0] * forward[0] + place.T_lab_0[i, 1] * forward[1]
-            a[1, i] += place.T_lab_0[i, 2] * forward[2]
+            a[0, i] += place.T_lab_0[i, 0] * forward + place.T_lab_0[i, 1] * sideward
+            a[1, i] += place.T_lab_0[i, 2] * yaw
     return w[0], modes, x, moved, a, row, after.state, after.wheels, found

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, cast
 
 from scenarios.files import output_folder as folder
 from scenarios.files.errors import ScenarioError
-from scenarios.steps.threads import one_blas_thread
+from scenarios.steps.threads import every_core, one_blas_thread
 
 if TYPE_CHECKING:
     from calibration import Dataset, Estimate, Evaluation
@@ -90,7 +90,7 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
 
     scenario = scenario.quick() if quick else scenario
     refused: NotCalibrated | NotEnoughData | NumericalFailure | None = None
-    with folder.replacing(out, folder.RUN) as new, one_blas_thread():
+    with folder.replacing(out, folder.RUN) as new, every_core():
         _simulate(scenario, new, progress)
         try:
             estimate = _calibrate(
@@ -143,7 +143,7 @@ def calibrate(
     if unknown:
         raise ScenarioError(f"--stages: no stage {', '.join(map(repr, unknown))}; the stages are {', '.join(STAGES)}")
     folder.settle_inputs(dataset)
-    with folder.replacing(out, folder.ESTIMATE) as new, one_blas_thread():
+    with folder.replacing(out, folder.ESTIMATE) as new, every_core():
         return _calibrate(Path(dataset), new, stages, options, progress, plan_next, cross_validate=stages is None)
 
 
@@ -179,7 +179,7 @@ def evaluate(
     `estimate` is an estimate folder, an estimate.json, a URDF with its `zeros`, or predicted poses (.csv, .nc).
     """
     folder.settle_inputs(estimate, dataset)
-    with folder.updating(out, folder.EVALUATION, "evaluation.json") as new, one_blas_thread():
+    with folder.updating(out, folder.EVALUATION, "evaluation.json") as new, every_core():
         truth = None if truth is None else Path(truth)
         return _evaluate(Path(estimate), Path(dataset), new, truth, progress, zeros)
 

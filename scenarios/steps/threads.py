@@ -1,5 +1,6 @@
-"""Threads of the linear algebra libraries."""
+"""Threads of a step: one for linear algebra, one for each core this process may use for independent parts."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -11,4 +12,15 @@ def one_blas_thread() -> Iterator[None]:
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):
+        yield
+
+
+@contextmanager
+def every_core() -> Iterator[None]:
+    """`one_blas_thread`, and independent parts on all cores of this process: the same bits on any number of them."""
+    from calibration.numerics import on_cores
+
+    affinity = getattr(os, "sched_getaffinity", None)  # Linux
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    with one_blas_thread(), on_cores(cores):
         yield

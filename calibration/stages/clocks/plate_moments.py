@@ -25,6 +25,7 @@ from scipy.interpolate import CubicSpline
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import from_vector, inverse, mean, skew, to_vector
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
 from calibration.numerics.time_delay import Pair, coarse_lag
 from calibration.recording.schema import Body, Description
@@ -109,7 +110,7 @@ def model_moments(parts: Sequence[Carrier], trial: MeasuredTrial, joints: JointM
     """
     order = [trial.description.joint_names.index(name) for name in list(parts[0].model.names)[2:]]
     q = low_passed(even(joints.t, joints.q[:, order]), _CUTOFF)
-    found = [_carried(part, trial, q) for part in parts]
+    found = side_by_side(lambda part: _carried(part, trial, q), parts)
     whole, valid = sum(m[:, 0] for m, _ in found), np.logical_and.reduce([q.valid, *(v for _, v in found)])
     return Signal(q.t, np.asarray(whole), valid), np.concatenate([m[:, 1:] for m, _ in found], axis=1)
 

@@ -22,6 +22,7 @@ from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import Postures, passing_postures, static_postures
 from calibration.numerics.lie import inverse, rotation_vector
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.time_delay import Lag
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -100,15 +101,16 @@ def _postures(description: Description, trials: Sequence[Trial], robot: Clock) -
 
 def refined_lags(robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock) -> list[TrialLag]:
     """Lags of the trials that move loaded joints, around an approximate clock."""
-    lags = []
-    for trial in trials:
+
+    def found(trial: Trial) -> TrialLag | None:
         try:
-            lags.append(
-                _refined(robot, read_samples(MeasuredTrial.of(description, trial), clock, calm=True), trial.id, clock)
-            )
+            samples = read_samples(MeasuredTrial.of(description, trial), clock, calm=True)
+            return _refined(robot, samples, trial.id, clock)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
-    return lags
+            return None
+
+    return [lag for lag in side_by_side(found, trials) if lag is not None]
 
 
 def link_angles(robot: Provisional, description: Description, trial: Trial, clock: Clock) -> JointMotion:

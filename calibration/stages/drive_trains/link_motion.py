@@ -248,9 +248,9 @@ def streamed(
     """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`."""
     m, torques = samples.shape[1], np.empty((2, samples.shape[1]))
     times = np.zeros((2, m))
-    times[1] += dt
     for j in range(states.shape[1]):
         for i in range(m):
+            times[1, i] = dt
             torques[0, i] = before[TORQUE, i] + drives.offs[i, j]
             torques[1, i] = samples[TORQUE, i] + drives.offs[i, j]
         a = Drive(times[0], before[Q], before[V], torques[0], before[INERTIA])

@@ -13,6 +13,7 @@ from calibration.checks.joint_readings import wrong_links
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import from_vector, inverse
+from calibration.numerics.side_by_side import side_by_side
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
@@ -59,7 +60,7 @@ def fit_drive_trains(
     used = [trial for trial in trials if is_long(trial)]
     loads = [loads_of_trial(bare, trial, robot, hand) for trial in used]
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
-    tried = dict(_identified(bare, loads, differences, hand))
+    tried = _identified(bare, loads, differences, hand)
     trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))
     slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
     found = DriveTrains(bare.dynamics, trains, urdf, description)
@@ -103,21 +104,25 @@ def is_long(trial: Trial) -> bool:
 
 def _identified(
     bare: DriveTrains, loads: Sequence[LinkLoads], differences: Sequence[np.ndarray], hand: HandModel
-) -> Iterator[tuple[str, DriveTrain | Slip]]:
+) -> dict[str, DriveTrain | Slip]:
     tolerances = bare.description.tolerances
     C = inertial_tolerances(bare.dynamics, tolerances.link_mass, tolerances.link_com)
     root = np.linalg.cholesky(C + 1e-12 * np.eye(len(C)))
-    for joint in hand.chain.joints:
+
+    def found(joint: str) -> DriveTrain | Slip | None:
         j = bare.joints.index(joint)
         has = [k for k, y in enumerate(differences) if np.isfinite(y[:, j]).any()]
         if not has or hand.chain.is_prismatic(joint):
-            continue
+            return None
         own, seen = [loads[k] for k in has], [differences[k] for k in has]
         modes = load_modes(own, j, root)
         data, coarse = (joint_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
         offset = float(bare.dynamics.offset[j])
         train, fit = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, offset)
-        yield joint, slipped_encoder(fit) or train
+        return slipped_encoder(fit) or train
+
+    joints = hand.chain.joints
+    return {joint: x for joint, x in zip(joints, side_by_side(found, joints), strict=True) if x is not None}
 
 
 def _slipped(joint: str, slip: Slip) -> Verdict:

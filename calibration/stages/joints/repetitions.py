@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from calibration.numerics.side_by_side import side_by_side
 from calibration.options import Terms
 from calibration.recording.trial import Trial
 from calibration.stages.joints.correction import JointModels
@@ -83,12 +84,12 @@ def on_repetitions(models: JointModels, trials: Iterable[Trial], terms: Terms) -
     if not of_trials:
         return ()
     noise = models.inputs.lab.description.sigmas.encoder
-    columns = zip(models.inputs.measured, models.zero, zip(*of_trials, strict=True), strict=True)
-    return tuple(
-        found
-        for joint, zero, column in columns
-        for found in _on_repetitions(joint, float(zero), [s for s in column if s is not None], terms, noise)
-    )
+
+    def found(joint: str, zero: float, column: Sequence[Samples | None]) -> list[RegimeQuality]:
+        return [*_on_repetitions(joint, float(zero), [s for s in column if s is not None], terms, noise)]
+
+    of_joints = side_by_side(found, models.inputs.measured, models.zero, zip(*of_trials, strict=True))
+    return tuple(quality for of_joint in of_joints for quality in of_joint)
 
 
 def _on_repetitions(

@@ -17,6 +17,7 @@ from calibration.checks.joint_readings import wrong_links
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model, Parameter, Status
 from calibration.numerics.robust_covariance import ENOUGH
+from calibration.numerics.side_by_side import side_by_side
 from calibration.options import Terms
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
@@ -60,7 +61,8 @@ def fit_joint_models(
         return JointModels(inputs, zero, ()), refused
     samples = _samples(trials, inputs, hand, zero)
     quiet = [joint for joint, of_joint in samples.items() if _rms(of_joint) < _QUIET * description.sigmas.encoder]
-    tried = {joint: candidates(of_joint, terms) for joint, of_joint in samples.items() if joint not in quiet}
+    loud = {joint: of_joint for joint, of_joint in samples.items() if joint not in quiet}
+    tried = dict(zip(loud, side_by_side(lambda of_joint: candidates(of_joint, terms), loud.values()), strict=True))
     options = {joint: worthwhile(found) for joint, found in tried.items()}
     chosen = nearest_hand(description, trials, robot, hand, samples, options)
     zeros = dict(zip(inputs.measured, map(float, zero), strict=True))

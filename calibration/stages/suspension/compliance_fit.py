@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.numerics.robust_covariance import block_covariance
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import RATE
 from calibration.stages.suspension.base_response import BaseResponse
 from calibration.stages.suspension.modal_response import modes_of
@@ -128,14 +129,14 @@ def _round(
     dS, dC = directions
     qS, qC = (np.sqrt(np.diag(A)) for A in start)
     (S, C), lam = start, 1e-4
-    shares = [_share(s, S, C, dS, dC, sigma) for s in responses]
+    shares = side_by_side(lambda s: _share(s, start, directions, sigma), responses)
     cost = sum(float(s.squares.sum()) for s in shares)
     for _ in range(_STEPS):
         H, g = sum((s.H for s in shares), prior), sum(s.g for s in shares)
         step = np.linalg.solve(H + lam * np.diag(np.diag(H)), g)
         S_new = _positive(S + np.tensordot(step, dS, axes=1), qS)
         C_new = _positive(C + np.tensordot(step, dC, axes=1), qC)
-        tried = [_share(s, S_new, C_new, dS, dC, sigma) for s in responses]
+        tried = side_by_side(lambda s, at=(S_new, C_new): _share(s, at, directions, sigma), responses)
         new = sum(float(s.squares.sum()) for s in tried)
         if new < cost:
             gain, S, C, shares, cost, lam = cost - new, S_new, C_new, tried, new, max(lam / 10.0, 1e-9)
@@ -149,20 +150,24 @@ def _round(
 
 
 def _share(
-    response: BaseResponse, S: np.ndarray, C: np.ndarray, dS: np.ndarray, dC: np.ndarray, sigma: np.ndarray
+    response: BaseResponse,
+    at: tuple[np.ndarray, np.ndarray],
+    directions: tuple[np.ndarray, np.ndarray],
+    sigma: np.ndarray,
 ) -> Share:
     """Residual and derivatives of one trial."""
+    (S, C), (dS, dC) = at, directions
     f, K, step = response.forcing, np.linalg.inv(S), 1.0 / RATE
     modes = modes_of(K + f.tangent, C, f.inertia)
     x = modes.respond(f.w, step)
     rate = np.gradient(x, step, axis=0)
     rows = np.flatnonzero(response.valid)[::_STRIDE]
     J = np.zeros((len(rows), 6, len(dS)))
-    for signal, b, directions, sign in ((x @ K.T, modes.b @ K, dS, 1.0), (rate, modes.b, dC, -1.0)):
+    for signal, b, d, sign in ((x @ K.T, modes.b @ K, dS, 1.0), (rate, modes.b, dC, -1.0)):
         lagged = modes.lagged(signal, step, rows)
         paths = (modes.a[:, None, :] * b.T[None]).reshape(36, -1)  # response of axis o to force i, (o, i)
         T = (lagged.reshape(len(rows) * 6, -1) @ paths.T).real.reshape(len(rows), 6, 6, 6)
-        J = J + sign * np.tensordot(T, directions, axes=([1, 3], [2, 1]))
+        J = J + sign * np.tensordot(T, d, axes=([1, 3], [2, 1]))
     r = (response.x - x)[rows]
     r, J = (r - r.mean(axis=0)) / sigma, (J - J.mean(axis=0)) / sigma[:, None]
     A = J.reshape(-1, J.shape[2])
