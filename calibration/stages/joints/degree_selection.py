@@ -56,7 +56,7 @@ def candidates(samples: Sequence[Samples], terms: Terms, highest: int = HIGHEST)
         return tuple(found)
     basis = basis_of(kept, box(whole))
     sets = [tuple(p for p in exponents(terms, degree) if p in kept) for degree in range(highest + 1)]
-    factors = [[_factor(basis, s, rho) for rho in rho_grid()] for s in samples]
+    factors = [_factors(basis, s) for s in samples]
     new = (d for d, powers in enumerate(sets) if powers and (d == 0 or powers != sets[d - 1]))
     degrees = [d for d in new if _is_fixed(basis, sets[d], factors)]
     order = list(dict.fromkeys(c for d in degrees for c in _columns(basis, sets[d])))  # those of lower degrees first
@@ -90,10 +90,11 @@ def _columns(basis: Basis, powers: tuple[Exponent, ...]) -> list[int]:
     return own + [len(basis.powers) + c for c in own]
 
 
-def _factor(basis: Basis, samples: Samples, rho: float) -> np.ndarray:
-    """R of the QR of [M, y], (at most 2 k + 1, 2 k + 1)."""
-    M = Problem(basis(samples.theta, samples.tau), samples.velocity, samples.y).design(rho)
-    return np.asarray(np.linalg.qr(np.column_stack([M, samples.y]), mode="r"))
+def _factors(basis: Basis, samples: Samples) -> list[np.ndarray]:
+    """R of the QR of [M, y], (at most 2 k + 1, 2 k + 1), at every rho."""
+    problem = Problem(basis(samples.theta, samples.tau), samples.velocity, samples.y)
+    designs = (np.column_stack([problem.design(rho), samples.y]) for rho in rho_grid())
+    return [np.asarray(np.linalg.qr(M, mode="r")) for M in designs]
 
 
 def _of_others(factors: Sequence[np.ndarray]) -> list[np.ndarray]:
