@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveMotion, DriveTrain, drive_motion, harmonic_terms
+from calibration.stages.drive_trains.link_motion import Drive, played_means
 from calibration.stages.drive_trains.torques import LinkLoads
 
 WINDOW, COARSE = 0.1, 0.5  # [s]
@@ -84,6 +85,19 @@ class JointData:
         starts = np.clip(np.where(np.isfinite(seen := self.started(zero)), seen, 0.5 * (low + high)), low, high)
         longest = LONGEST if self.window == WINDOW else 1.5 * LONGEST
         return self.means(of.deltas(self.motion, torque, starts, longest)) - of.values[1] * off
+
+    def played(self, values: np.ndarray, z: np.ndarray, zero: np.ndarray) -> np.ndarray:
+        """`delta` (l, k) of l dead zones without inertia: g, c, f_c, f_v and link's inertia (l, 5), modes z (l, z)."""
+        m, seen, (g, c, f, _, inertia) = self.motion, self.started(zero), values.T[:, None]
+        at = m.begins[:-1]
+        base, shift = m.torque + self.modes @ z[0], (z - z[0]).T
+        torque = base[at, None] + m.a[at, None] * inertia + self.modes[at] @ shift
+        low, high = torque - f, torque + f
+        low, high = c * low + g * np.sign(low), c * high + g * np.sign(high)
+        starts = np.clip(np.where(np.isfinite(seen)[:, None], seen[:, None], 0.5 * (low + high)), low, high)
+        drive, lanes = Drive(m.t, m.q, m.v, base, m.inertia), np.ascontiguousarray(values.T)
+        found = played_means(drive, m.a, self.modes, m.begins, self.first, starts, lanes, np.ascontiguousarray(shift))
+        return np.asarray(found.T)
 
     def started(self, zero: np.ndarray) -> np.ndarray:
         """delta (m,) where each trial starts, as y less `terms @ zero` shows it; NaN where it does not."""

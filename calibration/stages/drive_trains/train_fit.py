@@ -245,12 +245,14 @@ def cost(problem: Problem, theta: np.ndarray, difference: np.ndarray, gamma: np.
 
 def derivatives(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> np.ndarray:
     """d(delta + terms gamma)/d(theta, gamma) (k, p + 5) over finite steps; rows without y are 0."""
-    here, columns = problem.deltas(theta, gamma), []
-    for j, step in enumerate(problem.prior.step):
-        moved = theta.copy()
-        moved[j] += step
-        columns.append((problem.deltas(moved, gamma) - here) / step)
-    J = np.column_stack([*columns, problem.data.terms])
+    step = problem.prior.step
+    moved = theta + np.vstack([np.zeros(len(theta)), np.diag(step)])
+    if problem.form == "dead_zone" and not problem.dynamic:
+        n = len(_PARAMETERS)
+        deltas = problem.data.played(moved[:, :n], moved[:, n:], gamma)
+    else:
+        deltas = np.array([problem.deltas(of, gamma) for of in moved])
+    J = np.column_stack([((deltas[1:] - deltas[0]) / step[:, None]).T, problem.data.terms])
     return np.where(problem.data.known[:, None], J, 0.0)
 
 

@@ -162,12 +162,13 @@ def _share(
     x = modes.respond(f.w, step)
     rate = np.gradient(x, step, axis=0)
     rows = np.flatnonzero(response.valid)[::_STRIDE]
-    J = np.zeros((len(rows), 6, len(dS)))
-    for signal, b, d, sign in ((x @ K.T, modes.b @ K, dS, 1.0), (rate, modes.b, dC, -1.0)):
-        lagged = modes.lagged(signal, step, rows)
-        paths = (modes.a[:, None, :] * b.T[None]).reshape(36, -1)  # response of axis o to force i, (o, i)
-        T = (lagged.reshape(len(rows) * 6, -1) @ paths.T).real.reshape(len(rows), 6, 6, 6)
-        J = J + sign * np.tensordot(T, d, axes=([1, 3], [2, 1]))
+    parts = []
+    for signal, b, d in ((x @ K.T, modes.b @ K, dS), (rate, -modes.b, dC)):
+        gain = np.einsum("om,pmj->jmop", modes.a, b @ d[d.any(axis=(1, 2))])
+        real = np.stack([gain.real, -gain.imag], axis=2).reshape(-1, 6 * gain.shape[3])  # as complex numbers are stored
+        lagged = modes.lagged(signal, step, rows).reshape(len(rows), -1).view(float)
+        parts.append((lagged @ real).reshape(len(rows), 6, -1))
+    J = np.concatenate(parts, axis=2)
     r = (response.x - x)[rows]
     r, J = (r - r.mean(axis=0)) / sigma, (J - J.mean(axis=0)) / sigma[:, None]
     A = J.reshape(-1, J.shape[2])

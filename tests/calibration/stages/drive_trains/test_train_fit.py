@@ -106,6 +106,17 @@ def test_derivatives_are_those_of_a_smaller_step() -> None:
     assert (J[:, 5:] == of.data.terms).all()
 
 
+def test_several_play_operators_at_once_are_each_alone() -> None:
+    of_data = data()
+    q = of_data.motion.q
+    of = problem(replace(of_data, modes=0.05 * np.column_stack([np.sin(q), np.cos(2.0 * q)])))
+    rng = np.random.default_rng(0)
+    theta = np.abs(np.append(START, [0.3, -0.2]) * rng.uniform(0.5, 2.0, (5, 7)))
+    at_once = of.data.played(theta[:, :5], theta[:, 5:], ECCENTRICITY)
+    alone = np.array([of.deltas(x, ECCENTRICITY) for x in theta])
+    np.testing.assert_allclose(at_once, alone, rtol=0.0, atol=1e-15)
+
+
 def test_a_fit_leaves_its_data_and_start_as_they_were() -> None:
     of_data, start = data(), START.copy()
     before = {name: getattr(of_data.motion, name).copy() for name in ("q", "v", "torque", "inertia")}
