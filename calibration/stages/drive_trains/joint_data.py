@@ -12,8 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from calibration.numerics.compiled import njit
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveMotion, DriveTrain, drive_motion, harmonic_terms
-from calibration.stages.drive_trains.link_motion import Drive, played_means
+from calibration.stages.drive_trains.link_motion import Drive
 from calibration.stages.drive_trains.torques import LinkLoads
 
 WINDOW, COARSE = 0.1, 0.5  # [s]
@@ -96,7 +97,7 @@ class JointData:
         low, high = c * low + g * np.sign(low), c * high + g * np.sign(high)
         starts = np.clip(np.where(np.isfinite(seen)[:, None], seen[:, None], 0.5 * (low + high)), low, high)
         drive, lanes = Drive(m.t, m.q, m.v, base, m.inertia), np.ascontiguousarray(values.T)
-        found = played_means(drive, m.a, self.modes, m.begins, self.first, starts, lanes, np.ascontiguousarray(shift))
+        found = _played_means(drive, m.a, self.modes, m.begins, self.first, starts, lanes, np.ascontiguousarray(shift))
         return np.asarray(found.T)
 
     def started(self, zero: np.ndarray) -> np.ndarray:
@@ -183,3 +184,43 @@ def _regimes(motion: DriveMotion, first: np.ndarray) -> np.ndarray:
     slides = (np.minimum.reduceat(v, first) > _SLIDES) & (np.maximum.reduceat(a, first) < _STEADY)
     rests = np.maximum.reduceat(v, first) < _RESTS
     return np.where(slides, 0, np.where(rests, REST, 1))
+
+
+@njit(cache=True, error_model="numpy")
+def _played_means(  # noqa: C901, PLR0913  compiled: arrays alone
+    drive: Drive, a: np.ndarray, modes: np.ndarray, begins: np.ndarray, first: np.ndarray, starts: np.ndarray,
+    lanes: np.ndarray, shift: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Means (k, l) over windows that begin at samples `first` (k,), of the play operators of l drives at once.
+
+    `lanes` (5, l) are g, c, f_c, f_v and the inertia that accelerations a (n,) load beside the torque, `shift` (z, l)
+    of the torque by modes (n, z), `starts` (m, l) as in `played`.
+    """
+    n, l = len(drive.q), lanes.shape[1]
+    out, x, t, w = np.zeros((len(first), l)), np.empty(l), np.empty(l), -1
+    for m in range(len(starts)):
+        for i in range(begins[m], begins[m + 1]):
+            if w + 1 < len(first) and first[w + 1] == i:
+                w += 1
+            if i == begins[m]:
+                for p in range(l):
+                    x[p] = starts[m, p]
+            else:
+                dq, torque, v, dv = drive.q[i] - drive.q[i - 1], drive.torque[i], drive.v[i], a[i]
+                for p in range(l):
+                    t[p] = torque + lanes[4, p] * dv + lanes[3, p] * v
+                for j in range(modes.shape[1]):
+                    for p in range(l):
+                        t[p] += modes[i, j] * shift[j, p]
+                for p in range(l):
+                    g, c, below, above = lanes[0, p], lanes[1, p], t[p] - lanes[2, p], t[p] + lanes[2, p]
+                    low = c * below + (g if below > 0.0 else -g if below < 0.0 else 0.0)
+                    high = c * above + (g if above > 0.0 else -g if above < 0.0 else 0.0)
+                    x[p] = min(max(x[p] + dq, low), high)
+            for p in range(l):
+                out[w, p] += x[p]
+    for w in range(len(first)):
+        since = (first[w + 1] if w + 1 < len(first) else n) - first[w]
+        for p in range(l):
+            out[w, p] /= since
+    return out

@@ -185,46 +185,6 @@ def played(drive: Drive, begins: np.ndarray, starts: np.ndarray, values: np.ndar
     return out
 
 
-@njit(cache=True, error_model="numpy")
-def played_means(
-    drive: Drive, a: np.ndarray, modes: np.ndarray, begins: np.ndarray, first: np.ndarray, starts: np.ndarray,
-    lanes: np.ndarray, shift: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Means (k, l) over windows that begin at samples `first` (k,), of the play operators of l drives at once.
-
-    `lanes` (5, l) are g, c, f_c, f_v and the inertia that accelerations a (n,) load beside the torque, `shift` (z, l)
-    of the torque by modes (n, z), `starts` (m, l) as in `played`.
-    """
-    n, l = len(drive.q), lanes.shape[1]
-    out, x, t, w = np.zeros((len(first), l)), np.empty(l), np.empty(l), -1
-    for m in range(len(starts)):
-        for i in range(begins[m], begins[m + 1]):
-            if w + 1 < len(first) and first[w + 1] == i:
-                w += 1
-            if i == begins[m]:
-                for p in range(l):
-                    x[p] = starts[m, p]
-            else:
-                dq, torque, v, dv = drive.q[i] - drive.q[i - 1], drive.torque[i], drive.v[i], a[i]
-                for p in range(l):
-                    t[p] = torque + lanes[4, p] * dv + lanes[3, p] * v
-                for j in range(modes.shape[1]):
-                    for p in range(l):
-                        t[p] += modes[i, j] * shift[j, p]
-                for p in range(l):
-                    g, c, below, above = lanes[0, p], lanes[1, p], t[p] - lanes[2, p], t[p] + lanes[2, p]
-                    low = c * below + (g if below > 0.0 else -g if below < 0.0 else 0.0)
-                    high = c * above + (g if above > 0.0 else -g if above < 0.0 else 0.0)
-                    x[p] = min(max(x[p] + dq, low), high)
-            for p in range(l):
-                out[w, p] += x[p]
-    for w in range(len(first)):
-        since = (first[w + 1] if w + 1 < len(first) else n) - first[w]
-        for p in range(l):
-            out[w, p] /= since
-    return out
-
-
 class Drives(NamedTuple):
     """Drive trains made ready for single samples, m of them in a robot of k joints.
 
