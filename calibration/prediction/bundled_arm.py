@@ -102,12 +102,18 @@ class BundledArm:
         return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < _RESTS)
 
     def at_rest(self, q_motor: np.ndarray, T_lab_base: np.ndarray | None = None) -> ArmPositions:
-        """Of readings (n, k) at rest, each for itself; the base (4, 4) where it is known."""
+        """Of readings (n, k) at rest, each for itself; the base (4, 4) where it is known.
+
+        A link trails its motor and stops on a flank: its variance is that of the two ends, not of what is between.
+        """
         still, base = np.zeros(q_motor.shape[1]), self.proper(T_lab_base)
         states, angles = zip(
             *(self._stream.begin(0.0, np.array([q, still, still]), base) for q in q_motor), strict=True
         )
-        q, variance = (np.concatenate([getattr(f, name) for f in angles]) for name in ("q", "variance"))
+        q, low, high = (np.concatenate([getattr(f, name) for f in angles]) for name in ("q", "low", "high"))
+        residual = {train.joint: train.residual for train in self.trains.trains}
+        left_out = np.array([residual.get(joint, 0.0) for joint in self.trains.joints])
+        variance = 0.25 * (high - low) ** 2 + left_out**2
         moment, torque = (np.concatenate([getattr(s, name) for s in states]) for name in ("moment", "torque"))
         return ArmPositions(q, variance, moment, torque, np.ones(q.shape, dtype=bool))
 

@@ -9,7 +9,9 @@ import pytest
 
 from calibration.estimate.plain_values import plain, restored
 from calibration.numerics.lie import from_vector
+from calibration.prediction.bundled_arm import BundledArm
 from calibration.stages.drive_trains import DriveTrain, DriveTrains, stream_of
+from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.drive_train import Quantity
 from calibration.stages.drive_trains.torques import (
     Dynamics,
@@ -114,6 +116,12 @@ def test_link_angles_lag_behind_their_motors_by_half_the_gap_at_least() -> None:
     delta = Q - found.q
     assert 3e-3 < np.abs(delta[:, 1]).max() < 3e-3 + 8e-4 * 20.0
     assert (found.low <= found.q + 1e-12).all() and (found.q <= found.high + 1e-12).all()
+
+
+def test_a_link_that_nothing_loads_stopped_on_one_of_its_flanks() -> None:
+    arm = BundledArm(trains(), ColumnBending("first", np.zeros(2), np.zeros(2)), np.zeros(2))
+    found = arm.at_rest(np.zeros((1, 2)))
+    np.testing.assert_allclose(np.sqrt(found.variance[0, 0]), 3e-3 + 0.15 * 8e-4, rtol=1e-6)
 
 
 def test_drive_trains_come_back_from_json() -> None:
