@@ -115,8 +115,8 @@ def _rows(
 def _linear(direction: Direction, suspension: Suspension) -> Direction:
     """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off.
 
-    Where slip does not explain yaw, wheels yield otherwise, and the compliance need not be better. Trials that slipped
-    too far to be predicted decide nothing: what one of them shows is chance.
+    Trials that slipped too far to be predicted decide nothing: what one of them shows is chance. Where slip does not
+    explain yaw in the others either, wheels yield otherwise: they decide, and the compliance need not be better.
     """
     held_out = dict(suspension.held_out)
     tried = held_out.get(direction.source, suspension.held_out[0][1])
@@ -124,12 +124,15 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
     plane, heave = variance[list(PLANE)], variance[list(HEAVE)]
     if direction.source not in held_out:
         return replace(direction, heave_variance=heave)
-    calm = direction.held_out.only(~direction.held_out.wild)
-    if len(tried.count) == len(direction.held_out.count):
+    judged = direction.held_out.only(~direction.held_out.wild)
+    explained = judged.r2[2] >= _WORTH
+    if not explained:
+        judged = direction.held_out
+    elif len(tried.count) == len(direction.held_out.count):
         tried = tried.only(~direction.held_out.wild)
         plane = tried.variance(np.ones(6, dtype=bool))[list(PLANE)]
-    worth = _BETTER if calm.r2[2] >= _WORTH else 1.0 / _BETTER
-    linear = tried.moves[list(PLANE)] & (plane < worth * calm.variance(direction.moved))
+    worth = _BETTER if explained else 1.0 / _BETTER
+    linear = tried.moves[list(PLANE)] & (plane < worth * judged.variance(direction.moved))
     return replace(direction, linear=linear, heave_variance=heave)
 
 

@@ -121,6 +121,16 @@ def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
     assert replace(direction, held_out=calm).moved.all() and replace(direction, held_out=wild).moved.all()
 
 
+def test_trials_that_slipped_too_far_decide_where_slip_explains_none(recorded, suspension):
+    (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    sums, count = np.ones((8, 6)), np.full(8, 100.0)
+    fair = replace(suspension, held_out=(("plate", HeldOut(0.7e-6 * sums, 1e-6 * sums, 1e-10 * sums, count)),))
+    for left, linear in ((0.5e-6, True), (0.1e-6, False)):  # of the others: they are explained by half, or well
+        error = np.concatenate([left * sums[:7, :3], 1e-4 * sums[:1, :3]])
+        own = HeldOut(error, 1e-6 * sums[:, :3], 1e-10 * sums[:, :3], count)
+        assert np.all(_linear(replace(direction, held_out=own), fair).linear == linear)
+
+
 def test_what_is_missing_is_named(recorded, suspension):
     trials = [r[0] for r in recorded[:2]]
     model, said = fit(trials, suspension, description=DESCRIPTION.model_copy(update={"wheels": ()}))
