@@ -31,8 +31,8 @@ from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.measured import blocks
 
 MEMBERS = 16
-_DRAWS = 32  # from which the members are chosen
-_UNLIKELY = 27.7  # of -2 log of the posterior above its least: chi-square of 13, 99 %
+_DRAWS = 64  # from which the members are chosen
+ROUGH = 4.0  # by which the cost varies between points next to each other: whether a wheel slides is a threshold
 LEAST = np.array([5e-6, 5e-6, 2e-5])  # [m, rad]: nothing is known better
 _DEGREES = 6.0  # nu
 _WIDER = 1.2  # variance of the band over V: what a trial in twenty shows beyond the spread of most
@@ -111,15 +111,17 @@ def plain_band(square: np.ndarray, reach: np.ndarray, noise: np.ndarray) -> Plai
 def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Members (MEMBERS, p) of the posterior, the optimum first, then draws of the normal one that the data bear.
 
-    A friction that never shows is known on one side only: draws on the other side, where it would show, are unlikely.
-    Where most draws are, the least unlikely ones are taken.
+    Such a draw costs no more than its distance squared and ROUGH: a friction that never shows is known on one side
+    only, and draws on the other side, where it would show, cost more. Where most do, those that least do are taken.
     """
     rng = np.random.Generator(np.random.PCG64(len(trials.ids)))
-    draws = rng.multivariate_normal(logarithms, covariance, size=_DRAWS, method="eigh")
+    variances, axes = np.linalg.eigh(covariance)
+    far = rng.standard_normal((_DRAWS, len(logarithms)))
+    draws = logarithms + (far * np.sqrt(np.maximum(variances, 0.0))) @ axes.T
     every = np.concatenate([draws, logarithms[None]])
     costs = np.array([trials.cost(p, e) for p, e in zip(every, trials.errors(every), strict=True)])
-    excess = costs[:-1] - costs[-1]
-    order = np.argsort(np.maximum(excess, _UNLIKELY), kind="stable")
+    excess = costs[:-1] - costs[-1] - (far**2).sum(axis=1)
+    order = np.argsort(np.maximum(excess, ROUGH), kind="stable")
     return np.concatenate([logarithms[None], draws[order[: MEMBERS - 1]]])
 
 
