@@ -13,7 +13,8 @@ OPEN = {  # as docs/limits.md says; bounds are the default robot's
         "median of swing/dynamics",
         "max of swing/dynamics",
         "share of swings with yaw R2 of .95",
-        "95 % intervals of wheel parameters",
+        "share in the 95 % band, static",
+        "front mu estimated, share of robots",
     },
 }
 ROBOTS = {"fixed": ("humanoids2024", ()), "sampled": ("humanoids2024", SAMPLED), "jolts": ("jolts", ())}
