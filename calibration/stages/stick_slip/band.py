@@ -32,7 +32,7 @@ from calibration.stages.stick_slip.measured import blocks
 
 MEMBERS = 16
 _DRAWS = 64  # from which the members are chosen
-ROUGH = 4.0  # by which the cost varies between points next to each other: whether a wheel slides is a threshold
+_ROUGH = 4.0  # by which the cost varies between points next to each other: whether a wheel slides is a threshold
 LEAST = np.array([5e-6, 5e-6, 2e-5])  # [m, rad]: nothing is known better
 _DEGREES = 6.0  # nu
 _WIDER = 1.2  # variance of the band over V: what a trial in twenty shows beyond the spread of most
@@ -111,7 +111,7 @@ def plain_band(square: np.ndarray, reach: np.ndarray, noise: np.ndarray) -> Plai
 def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Members (MEMBERS, p) of the posterior, the optimum first, then draws of the normal one that the data bear.
 
-    Such a draw costs no more than its distance squared and ROUGH: a friction that never shows is known on one side
+    Such a draw costs no more than its distance squared and a little: a friction that never shows is known on one side
     only, and draws on the other side, where it would show, cost more. Where most do, those that least do are taken.
     """
     rng = np.random.Generator(np.random.PCG64(len(trials.ids)))
@@ -121,7 +121,7 @@ def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) 
     every = np.concatenate([draws, logarithms[None]])
     costs = np.array([trials.cost(p, e) for p, e in zip(every, trials.errors(every), strict=True)])
     excess = costs[:-1] - costs[-1] - (far**2).sum(axis=1)
-    order = np.argsort(np.maximum(excess, ROUGH), kind="stable")
+    order = np.argsort(np.maximum(excess, _ROUGH), kind="stable")
     return np.concatenate([logarithms[None], draws[order[: MEMBERS - 1]]])
 
 

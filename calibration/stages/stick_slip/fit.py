@@ -7,7 +7,7 @@ curvature shows. p_(-k), the parameters without trial k, is a step of Gauss-Newt
 with them says what the model is worth on an axis of the floor's plane, and how wide its band is.
 
 A wheel that all but slides bounds its friction on one side: the optimum is where sliding starts, and its curvature is
-that of the other side. So a friction's sigma is at least half of how far it may go, alone, for a cost of RISE.
+that of the other side. So a friction's sigma is at least half of how far it may go, alone, before the cost rises by 4.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from calibration.stages.stick_slip.wheels import SlipParameters, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source
 
-RISE = 4.0  # of -2 log of the posterior: two standard deviations
+_RISE = 4.0  # of -2 log of the posterior: two standard deviations
 _PARTS = (1.0, 0.5, 0.25)  # of a step without a trial
 _REACH = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.4])  # of a friction's logarithm
 
@@ -71,7 +71,7 @@ def _one_sided(trials: Trials, best: Point) -> np.ndarray:
     for i in FRICTIONS:
         points = tried(trials, best.logarithms + np.outer(steps, np.eye(len(sigma))[i]))
         rise = np.maximum.accumulate(np.reshape([p.cost - best.cost for p in points], (2, n)), axis=1)
-        sigma[i] = 0.5 * max(np.interp(RISE, side, _REACH) for side in rise)
+        sigma[i] = 0.5 * max(np.interp(_RISE, side, _REACH) for side in rise)
     return sigma
 
 
@@ -85,9 +85,9 @@ def _others(trials: Trials, best: Point, steps: np.ndarray) -> np.ndarray:
     found = np.repeat(best.logarithms[None], len(steps), axis=0)
     least = best.cost - trials.costs(best.errors)
     for part in _PARTS:
-        points = tried(trials, best.logarithms + part * steps)
-        costs = np.array([p.cost - trials.costs(p.errors)[k] for k, p in enumerate(points)])
-        found[costs < least] = (best.logarithms + part * steps)[costs < least]
+        at = best.logarithms + part * steps
+        costs = np.array([p.cost - trials.costs(p.errors)[k] for k, p in enumerate(tried(trials, at))])
+        found[costs < least] = at[costs < least]
         least = np.minimum(least, costs)
     return found
 
