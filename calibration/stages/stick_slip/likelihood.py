@@ -8,7 +8,7 @@ the noise of the markers. Parameters are logarithms, p with a normal prior.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -104,20 +104,23 @@ class Trials:
         ids, starts = self.ids[k : k + 1], np.array([0, b - a])
         return Trials(ids, self.wheels, self.corrected, starts, drive, inertia, rest, motions, self.prior)
 
-    def simulated(self, logarithms: np.ndarray, preload: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def simulated(
+        self, logarithms: np.ndarray, preload: np.ndarray | None = None, places: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Positions (k, n, 3) since the first second of each trial, and shares of wheels that slid (k, n).
 
-        By parameters (k, p); deflections of the wheels (k, m, 2) at the start of each trial may be given.
+        By parameters (k, p); the wheels' deflections (k, m, 2) at the start of each trial, and places (k, m, 2) other
+        than declared, may be given.
         """
-        bases = bases_of(self.wheels, logarithms, self.corrected, preload)
+        bases = bases_of(self.wheels, logarithms, self.corrected, preload, places)
         x, share = simulated(self.starts, self.drive, self.inertia, bases, STEP, len(logarithms))
         for a, b in self.spans:
             x[:, a:b] -= x[:, a:b][:, self.rest[a:b]].mean(axis=1, keepdims=True)
         return x, share
 
-    def errors(self, logarithms: np.ndarray) -> list[np.ndarray]:
-        """By each of some parameters (k, p), see `error`."""
-        return [self.error(x) for x in self.simulated(logarithms)[0]]
+    def errors(self, logarithms: np.ndarray, places: np.ndarray | None = None) -> list[np.ndarray]:
+        """By each of some parameters (k, p), and places of the wheels (k, m, 2) other than declared, see `error`."""
+        return [self.error(x) for x in self.simulated(logarithms, places=places)[0]]
 
     def error(self, x: np.ndarray) -> np.ndarray:
         """Measured minus predicted x (n, 3) by window (w, WINDOW, 3), its mean taken off; 0 where it does not count."""
@@ -206,10 +209,18 @@ def body(p: SlipParameters, corrected: bool) -> np.ndarray:
     return np.array([p.body_c, p.body_cr, CORRECTION[0] if corrected else 0.0, CORRECTION[1]])
 
 
-def bases_of(wheels: WheelSet, logarithms: np.ndarray, corrected: bool, preload: np.ndarray | None = None) -> Bases:
-    """Bases of parameters (k, p), preloaded by deflections (k, m, 2)."""
+def bases_of(
+    wheels: WheelSet,
+    logarithms: np.ndarray,
+    corrected: bool,
+    preload: np.ndarray | None = None,
+    places: np.ndarray | None = None,
+) -> Bases:
+    """Bases of parameters (k, p), preloaded by deflections (k, m, 2), on wheels at other places (k, m, 2)."""
     each = [SlipParameters.of(own) for own in logarithms]
-    return at_rest(np.array([wheels.rows(p) for p in each]), np.array([body(p, corrected) for p in each]), preload)
+    sets = [wheels] * len(each) if places is None else [replace(wheels, position=own) for own in places]
+    rows = np.array([own.rows(p) for own, p in zip(sets, each, strict=True)])
+    return at_rest(rows, np.array([body(p, corrected) for p in each]), preload)
 
 
 def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], prior: Prior = WIDE) -> Trials:

@@ -25,6 +25,7 @@ from calibration.stages.stick_slip.wheels import NAMES
 
 _LONGEST = 0.7  # step of a logarithm, at most
 _DAMPING = 1e-2, 6.0, 1e-5, 1e5  # at the start, factor, least, most
+_AT_ONCE = 4  # dampings that are tried: as fast as one
 _GAIN = 0.5  # of the cost, below which a search ends
 _WIDER = np.repeat([1.0, 3.0, 10.0], 16)  # draws about an end, times their sigma
 _VALLEY = 3.0  # by which the cost of another valley is less
@@ -125,16 +126,17 @@ def stepped(trials: Trials, at: Point) -> Point:
     H_k, g_k = trials.normal(at.logarithms, at.errors, both=False)
     H = H_k.sum(axis=0) + trials.prior.information
     g = g_k.sum(axis=0) + trials.prior.information @ (at.logarithms - trials.prior.mean)
-    damping, factor, least, most = _DAMPING
+    _, factor, least, most = _DAMPING
     damping = at.damping
     while damping < most:
-        step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
-        (new,) = tried(trials, [at.logarithms + np.clip(step, -_LONGEST, _LONGEST)])
-        if new.cost < at.cost:
-            ended = at.cost - new.cost < _GAIN
-            return Point(new.logarithms, new.errors, new.cost, max(damping / factor, least), ended)
-        damping *= factor
-    return Point(at.logarithms, at.errors, at.cost, damping, True)
+        dampings = damping * factor ** np.arange(_AT_ONCE)
+        steps = [-np.linalg.solve(H + d * np.diag(np.diag(H)), g) for d in dampings]
+        new = tried(trials, at.logarithms + np.clip(steps, -_LONGEST, _LONGEST))
+        for p, d in zip(new, dampings, strict=True):
+            if p.cost < at.cost:
+                return replace(p, damping=max(d / factor, least), ended=at.cost - p.cost < _GAIN)
+        damping = dampings[-1] * factor
+    return replace(at, damping=damping, ended=True)
 
 
 def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -149,8 +151,10 @@ def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     weight = np.sqrt(trials.independent / np.maximum(trials.windows[2].sum(axis=1), 1))[:, None]
     weight = (weight / np.sqrt(trials.variances(errors)))[:, None, :]
     steps = np.repeat([DIFFERENCE, _PLACE_STEP], [n, 2 * m])
-    moved = zip(steps, np.eye(n + 2 * m), strict=True)
-    A = np.array([((_placed(trials, best, h * e) - errors) / h * weight).ravel() for h, e in moved])
+    change = np.diag(steps)
+    places = trials.wheels.position + change[:, n:].reshape(-1, m, 2)
+    moved = trials.errors(best + change[:, :n], places)
+    A = np.array([((own - errors) / h * weight).ravel() for own, h in zip(moved, steps, strict=True)])
     H, g = A @ A.T + np.diag(prior), A @ (errors * weight).ravel()
     g[:n] += prior[:n] * (best - trials.prior.mean)
     shift, chi2 = np.empty((m, 2)), np.empty(m)
@@ -160,10 +164,3 @@ def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         shift[w] = -(covariance @ g[own])[n:]
         chi2[w] = shift[w] @ np.linalg.solve(covariance[n:, n:], shift[w])
     return shift, chi2
-
-
-def _placed(trials: Trials, best: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Errors with changes (p + 2 m,) of the parameters, then of the places of the wheels."""
-    n = len(best)
-    wheels = replace(trials.wheels, position=trials.wheels.position + change[n:].reshape(-1, 2))
-    return replace(trials, wheels=wheels).errors((best + change[:n])[None])[0]
