@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from functools import update_wrapper
+from threading import RLock
 from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
+_compiling = RLock()  # threads that call a kernel first at the same time compile it once
 
 
 class Kernel:
@@ -21,15 +23,16 @@ class Kernel:
 
     def compiled(self) -> Any:
         """Numba's form of the function; in its module compiled kernels replace this one and those that it calls."""
-        if self._compiled is None:
-            from numba import njit as compile_
+        with _compiling:
+            if self._compiled is None:
+                from numba import njit as compile_
 
-            self._compiled = compile_(nogil=True, **self._options)(self._function)
-            known = self._function.__globals__
-            for name in (self._function.__name__, *self._function.__code__.co_names):
-                if isinstance(other := known.get(name), Kernel):  # another thread may replace it
-                    known[name] = other.compiled()
-        return self._compiled
+                self._compiled = compile_(nogil=True, **self._options)(self._function)
+                known = self._function.__globals__
+                for name in (self._function.__name__, *self._function.__code__.co_names):
+                    if isinstance(other := known.get(name), Kernel):
+                        known[name] = other.compiled()
+            return self._compiled
 
 
 def njit(**options: Any) -> Callable[[F], F]:

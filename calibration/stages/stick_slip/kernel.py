@@ -28,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.numerics.compiled import njit
+from calibration.numerics.side_by_side import side_by_side
 
 PLATE = 8  # first of the plate's columns of `drive`
 STEPS = 2  # of the integration to a sample
@@ -249,7 +250,6 @@ def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: n
     _advance(state.reshape(-1), wheels.reshape(-1), drive, inertia, h, n)
 
 
-@njit(cache=True, error_model="numpy")
 def simulated(
     starts: np.ndarray, drive: np.ndarray, inertia: np.ndarray, bases: Bases, h: float, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -263,17 +263,30 @@ def simulated(
         h: Length of a step [s].
         k: How many of them.
     """
-    n, m = len(inertia), bases.wheels.shape[1]
-    steps = len(drive) // n
-    x, share = np.empty((k, n, 3)), np.empty((k, n))
+    x, share = np.empty((k, len(inertia), 3)), np.empty((k, len(inertia)))
+    side_by_side(lambda a, b: _simulated(x, share, a, b, drive, inertia, bases, h), starts[:-1], starts[1:])
+    return x, share
+
+
+@njit(cache=True, error_model="numpy")
+def _simulated(  # noqa: PLR0913
+    x: np.ndarray,
+    share: np.ndarray,
+    a: int,
+    b: int,
+    drive: np.ndarray,
+    inertia: np.ndarray,
+    bases: Bases,
+    h: float,
+) -> None:
+    """Samples a to b, one trial, of `simulated`'s x and share."""
+    k, m, steps = len(x), bases.wheels.shape[1], len(drive) // len(inertia)
     for g in range(len(bases.lanes)):
         lanes = bases.lanes[g]
-        for trial in range(len(starts) - 1):
-            state, wheels = bases.state[g].copy().reshape(-1), bases.wheels[g].copy().reshape(-1)
-            for t in range(starts[trial], starts[trial + 1]):
-                _advance(state, wheels, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)
-                for l in range(min(lanes, k - LANES * g)):
-                    share[LANES * g + l, t] = state[SLID * LANES + l] / (m * steps)
-                    for i in range(3):
-                        x[LANES * g + l, t, i] = state[(_X + i) * LANES + l]
-    return x, share
+        state, wheels = bases.state[g].copy().reshape(-1), bases.wheels[g].copy().reshape(-1)
+        for t in range(a, b):
+            _advance(state, wheels, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)
+            for l in range(min(lanes, k - LANES * g)):
+                share[LANES * g + l, t] = state[SLID * LANES + l] / (m * steps)
+                for i in range(3):
+                    x[LANES * g + l, t, i] = state[(_X + i) * LANES + l]

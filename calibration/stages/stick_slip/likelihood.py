@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from calibration.numerics.compiled import njit
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_force
 from calibration.stages.stick_slip.kernel import Bases, at_rest, simulated
@@ -120,7 +121,7 @@ class Trials:
 
     def errors(self, logarithms: np.ndarray, places: np.ndarray | None = None) -> list[np.ndarray]:
         """By each of some parameters (k, p), and places of the wheels (k, m, 2) other than declared, see `error`."""
-        return [self.error(x) for x in self.simulated(logarithms, places=places)[0]]
+        return side_by_side(self.error, self.simulated(logarithms, places=places)[0])
 
     def error(self, x: np.ndarray) -> np.ndarray:
         """Measured minus predicted x (n, 3) by window (w, WINDOW, 3), its mean taken off; 0 where it does not count."""
