@@ -29,9 +29,12 @@ from calibration.prediction.second_session import registration_trials, reregiste
 from calibration.recording.dataset import Dataset, load
 from calibration.recording.schema import Role, TrialEntry
 from calibration.recording.set_apart import set_apart
+from calibration.robot.hand_uncertainty import predicted_points
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.stage import synchronise
+from calibration.verdict import Verdict
 
+_INSIDE = 0.75  # share of the markers in a 95 % band, by half a dozen postures whose errors are alike
 _ROLES: tuple[Role, ...] = ("validation", "confirmation")
 
 
@@ -60,17 +63,21 @@ def on_another_day(estimate: Estimate, folder: Path, register: int = 0) -> Estim
         return today
     if dataset.description.hand_body.is_point or dataset.description.base_body.is_point:
         raise NotEnoughData("one or two markers on a body show no pose to register it with; put three on it")
-    predict, models = predictor(today, dataset), []
+    predict, models, verdicts = predictor(today, dataset), [], list(today.verdicts)
     for model in today.models:
-        fits = model.name in predict.models and row_of(model.name).registered
-        models.append(_registered(today, model, predict, dataset, postures) if fits else model)
-    return replace(today, models=tuple(models))
+        if model.name in predict.models and row_of(model.name).registered:
+            again, verdict = _registered(today, model, predict, dataset, postures)
+            verdicts += [verdict] if model.name == today.main else []
+            models.append(again)
+        else:
+            models.append(model)
+    return replace(today, models=tuple(models), verdicts=tuple(verdicts))
 
 
 def _registered(
     estimate: Estimate, model: Model, predict: Predictor, dataset: Dataset, entries: tuple[TrialEntry, ...]
-) -> Model:
-    """The model with both marker frames fitted to the postures of these trials."""
+) -> tuple[Model, Verdict]:
+    """The model with both marker frames fitted to the postures of these trials, and what that changed."""
     robot = Compensator.of(replace(estimate, main=model.name))
     seen = [pair for entry in entries for pair in _postures(robot, model.name, predict, dataset, entry)]
     if len(seen) < 2:
@@ -87,7 +94,27 @@ def _registered(
         replace(p, value=float(values[p.name]), sigma=float(sigma[p.name])) if p.name in known else p
         for p in model.parameters
     )
-    return replace(model, parameters=parameters, covariance=covariance, combinations=())
+    moved = _moved(robot, again, q, T, np.array([m.xyz for m in dataset.description.hand_body.markers]))
+    return replace(model, parameters=parameters, covariance=covariance, combinations=()), moved
+
+
+def _moved(before: Compensator, after: Compensator, q: np.ndarray, T: np.ndarray, xyz: np.ndarray) -> Verdict:
+    """Whether the hand's markers xyz (m, 3) at poses T (n, 4, 4) are where the first day's frames have them."""
+    p = np.einsum("nij,mj->nmi", T[:, :3, :3], xyz) + T[:, None, :3, 3]
+    found = [predicted_points(robot.hand, robot.spread, xyz, q) for robot in (before, after)]
+    off, left = (np.linalg.norm(f.positions - p, axis=2) for f in found)
+    inside = float((off <= found[0].radius_95).mean())
+    message = (
+        f"the hand's markers at {len(q)} postures are {_rms_mm(off):.2f} mm rms from where the first day has them, "
+        f"{inside:.0%} in its band; {_rms_mm(left):.2f} mm with both marker bodies registered again"
+    )
+    if inside >= _INSIDE:
+        message += "; if they were not touched, do not register them: a few postures find them less exactly"
+    return Verdict("registration", "ok", message)
+
+
+def _rms_mm(distance: np.ndarray) -> float:
+    return 1e3 * float(np.sqrt((distance**2).mean()))
 
 
 def _postures(

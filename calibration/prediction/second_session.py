@@ -13,6 +13,10 @@ dg ~ N(0, Sigma_g) is the error of all that stays (placements, zeros, gears), e_
 readings and of the hand, covariance S_i, both as the calibration found them. So frames and geometry are off together:
 
     covariance of (frames, g) = A Sigma_g A' + (L w S w L', 0),    A = (-L w J_g, 1)
+
+What the frames of some days differ by from the first day's is what another one may, n days of three values d each:
+
+    s^2 = sum d^2 / (3 n - 2),    the variance of a t distribution, as so few values make it
 """
 
 from collections.abc import Sequence
@@ -24,7 +28,7 @@ from calibration.estimate.rows import row_of
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.labels import relabelled_trial
 from calibration.mocap.postures import dwell_windows
-from calibration.numerics.lie import inverse, mean
+from calibration.numerics.lie import from_vector, inverse, log6, mean
 from calibration.prediction.compensator import Compensator
 from calibration.prediction.predictor import Predictor
 from calibration.recording.dataset import Dataset
@@ -33,6 +37,7 @@ from calibration.recording.set_apart import REGISTRATION
 from calibration.recording.trial import Trial
 from calibration.robot.blocks import Frames
 from calibration.robot.hand import HandModel
+from calibration.robot.hand_uncertainty import Session
 from calibration.stages.geometry.registration import fit_frames, frame_weights
 
 
@@ -55,6 +60,19 @@ def reregistered(predict: Predictor, dataset: Dataset) -> Predictor:
         if bundled is not None and row_of(name).bundle:
             bundled = replace(bundled, hand=models[name])
     return replace(predict, models=models, bundled=bundled)
+
+
+def changes(before: HandModel, after: HandModel) -> np.ndarray:
+    """Local twists (2, 6) of base and hand marker body from one registration to another [m, rad]."""
+    pairs = ((before.base, after.base), (before.hand, after.hand))
+    return np.array([log6(inverse(from_vector(a)) @ from_vector(b)) for a, b in pairs])
+
+
+def session_of(changed: Sequence[np.ndarray]) -> Session:
+    """How far bodies may be on another day, by the changes (2, 6) that re-registrations of one day or more showed."""
+    squares = np.array(changed).reshape(-1, 2, 2, 3) ** 2
+    base, hand = np.sqrt(squares.sum(axis=(0, 3)) / (3 * len(squares) - 2)).tolist()
+    return Session(tuple(base), tuple(hand))
 
 
 def _postures(predict: Predictor, name: str, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:

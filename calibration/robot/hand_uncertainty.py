@@ -11,11 +11,13 @@ Reference: Satterthwaite, Biometrics Bulletin 1946.
 """
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.special import gammaincinv
 
 from calibration.numerics.lie import adjoint, inverse, skew
+from calibration.recording.schema import Tolerances
 from calibration.robot.hand import HandModel
 
 
@@ -23,7 +25,8 @@ from calibration.robot.hand import HandModel
 class Session:
     """How far marker body and base are from where they were, on another day; standard deviations per axis.
 
-    The defaults are those of a service robot that was put away in between: the same posture, 2 mm (rms) elsewhere.
+    The defaults are those of a service robot that was put away in between, its markers not touched: the same posture,
+    2 mm (rms) elsewhere. They are assumed; what re-registrations show is `second_session.session_of`.
 
     Attributes:
         base: Of the laboratory's frame in the base: translation [m], rotation [rad].
@@ -32,6 +35,12 @@ class Session:
 
     base: tuple[float, float] = (1e-3, 2e-3)
     hand: tuple[float, float] = (1e-3, 5e-3)
+
+    @classmethod
+    def remounted(cls, tolerances: Tolerances) -> Self:
+        """Both marker bodies put back as drawings have them: on either day off by the tolerances of a body."""
+        one = (np.sqrt(2.0) * tolerances.body_translation, np.sqrt(2.0) * tolerances.body_rotation)
+        return cls(one, one)
 
     @property
     def variances(self) -> np.ndarray:

@@ -74,6 +74,7 @@ def predict(  # noqa: PLR0913  an option each
         dataset = new / "dataset"
         notes = import_files(None, files, mapping, dataset, later=known.laboratory, progress=progress)
         today = on_another_day(known, dataset, register)
+        notes += tuple(v.message for v in today.verdicts[len(known.verdicts) :])
         save_estimate(today, new / "estimate")
         _write(new / PREDICTED, today, load(dataset))
         scored = _sees_hand(load(dataset))

@@ -1,4 +1,4 @@
-"""The band of a prediction on another day: base moved, encoders homed and markers put on anew.
+"""The band of a prediction on another day: base moved, encoders homed again and markers remounted.
 
 Robots that no method was developed on; static postures only, so that `full` is the main row.
 """
@@ -14,7 +14,13 @@ from calibration.estimate.rows import BASELINE
 from calibration.mocap import relabelled_trial
 from calibration.mocap.postures import dwell_windows, mean_poses, readings_at
 from calibration.prediction.predict import predictor
-from calibration.prediction.second_session import _postures, registration_trials, reregistered_compensator
+from calibration.prediction.second_session import (
+    _postures,
+    changes,
+    registration_trials,
+    reregistered_compensator,
+    session_of,
+)
 from calibration.robot.hand_uncertainty import Session
 from scenarios import load
 from tests.acceptance.claims import keep
@@ -25,10 +31,10 @@ STATIC = [f"twin.campaign.{name}=0" for name in ("sweep", "calibration_swing", "
 BANDS = (
     "re-registered, band of this session",
     "re-registered, Session()",
-    "as calibrated on the first day, Session()",
-    "as calibrated on the first day, Session() of remounted markers",
+    "as calibrated on the first day, Session(), which assumes markers that stay on",
+    "as calibrated on the first day, Session.remounted of the laboratory's tolerances",
+    "as calibrated on the first day, session_of re-registrations of the nine others",
 )
-REMOUNTED = Session(base=(3e-3, 6e-3), hand=(3e-3, 14e-3))  # put on twice, 2 mm with 4 and with 10 mrad each time
 
 
 def seen(dataset: Dataset, clock) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -44,18 +50,17 @@ def seen(dataset: Dataset, clock) -> Iterator[tuple[np.ndarray, np.ndarray]]:
             yield q[rows].mean(axis=0), (p - T[:3, 3]) @ T[:3, :3]
 
 
-def inside(robot: Compensator, dataset: Dataset, clock, session: Session | None) -> float:
-    """Share of markers within the radius that holds 95 %."""
-    q, p = (np.array(x) for x in zip(*seen(dataset, clock), strict=True))
-    xyz = np.array([m.xyz for m in dataset.description.hand_body.markers])
+def inside(robot: Compensator, postures: tuple[np.ndarray, ...], xyz: np.ndarray, session: Session | None) -> float:
+    """Share of markers xyz (m, 3) within the radius that holds 95 %, seen in postures as of `seen`."""
+    q, p = postures
     found = robot.points(xyz, q, session)
     return float((np.linalg.norm(found.positions - p, axis=2) <= found.radius_95).mean())
 
 
 @pytest.fixture(scope="module")
 def shares(tmp_path_factory) -> np.ndarray:
-    """Of each robot: registered anew, this day's band and any day's; as it is, any day's and remounted markers'."""
-    found = []
+    """Of each robot, the share of markers in each of the bands."""
+    robots = []
     for seed in SEEDS:
         folder = tmp_path_factory.mktemp(str(seed))
         config = load("humanoids2024", [*STATIC, "twin.campaign.confirmation=true"]).twin
@@ -66,8 +71,15 @@ def shares(tmp_path_factory) -> np.ndarray:
         assert estimate.main == "full"
         trials = [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)]
         again = reregistered_compensator(robot, *_postures(predict, BASELINE, trials), dataset.description)
-        pairs = ((again, None), (again, Session()), (robot, Session()), (robot, REMOUNTED))
-        found.append([inside(r, dataset, predict.robot, session) for r, session in pairs])
+        postures = tuple(np.array(x) for x in zip(*seen(dataset, predict.robot), strict=True))
+        robots.append((robot, again, postures, dataset.description))
+    changed, found = [changes(robot.hand, again.hand) for robot, again, *_ in robots], []
+    for k, (robot, again, postures, lab) in enumerate(robots):
+        others = session_of(changed[:k] + changed[k + 1 :])
+        days = (Session(), Session.remounted(lab.tolerances), others)
+        pairs = ((again, None), (again, Session()), *((robot, day) for day in days))
+        xyz = np.array([m.xyz for m in lab.hand_body.markers])
+        found.append([inside(r, postures, xyz, day) for r, day in pairs])
     for name, share in zip(BANDS, np.array(found).T, strict=True):
         keep(f"geometry/session/{name}", share)
     return np.array(found)
@@ -82,4 +94,4 @@ def test_reregistered_the_band_of_one_day_holds_on_another(shares):
 @pytest.mark.slow
 def test_markers_put_back_are_not_in_the_band_of_any_day_but_in_one_that_states_it(shares):
     assert shares[:, 2].mean() < 0.75
-    assert shares[:, 3].mean() >= 0.75
+    assert shares[:, 3].mean() >= 0.92 and shares[:, 4].mean() >= 0.9

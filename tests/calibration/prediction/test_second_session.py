@@ -3,11 +3,13 @@ import pinocchio as pin
 import pytest
 
 from calibration.errors import NotEnoughData
+from calibration.numerics.lie import exp6, from_vector, to_vector
 from calibration.prediction.compensator import Compensator
-from calibration.prediction.second_session import reregistered_compensator
+from calibration.prediction.second_session import changes, reregistered_compensator, session_of
 from calibration.recording.schema import Description
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
+from calibration.robot.hand_uncertainty import Session
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.geometry.registration import fit_frames
 from tests.doubles.rigid_robot import with_values
@@ -67,6 +69,22 @@ def test_postures_that_cannot_tell_both_frames_are_refused(hand, description):
     turned[:, 1] += np.linspace(0.0, 0.5, 6)
     with pytest.raises(NotEnoughData, match="about one direction only"):
         fit_frames(hand, turned, hand.poses(turned), description)
+
+
+def test_widths_of_another_day_are_those_that_registrations_showed(hand):
+    """Of two days of three values each: squares over four, not six."""
+    rng, true = np.random.default_rng(4), Session((1e-3, 2e-3), (5e-4, 5e-3))
+    days = []
+    for _ in range(400):
+        x = rng.normal(size=12) * np.sqrt(true.variances)
+        frames = [
+            to_vector(from_vector(f) @ exp6(d)) for f, d in zip((hand.base, hand.hand), x.reshape(2, 6), strict=True)
+        ]
+        days.append(changes(hand, with_values(hand, base=frames[0], hand=frames[1])))
+        np.testing.assert_allclose(days[-1], x.reshape(2, 6), atol=1e-12)
+    np.testing.assert_allclose(session_of(days).variances, true.variances, rtol=0.2)
+    wider = session_of(days[:2]).variances.sum() / np.square(days[:2]).sum(axis=(0, 2)).sum()
+    assert wider == pytest.approx(3.0 / 4.0)
 
 
 @pytest.mark.slow

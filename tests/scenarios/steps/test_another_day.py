@@ -65,13 +65,21 @@ def test_a_fit_without_a_trial_kept_aside_has_a_report(days):
     assert exit.value.code in (0, None) and (days / "lab/estimate/report.html").is_file()
 
 
-def test_markers_put_back_are_registered_with_a_few_postures(days, undrawn):
+def test_markers_put_back_are_registered_with_a_few_postures(days, undrawn, capsys):
     assert predicted(days, "remounted")[0] > 2.0
+    capsys.readouterr()
     error, _, out = predicted(days, "remounted", "--register", "6")
     assert error < 0.4
+    shown = capsys.readouterr().out
+    assert "from where the first day has them, 0% in its band" in shown and "do not register" not in shown
     again, before = (Compensator.load(f / "estimate") for f in (out, days / "lab"))
     np.testing.assert_array_equal(again.hand.chain.xi, before.hand.chain.xi)
     assert np.abs(again.hand.base - before.hand.base).max() > 1e-3
+
+
+def test_markers_that_stayed_need_no_registration(days, undrawn, capsys):
+    predicted(days, "same", "--register", "6")
+    assert "if they were not touched, do not register them" in capsys.readouterr().out
 
 
 def test_more_postures_than_there_are_and_another_robot_are_refused(days, capsys):
