@@ -32,7 +32,7 @@ _LOOK, _MANY, _TEST = "Look at results", "Many robots", "Test a calibration prog
 
 
 def _example(arguments: str) -> str:
-    return f"Example: tiago-twin {arguments}"
+    return f"\b\nExample: tiago-twin {arguments}"
 
 
 app = typer.Typer(

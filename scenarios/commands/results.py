@@ -1,5 +1,7 @@
 """The commands that look at recordings and results: `look`, `show`, `picture`, `view`."""
 
+import os
+import sys
 import webbrowser
 from enum import StrEnum
 from functools import partial
@@ -103,8 +105,22 @@ def picture(  # noqa: PLR0913  an option each
             typer.echo(f"{path}: {n} picture{'s' if n > 1 else ''} of {trial}")
 
 
+def _on_screen() -> bool:
+    """Whether somebody at a terminal has a screen to open a page on."""
+    return sys.stdout.isatty() and (sys.platform != "linux" or not {"DISPLAY", "WAYLAND_DISPLAY"}.isdisjoint(os.environ))
+
+
 def view(
     run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="An evaluated run folder, simulated or real.")],
+    open_: Annotated[
+        bool,
+        typer.Option(
+            "--open/--no-open",
+            default_factory=_on_screen,
+            show_default=False,
+            help="Open it in a browser; done on a desktop unless given.",
+        ),
+    ],
     trial: Annotated[
         str | None, typer.Option(metavar="ID", help="A held-out trial; the first that moves unless given.")
     ] = None,
@@ -112,9 +128,8 @@ def view(
     magnify: Annotated[
         float, typer.Option(min=0.0, max=1e4, metavar="M", help="Show errors and base motion M times as large.")
     ] = 20.0,
-    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open it in a browser.")] = False,
 ) -> None:
-    """Write a 3D page of a trial: robot, markers, force, predicted hands."""
+    """Write and open a 3D page of a trial: robot, markers, force, predicted hands."""
     from scenarios.commands import console
 
     page = out or run_folder / "view.html"

@@ -39,7 +39,7 @@ def error_boxes(samples: Sequence[Sample], quantity: str, floor: float | None, a
     Args:
         samples: The rows.
         quantity: What is along x, with its unit in brackets.
-        floor: Root mean square that no model can undercut, in the unit of the samples; None where not known.
+        floor: Root mean square of the instruments alone, in the unit of the samples; None where not known.
         ax: Where to draw.
     """
     _boxes(samples, ax)

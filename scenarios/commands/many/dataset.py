@@ -22,7 +22,7 @@ def dataset(  # noqa: PLR0913  an option each
     seed: Seed = None,
     overrides: Overrides = None,
 ) -> None:
-    """Simulate N sampled robots of a scenario (gears and wheels 0.5 to 1.5 of its own); run again to resume."""
+    """Simulate N robots sampled around a scenario (gears and wheels from half to 1.5 times its values); resumable."""
     from scenarios import steps
     from scenarios.commands import console
     from scenarios.datasets import run_content

@@ -10,7 +10,7 @@ from scenarios.report.results.run_results import Results
 
 FLOOR = "floor"
 MEANINGS = {row.name: row.meaning for row in LADDER} | {
-    FLOOR: "true parameters and states through the same instruments: no model can do better"
+    FLOOR: "true parameters and joint angles, base measured by its markers: what the instruments alone cost"
 }
 BASES = {
     "fixed": "base assumed fixed",
@@ -108,7 +108,7 @@ def oracle_base(steps: Iterable[Step], model: str) -> Step | None:
 
 
 def floor(steps: Iterable[Step]) -> Row | None:
-    """What no model can undercut."""
+    """The error of the instruments alone."""
     return next((s.main for s in steps if s.model == FLOOR), None)
 
 

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from threadpoolctl import threadpool_limits
@@ -46,10 +47,12 @@ def test_the_installed_command_is_this_one():
 
 @pytest.mark.parametrize("option", ["-h", "--help"])
 def test_every_command_has_help_with_an_example(tiago_twin, option):
-    names = [str(c.name or c.callback.__name__) for c in main.app.registered_commands]
-    for name in names:
+    for command in main.app.registered_commands:
+        name = str(command.name or command.callback.__name__)
         code, out, _ = tiago_twin(name, option)
-        assert (code, f"Example: tiago-twin {name}" in " ".join(out.split())) == (0, True), name
+        example = out.splitlines()[-1].strip()  # one line, to be copied
+        assert (code, example) == (0, str(command.epilog).splitlines()[-1])
+        assert example.startswith(f"Example: tiago-twin {name}")
 
 
 def test_the_version_is_that_of_the_package(tiago_twin):
@@ -148,3 +151,16 @@ def test_help_lists_every_command_in_a_group_and_offers_completion(tiago_twin):
 def test_completion_knows_the_scenarios():
     asked = {"_TIAGO_TWIN_COMPLETE": "complete_bash", "COMP_WORDS": "tiago-twin run hum", "COMP_CWORD": "2"}
     assert CliRunner().invoke(main.app, [], env=asked, prog_name="tiago-twin").output.split() == ["humanoids2024"]
+
+
+@pytest.mark.parametrize(
+    ("terminal", "options", "n"), [(False, (), 0), (True, (), 1), (True, ("--no-open",), 0), (False, ("--open",), 1)]
+)
+def test_a_view_opens_on_a_screen_and_not_in_a_pipe(terminal, options, n, monkeypatch, tiago_twin, tmp_path):
+    opened = []
+    monkeypatch.setitem(sys.modules, "scenarios.view.page", SimpleNamespace(write=lambda *_: "xyz"))
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: terminal)
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert tiago_twin("view", str(tmp_path), *options)[0] == 0
+    assert opened == [(tmp_path / "view.html").as_uri()] * n
