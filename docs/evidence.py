@@ -130,7 +130,7 @@ def prose() -> Iterator[tuple[Path, str, str]]:
     readme, limits = DOCS.parent / "README.md", DOCS / "limits.md"
     yield readme, r"unseen motion: nominal [^\]]*", f"unseen motion: {bars}"
     yield readme, r"calibrated, [\d.]+ mm on unseen motion", f"calibrated, {rows[-1][1]} mm on unseen motion"
-    yield readme, r"its markers, the error is [\d.]+ mm", f"its markers, the error is {run['floor']} mm"
+    yield readme, r"noisy markers, the error would be [\d.]+ mm", f"noisy markers, the error would be {run['floor']} mm"
     yield readme, r"for \d+ of \d+ parameters of the default run", f"for {inside} parameters of the default run"
     yield readme, r"for \d+ to \d+ % on twenty", f"for {range_} on twenty"
     yield limits, r"floor of the instruments [\d.]+ mm", f"floor of the instruments {run['floor']} mm"
