@@ -8,6 +8,7 @@ purpose, are for `base_frame` alone; all other stages use the trials in which it
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import accumulate
 
 from calibration.breakdown import Breakdowns
 from calibration.checks.changes import changes, exchanged_sides, wrong_mounts
@@ -54,6 +55,7 @@ Progress = Callable[[str, float], None]
 _STAGES: tuple[Stage, ...] = (REGISTRATION, BASE_FRAME, ARM_TOOL, SUSPENSION, GEOMETRY, WRIST_LOAD, JOINTS, BUNDLE)
 STAGES = ("clocks", *(stage.name for stage in _STAGES))
 _FRAMES = (BASE_FRAME.name, ARM_TOOL.name)  # run where there is a spin; alone where the arm only ever posed
+_LONG = {"bundle": 12.0}  # time of a stage over that of a short one, for its share of the progress [-]
 _NO_CLOCKS = (Verdict("clocks", "missing", "posture means only: there is no time, and no clock to estimate"),)
 
 
@@ -109,17 +111,18 @@ def _calibrated(
     context = Context(data, _empty(dataset, data.options)).with_findings(*findings)
     if context.data.rejected:
         return _explained(context, means).estimate
-    report("clocks", 0.2)
+    report("clocks", 0.1)
     context = _synchronised(context, means)
     if context.data.rejected and not context.data.clocks:
         return context.estimate
     fits = [stage for stage in _STAGES if stage.name in wanted]
     if not fits:
         return context.estimate
-    report("postures", 0.5)
+    report("postures", 0.15)
     context = replace(context, data=with_postures(context.data, pairs, means))
-    for k, stage in enumerate(fits):
-        report(stage.name, 0.55 + 0.45 * k / len(fits))
+    parts = list(accumulate((_LONG.get(stage.name, 1.0) for stage in fits), initial=0.0))
+    for stage, part in zip(fits, parts[:-1], strict=True):
+        report(stage.name, 0.2 + 0.75 * part / parts[-1])
         context = _after(context, stage)
     if context.data.rejected:
         context = _explained(context, means)

@@ -14,6 +14,7 @@ from scenarios import load
 from scenarios.commands.main import app
 from scenarios.files import registry
 from scenarios.files.value_paths import value_paths
+from scenarios.report.results.parameters import KINDS
 from twin import laboratory
 from twin.rendering import picture
 
@@ -35,6 +36,26 @@ FACES = (
     "mjcf",
 )
 DEFAULT = "humanoids2024"
+MEANINGS = {
+    "geometry": "twist (x, y, z, rx, ry, rz) of each joint placement, on the right: M exp6(xi)",
+    "frame": "rigid transform `frame.A.B` = T_A_B, translation and rotation vector; of a marker body: the twist of its "
+    "placement on its link",
+    "encoder": "reading at angle zero, cosine and sine of the error once and twice per turn, of the motor or link side",
+    "backlash": "total width of the dead zone between motor and link",
+    "gear": "compliance is deflection over torque; damping, inertias and servo gains of the drive",
+    "friction": "Coulomb and viscous friction on the link side",
+    "flexibility": "stiffness and damping of the column or of a link, about x and y",
+    "link": "relative error of the mass, shift (cx, cy, cz) of the centre of mass in the link's axes",
+    "payload": "mass, centre of mass and edge lengths of the payload",
+    "suspension": "stiffness k and damping c of each wheel's bushing, along x, y, z and about rx, ry, rz",
+    "contact": "normal stiffness kn and damping bn, friction coefficient mu of each wheel on the floor",
+    "marker": "position of a marker in the frame of its body",
+    "clock": "offset and drift of an instrument: t_mocap = t (1 + drift) + offset",
+    "mocap": "noise and errors of the motion capture",
+    "plate": "noise and errors of the force plate",
+    "wrist": "noise and errors of the wrist's force-torque sensor",
+    "log": "errors of the robot's log",
+}
 
 
 def table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -59,11 +80,21 @@ def configuration() -> str:
 
 
 def parameters() -> str:
-    """Names, units and values of the truth of the default robot."""
-    truth = laboratory(load(DEFAULT).twin, load(DEFAULT).seed).twin.truth
-    rows = ((f"`{p.name}`", p.unit, f"{p.value:.6g}") for p in truth)
-    text = "Names and units in `truth.json`, `estimate.json` and `score.json`; values of the default robot."
-    return f"# Parameters\n\n{text}\n\n{table(('name', 'unit', 'value'), rows)}\n"
+    """Names, meanings, units and values of the truth of the default robot."""
+    lab = laboratory(load(DEFAULT).twin, load(DEFAULT).seed)
+    truth = (*lab.twin.truth, *(p for instrument in lab.instruments for p in instrument.parameters()))
+    parts = [
+        "# Parameters\n\nNames and units in `truth.json`, `estimate.json` and `score.json`; values are those of the "
+        "default robot.\n"
+    ]
+    for kind, meaning in MEANINGS.items():
+        rows = [(f"`{p.name}`", p.unit, f"{p.value:.6g}") for p in truth if p.name.split(".")[0] == kind]
+        if rows:
+            values = table(("name", "unit", "value"), rows)
+            parts.append(f"## {KINDS[kind].capitalize()}\n\n`{kind}.*`: {meaning}.\n\n{values}\n")
+    if unknown := {p.name.split(".")[0] for p in truth} - set(MEANINGS):
+        raise SystemExit(f"docs/reference.py: say what these parameters are: {sorted(unknown)}")
+    return "\n".join(parts)
 
 
 def api() -> str:

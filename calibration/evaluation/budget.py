@@ -28,7 +28,7 @@ _REMEDY = {
     BASE: "measure the base while the robot works",
     JOINTS: "read link-side encoders while the robot works",
     CLOCK: "synchronise robot and motion capture by a common trigger",
-    GEOMETRY: "record more postures, as design plans them",
+    GEOMETRY: "record more postures, chosen by the command design",
     ARM: "record link-side encoders in a validation trial: they separate joints from geometry",
 }
 

@@ -107,7 +107,9 @@ def picture(  # noqa: PLR0913  an option each
 
 def _on_screen() -> bool:
     """Whether somebody at a terminal has a screen to open a page on."""
-    return sys.stdout.isatty() and (sys.platform != "linux" or not {"DISPLAY", "WAYLAND_DISPLAY"}.isdisjoint(os.environ))
+    return sys.stdout.isatty() and (
+        sys.platform != "linux" or not {"DISPLAY", "WAYLAND_DISPLAY"}.isdisjoint(os.environ)
+    )
 
 
 def view(

@@ -15,7 +15,7 @@ class Scenario(BaseModel):
     Attributes:
         name: Its name.
         description: One line.
-        seed: Root of all randomness.
+        seed: Random seed; the same seed gives the same bytes.
         twin: Robot and laboratory.
         calibration: What is chosen about the calibration.
     """

@@ -1,7 +1,7 @@
 """report.html and the figures beside it: the same results give the same bytes, wherever the run folder is."""
 
 import base64
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -49,7 +49,7 @@ class Numbers:
         return self.before.get(name, 0)
 
 
-def write(run_dir: Path | str) -> None:
+def write(run_dir: Path | str, progress: Callable[[str, float], None] = lambda section, share: None) -> None:
     """Write RUN/report.html and RUN/figures/*.svg from what is saved in RUN.
 
     Raises:
@@ -59,7 +59,10 @@ def write(run_dir: Path | str) -> None:
     run = Path(run_dir)
     view = run_view(read(run))
     sections = [section(view) for section in (SECTIONS if view.steps else UNEVALUATED)]
-    drawings = {name: _drawing(name, drawn) for one in sections for name, drawn in one.figures().items()}
+    drawings: dict[str, Drawing | None] = {}
+    for k, one in enumerate(sections):
+        progress(one.title, (1 + k) / (2 + len(sections)))
+        drawings |= {name: _drawing(name, drawn) for name, drawn in one.figures().items()}
     page = render(view, sections, {name: drawing for name, drawing in drawings.items() if drawing is not None})
     folder = run / "figures"
     if folder.is_symlink():

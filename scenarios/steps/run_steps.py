@@ -10,6 +10,7 @@ Importing this module is cheap: the engines are imported by the step that needs 
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -297,4 +298,7 @@ def _report(run_folder: Path, progress: Progress) -> None:
 
     progress("report", "", 0.0)
     is_refused = (run_folder / page.REASON).is_file() and not (run_folder / "evaluation.json").is_file()
-    (page.write_refusal if is_refused else page.write)(run_folder)
+    if is_refused:
+        page.write_refusal(run_folder)
+    else:
+        page.write(run_folder, partial(progress, "report"))

@@ -9,7 +9,7 @@ and the instrument, so that the files do not depend on the number of threads.
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import numpy as np
@@ -63,18 +63,21 @@ def record(
     motions = schedule(config.campaign, mjcf.model(), seed)
     later = second_session(lab) if any(m.role == CONFIRMATION for m in motions) else lab
     starts = EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
-    entries, done, total = [], 0.0, sum(m.duration for m in motions)
+    done, total = 0.0, sum(m.duration for m in motions)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         sessions = (later if m.role == CONFIRMATION else lab for m in motions)
         jobs = [
             pool.submit(_one, s, m, float(t), out, watch) for s, m, t in zip(sessions, motions, starts, strict=True)
         ]
+        motion_of = dict(zip(jobs, motions, strict=True))
         try:
-            for motion, job in zip(motions, jobs, strict=True):
-                entries.append(job.result())
-                done += motion.duration
+            for job in as_completed(jobs):
+                if job.exception():
+                    break
+                done += motion_of[job].duration
                 if progress:
-                    progress(f"{motion.id} ({motion.duration:.0f} s)", done / total)
+                    progress(f"{motion_of[job].id} ({motion_of[job].duration:.0f} s)", done / total)
+            entries = [job.result() for job in jobs]
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

@@ -29,13 +29,13 @@ class Instruments:
 
     Attributes:
         bodies: Marker clusters by name.
-        mocap_rate: [Hz].
-        marker_noise: Per axis [m].
-        plate_rate: [Hz].
-        plate_force_noise: Per axis [N].
-        plate_moment_noise: Per axis [N.m].
-        robot_rate: [Hz].
-        current_quantum: [A].
+        mocap_rate: Rate of the motion capture [Hz].
+        marker_noise: Standard deviation per axis and sample [m].
+        plate_rate: Rate of the force plate [Hz].
+        plate_force_noise: Standard deviation per axis and sample [N].
+        plate_moment_noise: Standard deviation per axis and sample [N.m].
+        robot_rate: Rate of the robot's log [Hz].
+        current_quantum: Step of the motor currents [A].
         link_encoders: Absolute encoders.
         robot_clock: The robot's.
         plate_clock: The plate's.

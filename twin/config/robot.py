@@ -21,17 +21,17 @@ class ArmJoint(Gear):
 
     Attributes:
         gap: Total backlash [rad].
-        stiffness: Of the mesh in contact [N.m/rad].
-        damping: Of the mesh in contact [N.m.s/rad].
-        coulomb: Friction of the link side [N.m].
-        viscous: Friction of the link side [N.m.s/rad].
-        rotor_inertia: Reflected to the joint [kg.m2].
+        stiffness: Mesh stiffness in contact [N.m/rad].
+        damping: Mesh damping in contact [N.m.s/rad].
+        coulomb: Coulomb friction on the link side [N.m].
+        viscous: Viscous friction on the link side [N.m.s/rad].
+        rotor_inertia: Rotor inertia, reflected to the joint [kg.m2].
         servo_stiffness: Position gain on the motor side [N.m/rad].
-        link_inertia: Of the output gear, fixed to the link [kg.m2].
+        link_inertia: Inertia of the output gear, fixed to the link [kg.m2].
         servo_damping: Velocity gain on the motor side [N.m.s/rad]; None: 1.2 sqrt(servo_stiffness rotor_inertia).
         offset: Motor encoder's reading at true zero [rad].
-        quantum: Of the motor encoder, at the joint [rad].
-        torque_per_ampere: Of the drive, at the joint [N.m/A].
+        quantum: Step of the motor encoder, at the joint [rad].
+        torque_per_ampere: Torque per motor current, at the joint [N.m/A].
     """
 
     gap: Annotated[float, Field(ge=0.0, le=0.1), DRAWN]
@@ -68,12 +68,12 @@ class Torso:
     """The torso lift, driven without backlash, and its column's bending.
 
     Attributes:
-        quantum: Of the motor encoder [m].
-        force_per_ampere: [N/A].
-        servo_stiffness: [N/m].
-        rotor_inertia: Reflected [kg].
-        bending_stiffness: About x and y [N.m/rad].
-        bending_damping: [N.m.s/rad].
+        quantum: Step of the motor encoder [m].
+        force_per_ampere: Force per motor current [N/A].
+        servo_stiffness: Position gain [N/m].
+        rotor_inertia: Rotor inertia, reflected to the lift [kg].
+        bending_stiffness: Of the column, about x and y [N.m/rad].
+        bending_damping: Of the column, about x and y [N.m.s/rad].
     """
 
     quantum: Positive
@@ -89,15 +89,15 @@ class Widths:
     """What differs from one robot of the series to the next, standard deviations unless stated.
 
     Attributes:
-        placement_translation: Each joint placement, per axis [m].
-        placement_rotation: Each joint placement, per axis [rad].
-        link_mass: Relative [-].
-        link_com: Per axis [m].
-        mount_translation: Where the arm is bolted on, per axis, on top of its first joint's placement [m].
-        mount_rotation: The same, per axis [rad].
+        placement_translation: Of each joint placement, per axis [m].
+        placement_rotation: Of each joint placement, per axis [rad].
+        link_mass: Of each link's mass, relative [-].
+        link_com: Of each link's centre of mass, per axis [m].
+        mount_translation: Of where the arm is mounted, per axis, in addition to its first joint's placement [m].
+        mount_rotation: Of how the arm is mounted, per axis [rad].
         spread: Half width of the uniform factor on gap, offset, stiffness and friction of each gear and on stiffness
             and friction of each type of wheel [-]; 0 leaves them as written.
-        gaps_and_offsets: The same of gaps and offsets alone, where it is wider than `spread` [-].
+        gaps_and_offsets: The same for gaps and offsets alone, used where wider than `spread` [-].
         makes: Arms of other makes, of which a robot has one: masses of its links over the datasheet's [-], 1 where
             none is given. Without any, the datasheet's.
     """

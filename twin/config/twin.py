@@ -77,7 +77,22 @@ class Session:
 
 @dataclass(frozen=True, config=STRICT)
 class Datasheet:
-    """Tolerances declared to the laboratory, standard deviations; see `calibration.schema.Tolerances`."""
+    """Tolerances declared to the laboratory, standard deviations; see `calibration.schema.Tolerances`.
+
+    Attributes:
+        joint_translation: Joint placement, per axis [m].
+        joint_rotation: Joint placement, per axis [rad].
+        encoder_offset: Zero of the motor encoder [rad].
+        joint_play: Backlash: motor-side reading minus joint angle, offset apart [rad].
+        body_translation: Marker cluster on its link, per axis [m].
+        body_rotation: Marker cluster on its link, per axis [rad].
+        link_mass: Relative to the link's mass [-].
+        link_com: Centre of mass, per axis [m].
+        joint_delay: Median delay of a link behind its motor by viscous friction [s].
+        joint_delay_spread: Standard deviation of the delay's logarithm [-].
+        joint_windup: Dry friction over stiffness of a gear [rad].
+        payload_mass: Mass of the payload [kg].
+    """
 
     joint_translation: FixedPositive
     joint_rotation: FixedPositive
@@ -95,25 +110,7 @@ class Datasheet:
 
 @dataclass(frozen=True, config=STRICT)
 class RobotConfig:
-    """A robot and its laboratory.
-
-    Attributes:
-        arm: Arm joints by name, base to tip.
-        torso: The lift and its column.
-        base: Wheels and floor.
-        payload: In the hand.
-        widths: What is sampled.
-        instruments: The laboratory.
-        campaign: What is recorded.
-        datasheet: What is declared.
-        timestep: Of the simulation [s].
-        gear_form: dead_zone: load torque decides the flank; friction_held: friction does, and the mesh slips.
-        friction_held: What that form adds, by joint; joints not named keep the dead zone.
-        coupled_wrist: Whether arm_6 and arm_7 are driven by one differential.
-        departures: Disturbances that no model of the calibration contains.
-        session: What changes until the confirmation.
-        defects: Further defects of any kind that `twin.defects` knows, applied last, in this order.
-    """
+    """A robot and its laboratory; fields: `TwinConfig`."""
 
     arm: Arm
     torso: Torso
@@ -167,7 +164,25 @@ class RobotConfig:
 
 @dataclass(frozen=True, config=STRICT)
 class TwinConfig(RobotConfig):
-    """The values of a scenario: nominal ones and distributions, which a dataset may describe."""
+    """The values of a scenario: nominal ones and distributions, which a dataset may describe.
+
+    Attributes:
+        arm: Arm joints by name, base to tip.
+        torso: The lift and its column.
+        base: Wheels and floor.
+        payload: In the hand.
+        widths: What is sampled.
+        instruments: The laboratory.
+        campaign: What is recorded.
+        datasheet: What is declared.
+        timestep: Time step of the simulation [s].
+        gear_form: What decides the flank: load torque (`dead_zone`), or friction, with a mesh that slips.
+        friction_held: What that form adds, by joint; joints not named keep the dead zone.
+        coupled_wrist: Whether arm_6 and arm_7 are driven by one differential.
+        departures: Disturbances that no model of the calibration contains.
+        session: What changes until the confirmation.
+        defects: Further defects of any kind that `twin.defects` knows, applied last, in this order.
+    """
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -42,13 +42,13 @@ class Gear(Defect):
     Attributes:
         joint_name: The joint.
         gap: Total backlash [rad].
-        stiffness: Of the mesh in contact [N.m/rad].
-        damping: Of the mesh in contact [N.m.s/rad].
-        coulomb: Friction of the link side [N.m].
-        viscous: Friction of the link side [N.m.s/rad].
-        rotor_inertia: Reflected to the joint [kg.m2].
+        stiffness: Mesh stiffness in contact [N.m/rad].
+        damping: Mesh damping in contact [N.m.s/rad].
+        coulomb: Coulomb friction on the link side [N.m].
+        viscous: Viscous friction on the link side [N.m.s/rad].
+        rotor_inertia: Rotor inertia, reflected to the joint [kg.m2].
         servo_stiffness: Position gain on the motor side [N.m/rad].
-        link_inertia: Of the output gear, fixed to the link [kg.m2].
+        link_inertia: Inertia of the output gear, fixed to the link [kg.m2].
         servo_damping: Velocity gain on the motor side [N.m.s/rad]; None: 1.2 sqrt(servo_stiffness rotor_inertia).
     """
 

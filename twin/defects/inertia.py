@@ -53,9 +53,9 @@ class Payload(Defect):
     """A box in the hand; the laboratory is given its nominal values.
 
     Attributes:
-        mass: [kg].
-        com: In the axes of its link [m].
-        size: Edge lengths [m].
+        mass: Mass [kg].
+        com: Centre of mass in the axes of its link [m].
+        size: Edge lengths of the box [m].
         com_error: Standard deviation of the true centre of mass, per axis [m].
         link: Link that carries it.
     """

@@ -21,7 +21,12 @@ from twin.truth import Parameter
 
 @validated(frozen=True, config=STRICT)
 class ClockSetting:
-    """t_mocap = t (1 + drift) + offset: offset [s], drift [-]."""
+    """t_mocap = t (1 + drift) + offset.
+
+    Attributes:
+        offset: Offset of the clock [s].
+        drift: Drift of the clock [-].
+    """
 
     offset: Value
     drift: Annotated[float, Field(ge=-1e-3, le=1e-3), DRAWN]

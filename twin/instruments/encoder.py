@@ -18,9 +18,9 @@ class LinkEncoders:
     """Absolute encoders on the link side, standard deviations of what differs among them.
 
     Attributes:
-        offset: Zero [rad].
-        once: Amplitude once per turn [rad].
-        twice: Amplitude twice per turn [rad].
+        offset: Standard deviation of the zero [rad].
+        once: Amplitude of the error once per turn [rad].
+        twice: Amplitude of the error twice per turn [rad].
         quantum: Step of the reading [rad].
     """
 
@@ -35,8 +35,8 @@ class MotorEncoders:
     """Eccentricity of the motor-side encoders as seen at the joint, standard deviations of what differs among them.
 
     Attributes:
-        once: Amplitude once per turn of the joint [rad].
-        twice: Amplitude twice per turn [rad].
+        once: Amplitude of the error once per turn of the joint [rad].
+        twice: Amplitude of the error twice per turn [rad].
     """
 
     once: NonNegative = 0.0

@@ -28,13 +28,13 @@ class PlateErrors:
     """Of the force plate, in its own axes; widths are standard deviations between plates.
 
     Attributes:
-        gain: Of each diagonal entry of the gain matrix about 1 [-].
-        crosstalk: Of each other entry, relative; a length of 1 m relates forces and moments [-].
-        force_drift: Of the offset's rate [N/s].
-        moment_drift: Of the offset's rate [N.m/s].
-        force_resolution: Step [N].
-        moment_resolution: Step [N.m].
-        cutoff: Of the anti-alias filter, Butterworth of order 2 [Hz]; 0: none.
+        gain: Standard deviation of each diagonal entry of the gain matrix, mean 1 [-].
+        crosstalk: Standard deviation of each other entry [-]; a length of 1 m relates forces and moments.
+        force_drift: Standard deviation of the drift rate of forces [N/s].
+        moment_drift: Standard deviation of the drift rate of moments [N.m/s].
+        force_resolution: Step of the force readings [N]; 0: none.
+        moment_resolution: Step of the moment readings [N.m]; 0: none.
+        cutoff: Cutoff of the anti-alias filter, Butterworth of order 2 [Hz]; 0: none.
     """
 
     gain: NonNegative = 0.0

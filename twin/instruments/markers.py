@@ -98,7 +98,7 @@ class MarkerBody:
         link: The link that carries it; the body's frame is nominally the link's.
         markers: Nominal position of each marker in that frame [m].
         translation: Standard deviation of the cluster's placement, per axis [m].
-        rotation: [rad].
+        rotation: Standard deviation of the cluster's orientation, per axis [rad].
         marker: Standard deviation of each marker within its cluster, per axis [m].
     """
 

@@ -39,12 +39,12 @@ class MocapErrors:
     Attributes:
         scale: Relative error of all lengths [-].
         bias: Standard deviation of a smooth field of position errors, per axis [m].
-        bias_length: Over which that field changes [m].
-        latency: From exposure to time stamp [s].
-        cameras: Where they are [m]; a marker that fewer than two see past the arm is lost. None: all is seen.
-        arm_radius: Of what hides markers [m].
-        swaps: Times per minute that two markers of a body exchange labels [1/min].
-        swap_duration: Of each [s].
+        bias_length: Length over which that field changes [m].
+        latency: Delay from exposure to time stamp [s].
+        cameras: Positions of the cameras [m]; a marker that fewer than two see past the arm is lost. None: all is seen.
+        arm_radius: Radius of the arm where it hides markers [m].
+        swaps: How often two markers of a body exchange labels [1/min].
+        swap_duration: Duration of each exchange [s].
     """
 
     scale: Small = 0.0

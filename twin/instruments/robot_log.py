@@ -28,10 +28,10 @@ class LogErrors:
 
     Attributes:
         jitter: Standard deviation of the stamps about the ticks of the robot's clock [s].
-        latency: From sampling to time stamp [s].
-        velocity_cutoff: Of the velocity's first-order low-pass [Hz]; 0: none.
-        dropouts: Times per minute that messages are lost [1/min].
-        dropout_duration: Of each [s].
+        latency: Delay from sampling to time stamp [s].
+        velocity_cutoff: Cutoff of the velocity's first-order low-pass [Hz]; 0: none.
+        dropouts: How often messages are lost [1/min].
+        dropout_duration: Duration of each loss [s].
     """
 
     jitter: FixedNonNegative = 0.0

@@ -22,10 +22,10 @@ class WristSensor:
     """The force-torque sensor between wrist and hand, read with the encoders; widths are between sensors.
 
     Attributes:
-        force_noise: Per axis and sample [N].
-        moment_noise: Per axis and sample [N.m].
-        force_resolution: Step [N].
-        moment_resolution: Step [N.m].
+        force_noise: Standard deviation per axis and sample [N].
+        moment_noise: Standard deviation per axis and sample [N.m].
+        force_resolution: Step of the force readings [N].
+        moment_resolution: Step of the moment readings [N.m].
         force_offset: Standard deviation of the zero [N].
         moment_offset: Standard deviation of the zero [N.m].
     """

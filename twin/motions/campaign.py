@@ -53,9 +53,9 @@ class Driving:
         forms: kinematic: the base is carried along its path, no physics; wheels: by its own wheels, on the floor.
         spin_rests: Rests of a spin, evenly over one turn.
         drive_rests: Rests of a drive.
-        stride: From rest to rest of a drive [m].
-        yaw_rate: Of a spin [rad/s].
-        speed: Of a drive [m/s].
+        stride: Distance from rest to rest of a drive [m].
+        yaw_rate: Yaw rate of a spin [rad/s].
+        speed: Speed of a drive [m/s].
         ramp: Duration of the velocity ramps [s]: one period of the base on its wheels, which leaves it still.
     """
 
@@ -74,20 +74,20 @@ class Campaign:
 
     Attributes:
         ramp: Duration of the velocity ramp that starts and stops a motion [s].
-        posture_ramp: The same of a move between postures, which a laboratory plays softly [s]; None: `ramp`.
+        posture_ramp: The same for moves between postures [s]; None: `ramp`.
         rest: Rest at the start and end of each trial [s].
-        speed: Of moves between postures [rad/s].
+        speed: Largest joint speed between postures [rad/s].
         dwell: Rest in each static posture [s].
-        calibration_postures: Number of.
-        validation_postures: Number of.
+        calibration_postures: Number of static postures for the calibration.
+        validation_postures: Number of static postures kept aside.
         given_postures: Calibration postures [m, rad] as `tiago-twin design` chooses them, the lift first, instead of
             `calibration_postures` sampled ones.
-        given_approaches: For each of them the sign of each joint's last motion before it rests, by way of a point
-            0.05 rad (the lift 5 mm) before it; 0: it does not matter. Empty: straight from the last.
+        given_approaches: For each of these postures the sign of each joint's last motion before it rests, by way of a
+            point 0.05 rad (the lift 5 mm) before it; 0: it does not matter. Empty: straight from the last.
         sweep: Duration of each one-joint sweep [s]; 0: no sweeps.
         calibration_swing: Duration of each calibration swing [s]; 0: none.
         validation_swing: Duration of each validation swing [s]; 0: none.
-        pause: Between trials, on every clock [s].
+        pause: Pause between trials, on every clock [s].
         payloads: Further masses [kg] with which the first validation swing is repeated.
         push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed again.

@@ -33,9 +33,9 @@ class PlatePlace:
     """Where the plate lies against its nominal place, as surveyed: it is declared.
 
     Attributes:
-        shift: Of its centre along the lab's x and y [m].
-        height: Of its surface above the floor around it [m]; the robot stands on it.
-        yaw: About the vertical [rad].
+        shift: Shift of its centre along the lab's x and y [m].
+        height: Height of its surface above the floor around it [m]; the robot stands on it.
+        yaw: Rotation about the vertical [rad].
     """
 
     shift: tuple[Annotated[float, Field(ge=-0.5, le=0.5)], Annotated[float, Field(ge=-0.5, le=0.5)]] = (0.0, 0.0)

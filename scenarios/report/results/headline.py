@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from calibration.prediction import BASELINE, NOMINAL
 from scenarios.report.results.formatting import error
 from scenarios.report.results.ladder import BASES, FLOOR, Step, floor, headline_model, oracle_base, predictive
-from scenarios.report.results.result_files import Row
+from scenarios.report.results.result_files import Cause, Row
 from scenarios.report.results.run_results import Results
 
 _NBSP = "\N{NO-BREAK SPACE}"
@@ -83,7 +83,7 @@ def headline(results: Results, steps: Sequence[Step]) -> Headline:
     shares = tuple(Share(s.cause, s.size_mm) for s in budget.shares if s.size_mm > 0.0) if budget else ()
     coarse = _shares(steps, best) if best else ()
     shares = shares or coarse
-    gains = tuple(NextStep(s.remedy, s.gain_mm) for s in budget.next_steps) if budget else ()
+    gains = tuple(_from_budget(budget.next_steps, steps, best)) if budget else ()
     refused = tuple(NextStep(f"{n.stage}: {n.message}", None) for n in found if n.level == "refused")
     others = _next_steps(steps, best, found, gains) or tuple(_worth(steps, best, coarse)) or tuple(to_record(found))
     ranked = (*refused, *others)[:_STEPS]
@@ -126,6 +126,14 @@ def _shares(steps: Sequence[Step], best: Step) -> tuple[Share, ...]:
         Share(_FLOOR, last),
     )
     return tuple(sorted((share for share in found if share.size > 0.0), key=lambda share: -share.size))
+
+
+def _from_budget(found: Sequence[Cause], steps: Sequence[Step], best: Step | None) -> Iterator[NextStep]:
+    """Remedies of the budget; the base as it was measured has to be better than the predicted one."""
+    given = None if best is None else oracle_base(steps, best.model)
+    for share in found:
+        if share.cause != "base" or given is None or best is None or better(given.main, best.main):
+            yield NextStep(share.remedy, share.gain_mm)
 
 
 def _next_steps(

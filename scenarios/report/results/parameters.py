@@ -31,6 +31,10 @@ KINDS = {
     "marker": "markers",
     "plate": "force plate",
     "clock": "clocks",
+    "flexibility": "bending",
+    "log": "robot log",
+    "mocap": "motion capture",
+    "wrist": "wrist sensor",
 }
 
 

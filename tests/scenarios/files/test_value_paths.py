@@ -1,5 +1,7 @@
 """`show`: every value that `--set` can reach, with unit, range, default and meaning."""
 
+import re
+
 import pytest
 
 from scenarios.files.value_paths import value_paths
@@ -16,6 +18,13 @@ def test_a_number_has_unit_range_and_meaning(paths):
     assert (gap.unit, gap.range) == ("rad", "0 <= x <= 0.1")
     assert "play" in gap.meaning.lower() or "backlash" in gap.meaning.lower()
     assert "[" not in gap.meaning
+
+
+@pytest.mark.parametrize("name", ["humanoids2024", "laboratory"])
+def test_every_value_has_a_meaning_of_its_own_and_every_decimal_a_unit(name):
+    found = value_paths(load(name))
+    assert [one.path for one in found if one.meaning in ("", "Robot and laboratory")] == []
+    assert [one.path for one in found if re.fullmatch(r"-?[\d.e-]*\.[\d.e-]*", one.value) and not one.unit] == []
 
 
 def test_choices_and_defaults_are_named(paths):

@@ -21,15 +21,15 @@ class WheelType:
     Attributes:
         stiffness: Bushing kx, ky, kz [N/m].
         damping: Bushing cx, cy, cz [N.s/m].
-        contact_stiffness: Normal, on the floor [N/m].
-        contact_damping: Normal, on the floor, and of slip: friction takes none away without [N.s/m].
-        friction: Coefficient mu [-].
+        contact_stiffness: Normal stiffness of the contact [N/m].
+        contact_damping: Damping of the contact along the normal, which slip needs as well [N.s/m].
+        friction: Coulomb friction coefficient mu of the contact [-].
         torsion: Bushing krx, kry, krz [N.m/rad]: krz alone, or all three; 0: fixed to the base about that axis.
         torsion_damping: Bushing crx, cry, crz [N.m.s/rad].
-        torsional_friction: Of the contact, moment about the normal over normal force [m].
-        rolling_friction: Of the contact, moment about a tangent over normal force [m].
-        guide_friction: Coulomb's, of the bushing along z [N]: a vertical load below it moves the contact alone.
-        turning_force: Along x and along y at which a caster turns instead of sliding, whatever its load [N]; 0: never.
+        torsional_friction: Friction moment of the contact about its normal, over the normal force [m].
+        rolling_friction: Friction moment of the contact about a tangent, over the normal force [m].
+        guide_friction: Coulomb friction of the bushing along z [N]; smaller changes of load deform the contact alone.
+        turning_force: Force along x or y at which a caster turns instead of sliding, at any load [N]; 0: never.
     """
 
     stiffness: tuple[Positive, Positive, Positive]
