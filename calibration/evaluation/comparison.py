@@ -131,7 +131,7 @@ def base_reason(errors: Mapping[str, np.ndarray], finding: str) -> str:
         return f"{moved_by}, the nominal hand is off by more: even {even}"
     if finding == "worse":
         return f"{moved_by}, its prediction misses that by {missed:.2f} mm; {even}"
-    return f"{moved_by}, predicted to {missed:.2f} mm; {even}, the rest is nominal geometry"
+    return f"{moved_by}, of which the prediction leaves {missed:.2f} mm; {even}, the rest is nominal geometry"
 
 
 def _rms(e: np.ndarray) -> float:

@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from scenarios.files.errors import ScenarioError
 from scenarios.files.output_folder import one_file
 from scenarios.plots.style import svg
+from scenarios.report.labels import labelled
 from scenarios.report.results import formatting
 from scenarios.report.results.run_results import read
 from scenarios.report.results.section import Drawn, RunView, Section, run_view
@@ -95,7 +96,7 @@ def render(view: RunView, sections: Iterable[Section], drawings: Mapping[str, Dr
         numbers = {"figure": figure, "table": table}
         parts = [(s, templates.get_template(s.template).render(**shared, **numbers, **v)) for s, v in shown]
     style = (_HERE / "report.css").read_text(encoding="utf-8")
-    return templates.get_template("page.html").render(**shared, parts=parts, style=style)
+    return labelled(templates.get_template("page.html").render(**shared, parts=parts, style=style))
 
 
 @cache

@@ -41,7 +41,7 @@ def test_what_is_not_there_is_not_compared(common):
 @pytest.mark.parametrize(
     ("share", "against", "finding", "said"),
     [
-        (1.0, 1.0, "better", "moved the hand by 1.00 mm rms per component, predicted to 0.00 mm"),
+        (1.0, 1.0, "better", "moved the hand by 1.00 mm rms per component, of which the prediction leaves 0.00 mm"),
         (1.0, -1.0, "worse", "even with the measured base the error is 10.00 mm instead of 9.00"),
         (-2.0, 1.0, "worse", "misses that by 3.00 mm; with the measured base the error is 10.00 mm instead of 11.00"),
     ],

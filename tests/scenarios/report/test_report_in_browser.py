@@ -84,8 +84,9 @@ def test_text_is_dark_on_light_or_light_on_dark(run, scheme):
     assert (text > 0.8 and paper < 0.2) if scheme == "dark" else (text < 0.2 and paper > 0.8)
 
 
-def test_no_table_is_cut_on_a_laptop(run):
-    assert measured(run, 1280)["cut"] == []
+@pytest.mark.parametrize("width", [390, 1280])
+def test_no_table_is_cut(run, width):
+    assert measured(run, width)["cut"] == []
 
 
 def test_errors_of_all_rows_are_seen_on_a_phone_without_scrolling(run):
