@@ -129,11 +129,11 @@ def _shares(steps: Sequence[Step], best: Step) -> tuple[Share, ...]:
 
 
 def _from_budget(found: Sequence[Cause], steps: Sequence[Step], best: Step | None) -> Iterator[NextStep]:
-    """Remedies of the budget; the base as it was measured has to be better than the predicted one."""
+    """Remedies of the budget; where the base's markers are no better than its prediction, others are needed."""
     given = None if best is None else oracle_base(steps, best.model)
     for share in found:
-        if share.cause != "base" or given is None or best is None or better(given.main, best.main):
-            yield NextStep(share.remedy, share.gain_mm)
+        worse = share.cause == "base" and given is not None and best is not None and not better(given.main, best.main)
+        yield NextStep(share.remedy + (", more exactly than its markers did here" if worse else ""), share.gain_mm)
 
 
 def _next_steps(
