@@ -65,7 +65,6 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
     from scenarios.files import registry
 
     path = registry.find(name_or_path)  # an unknown name is refused before the engines are imported
-
     from scenarios.files import extends, yaml_file
     from scenarios.files.scenario import Scenario
 
@@ -298,7 +297,4 @@ def _report(run_folder: Path, progress: Progress) -> None:
 
     progress("report", "", 0.0)
     is_refused = (run_folder / page.REASON).is_file() and not (run_folder / "evaluation.json").is_file()
-    if is_refused:
-        page.write_refusal(run_folder)
-    else:
-        page.write(run_folder, partial(progress, "report"))
+    (page.write_refusal if is_refused else partial(page.write, progress=partial(progress, "report")))(run_folder)

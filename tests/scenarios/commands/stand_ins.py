@@ -96,7 +96,7 @@ class Engines:
         row = {**ROW, "model": "floor", "against": "truth"}
         return SimpleNamespace(save=self.saves("score.json", {"rows": [row]}))
 
-    def report(self, run_dir, progress=None):
+    def report(self, run_dir, progress):
         self.step("report", run_dir)
         (Path(run_dir) / "report.html").write_text("<html>")
 
