@@ -14,7 +14,9 @@ A link encoder that slips on its shaft: from some moment on its readings are off
 
 d by weighted least squares together with theta and gamma, linear about the fit, for every t_0 with `_EACH` windows on
 either side; the one that lowers the cost most. It slipped where d exceeds `_STEP` and `_SIGMAS` standard deviations.
-Where the joint does not slide in between, t_0 is where absolute residuals add up to least.
+Where the joint does not slide in between, t_0 is where absolute residuals add up to least. Windows on the side of the
+mesh opposite to the predicted one, and those beside a change of side, do not count: a link that crosses its gap once,
+sooner or later than predicted, looks like a slip by the gap.
 """
 
 from dataclasses import dataclass, replace
@@ -160,7 +162,7 @@ def slipped_encoder(fit: TrainFit) -> Slip | None:
     times = data.motion.t[data.first]
     known = np.flatnonzero(np.isfinite(r))
     known = known[np.argsort(times[known], kind="stable")]
-    at = np.flatnonzero(data.regime[known] == 0)
+    at = np.flatnonzero((data.regime[known] == 0) & ~_crossing(fit, r)[known])
     if len(at) < _FEWEST:
         return None
     rows = known[at]
@@ -173,6 +175,14 @@ def slipped_encoder(fit: TrainFit) -> Slip | None:
     i = between[int(np.argmin(np.cumsum(np.abs(left) - np.abs(left - size)) - np.abs(left) + np.abs(left - size)))]
     trial = int(data.trial[i])
     return Slip(data.trial_ids[trial], float(times[i] - data.motion.t[data.motion.begins[trial]]), size)
+
+
+def _crossing(fit: TrainFit, r: np.ndarray) -> np.ndarray:
+    """(k,) windows on the side opposite to the predicted one, by residuals r (k,), and beside a change of side."""
+    side = np.sign(fit.problem.deltas(fit.theta, fit.gamma))
+    opposite = np.abs(r + 2.0 * fit.theta[0] * side) < np.minimum(_APART, np.abs(r))
+    open_ = opposite | (side != np.roll(side, 1))
+    return np.any([np.roll(open_, shift) for shift in range(-_CLEAR, _CLEAR + 1)], axis=0)
 
 
 def _step(A: np.ndarray, r: np.ndarray, group: np.ndarray, problem: Problem) -> tuple[int, float, float, np.ndarray]:

@@ -175,6 +175,16 @@ def test_a_link_encoder_that_slips_is_found_with_its_trial(size: float) -> None:
         assert found.size == pytest.approx(size, rel=0.05)
 
 
+def test_a_link_that_crosses_its_gap_once_and_late_is_no_slip_of_its_encoder() -> None:
+    of_data = data()
+    t = np.arange(len(of_data.motion.t)) / 100.0
+    motion = replace(of_data.motion, torque=2.0 * np.tanh(5.0 * (t - 0.5 * t[-1])))
+    late = np.roll(motion.torque, 35)
+    delta = of_data.means(TRUTH.deltas(motion, late, TRUTH.ends(late[motion.begins[:-1]])[0]))
+    of_data = replace(of_data, motion=replace(motion, t=t), y=delta + of_data.terms @ ECCENTRICITY)
+    assert slipped_encoder(evaluated(problem(of_data), np.append(TRUTH.values[:4], 0.0), ECCENTRICITY)) is None
+
+
 def test_a_stiff_joint_s_load_is_what_its_changes_of_side_show() -> None:
     """0.25 N.m that the nominal masses leave out wind its mesh up by 25 urad, and move when it changes sides."""
     stiff = replace(TRUTH, values=np.array([3e-3, 1e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]))
