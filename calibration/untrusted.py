@@ -5,6 +5,7 @@ key twice. The libraries behind (ruamel.yaml, urdfdom) recurse, expand and crash
 """
 
 import json
+import math
 import stat
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ _YAML_BYTES = 2**18  # [B]: ruamel.yaml reads some 50 kB a second
 _YAML_NODES = 100_000  # values, aliases written out
 _DEPTH = 60  # of lists and mappings within each other, and of elements
 _LINKS = 500  # of a robot
+_LEAST = {"mass value": 0.0, "axis length": 1e-6}  # numbers of a robot that have a sign
 _FINDINGS = 20  # shown of one file
 
 
@@ -124,7 +126,7 @@ def findings(error: ValidationError, whole: str) -> str:
 
 
 def checked_urdf(text: str, path: Path | str) -> str:
-    """A URDF whose links are a tree of bounded size, with finite numbers and masses that are not negative.
+    """A URDF whose links are a tree of bounded size, with finite numbers, masses not negative and axes not zero.
 
     Raises:
         InputError: It is not such a text; the libraries that read it may crash on others.
@@ -150,7 +152,7 @@ def checked_urdf(text: str, path: Path | str) -> str:
     if len(roots) != 1 or len(set(links)) != len(links) or not _ends(parent, links):
         raise InputError(path, f"not a URDF: its links are no tree with one root (roots {roots[:5]})")
     for place, value in _numbers(robot):
-        if not abs(value) < 1e9 or (place == "mass value" and value < 0.0):
+        if not _LEAST.get(place, -1e9) <= value < 1e9:
             raise InputError(path, f"not a URDF of a robot: {place} is {value:g}")
     return text
 
@@ -176,6 +178,8 @@ def _numbers(robot: ET.Element) -> Iterator[tuple[str, float]]:
                         yield f"{tag} {name}", float(word)
                     except ValueError:
                         yield f"{tag} {name}", float("nan")
+    for axis in robot.iter("axis"):
+        yield "axis length", math.hypot(*map(float, axis.get("xyz", "1 0 0").split()))
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

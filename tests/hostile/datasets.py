@@ -249,6 +249,9 @@ URDF = [
     Case("200,000 elements deep", text(URDF_PATH, "<a>" * 200_000), CALIBRATE, "not a URDF", slow=True),
     Case("endless device", linked(URDF_PATH, "/dev/zero"), CALIBRATE, "no regular file"),
     Case("pipe", pipe(URDF_PATH), CALIBRATE, "no regular file"),
+    Case(
+        "an axis of no length", replaced(URDF_PATH, '<axis xyz="0 0 1"', '<axis xyz="0 0 0"'), CALIBRATE, "axis length"
+    ),
     Case("of another robot", replaced(URDF_PATH, "arm_4_joint", "elbow", 99), CALIBRATE, "no joint named"),
 ]
 

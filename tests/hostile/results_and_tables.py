@@ -158,6 +158,16 @@ CSV = [
         IMPORT,
         "wheels named more than once",
     ),
+    Case(
+        "semicolons and decimal commas",
+        lambda d: [
+            p.write_text(p.read_text().replace(",", ";").replace(".", ",")) for p in (d / "csv").glob("swing.*.csv")
+        ],
+        IMPORT,
+        codes=(0,),
+        slow=True,
+    ),
+    Case("a comment above the header", replaced("csv/swing.robot.csv", "t", "# log\nt"), IMPORT, "is it the header?"),
     Case("mapping with ragged approach", replaced(MAP, "approach:\n", "approach: [[1], [1, 1]]\n"), IMPORT, "approach"),
 ]
 

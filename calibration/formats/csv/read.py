@@ -236,22 +236,17 @@ def _unused(text: CsvText, table: CsvTable) -> tuple[str, ...]:
 
 
 def read_text(path: Path) -> CsvText:
-    """Read a file with one header line.
+    """Read a file with one header line; where semicolons or tabs separate its columns, commas may be decimal.
 
     Raises:
         InputError: It cannot be read, has no header or no rows, names a column twice, or a row is of another length.
     """
-    check_file(path, _MOST_BYTES)
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(stream) if row]
-    except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(path, f"is no CSV text ({error}); export it again") from error
+    rows = _rows(path)
     if len(rows) < 2:
         raise InputError(f"{path}:1:1", "no rows below the header; export the file again")
     header = tuple(rows[0])
+    if len(header) == 1:
+        raise InputError(f"{path}:1:1", f"the first line names one column, {header[0][:40]!r}: is it the header?")
     if all(_is_number(name, gaps=False) for name in header[1:]):
         raise InputError(f"{path}:1:1", "the first line holds numbers; write a header line that names the columns")
     if len(header) > _MOST_COLUMNS:
@@ -264,6 +259,23 @@ def read_text(path: Path) -> CsvText:
             message = f"{len(row)} cells, the header has {len(header)}: truncated or damaged; export the file again"
             raise InputError(f"{path}:{line}:{len(row)}", message)
     return CsvText(path, header, np.array(rows[1:], dtype=object))
+
+
+def _rows(path: Path) -> list[list[str]]:
+    check_file(path, _MOST_BYTES)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            head = stream.readline()
+            separator = next((s for s in ",;\t" if s in head), ",")
+            stream.seek(0)
+            rows = [[cell.strip() for cell in row] for row in csv.reader(stream, delimiter=separator) if row]
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, f"is no CSV text ({error}); export it again") from error
+    if separator != "," and not any("." in cell for row in rows[1:] for cell in row):
+        rows[1:] = [[cell.replace(",", ".") for cell in row] for row in rows[1:]]
+    return rows
 
 
 def _is_number(text: str, gaps: bool) -> bool:
