@@ -99,7 +99,7 @@ def exchanged(trial: Trial, sigma: float) -> Iterator[str]:
     if names:
         yield (
             f"motor and link readings of {', '.join(names)} are exchanged, or the motor's are wrong: its velocity is "
-            "that of the link readings; exchange the columns"
+            "that of the link readings; exchange the columns, or see its readings for spikes, stops and delays"
         )
 
 

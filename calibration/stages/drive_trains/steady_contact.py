@@ -14,9 +14,9 @@ A link encoder that slips on its shaft: from some moment on its readings are off
 
 d by weighted least squares together with theta and gamma, linear about the fit, for every t_0 with `_EACH` windows on
 either side; the one that lowers the cost most. It slipped where d exceeds `_STEP` and `_SIGMAS` standard deviations.
-Where the joint does not slide in between, t_0 is where absolute residuals add up to least. Windows on the side of the
-mesh opposite to the predicted one, and those beside a change of side, do not count: a link that crosses its gap once,
-sooner or later than predicted, looks like a slip by the gap.
+Where the joint does not slide in between, t_0 is where absolute residuals add up to least. Windows on the side opposite
+to the predicted one do not count where they are fewer than `_EACH`: a link that crosses its gap once, sooner or later
+than predicted, looks like a slip by the gap.
 """
 
 from dataclasses import dataclass, replace
@@ -178,11 +178,12 @@ def slipped_encoder(fit: TrainFit) -> Slip | None:
 
 
 def _crossing(fit: TrainFit, r: np.ndarray) -> np.ndarray:
-    """(k,) windows on the side opposite to the predicted one, by residuals r (k,), and beside a change of side."""
+    """(k,) windows on the other side than predicted, by residuals r (k,), and beside them; none where many are."""
     side = np.sign(fit.problem.deltas(fit.theta, fit.gamma))
     opposite = np.abs(r + 2.0 * fit.theta[0] * side) < np.minimum(_APART, np.abs(r))
-    open_ = opposite | (side != np.roll(side, 1))
-    return np.any([np.roll(open_, shift) for shift in range(-_CLEAR, _CLEAR + 1)], axis=0)
+    opposite &= fit.problem.data.regime == 0
+    opposite &= opposite.sum() < _EACH
+    return np.asarray(np.any([np.roll(opposite, shift) for shift in range(-_CLEAR, _CLEAR + 1)], axis=0))
 
 
 def _step(A: np.ndarray, r: np.ndarray, group: np.ndarray, problem: Problem) -> tuple[int, float, float, np.ndarray]:
