@@ -65,7 +65,7 @@ class Wrenched(Protocol):
 
 
 def implausible_plates(trial: Trial, weight: float) -> Iterator[str]:
-    """Why the plates of a trial cannot be used; `weight` of the nominal robot [N]."""
+    """Why the plates of a trial cannot be used; `weight` of the nominal robot [N], 0 where its links have no masses."""
     bad = np.flatnonzero(~np.isfinite(trial.plate_wrench).all(axis=(1, 2)))
     if len(bad):
         yield f"plate: {len(bad)} samples are missing, the first is {bad[0]}; cut them out, or leave the plate out"
@@ -79,7 +79,7 @@ def implausible_plates(trial: Trial, weight: float) -> Iterator[str]:
             f"plate: Fz is {-load:+.0f} N on a robot that weighs {weight:.0f} N: its wrench is the reaction, or the "
             "plate is upside down; see convention and axes"
         )
-    elif not weight / _LOAD < load < weight * _LOAD:
+    elif weight and not weight / _LOAD < load < weight * _LOAD:
         yield f"plate carries {load:.3g} N, the nominal robot weighs {weight:.0f} N; see the plate's units and labels"
 
 

@@ -252,6 +252,9 @@ URDF = [
     Case(
         "an axis of no length", replaced(URDF_PATH, '<axis xyz="0 0 1"', '<axis xyz="0 0 0"'), CALIBRATE, "axis length"
     ),
+    Case(
+        "no masses", replaced(URDF_PATH, "<mass value=", "<mass value='0' old=", 99), CALIBRATE, "no masses", (0,), True
+    ),
     Case("of another robot", replaced(URDF_PATH, "arm_4_joint", "elbow", 99), CALIBRATE, "no joint named"),
 ]
 

@@ -85,7 +85,7 @@ def motion_load(
     rows = np.linspace(0, len(q.t) - 1, _MASS_SAMPLES).astype(int)
     M = T_0_root.dualAction @ along.composite[rows].mean(axis=0) @ T_0_root.inverse().action
     weight = float(M[0, 0] * np.linalg.norm(description.gravity))
-    com = np.array([M[2, 4] * -1.0, M[2, 3], M[0, 4]]) / M[0, 0]
+    com = np.array([M[2, 4] * -1.0, M[2, 3], M[0, 4]]) / max(M[0, 0], np.finfo(float).tiny)
     return Load(Signal(q.t, -w, q.valid), M, weight, com, np.eye(4))
 
 

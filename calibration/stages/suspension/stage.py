@@ -47,6 +47,8 @@ def fit_suspension(
 
     `full`: Kt, Ct, Ktheta, Ctheta of the printed form are symmetric matrices instead of diagonal ones.
     """
+    if not sum(inertia.mass for inertia in lab.floating.inertias):
+        return None, (Verdict(STAGE, "missing", "nominal.urdf has no masses, so no load is known: add its inertials"),)
     responses = read_responses(WrenchSources(lab, robot, plate, lab.T_base_B), trials)
     found = list(wrong_plate(lab, *responses.forcings)) if responses.plate else []
     moved = _moved_bases(responses.dynamics or responses.plate)
