@@ -9,6 +9,7 @@ Importing this module is cheap: the engines are imported by the step that needs 
 
 import platform
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -62,10 +63,9 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> "Scenario":
     Raises:
         ScenarioError: There is none, or something in it is wrong; all findings at once.
     """
-    from scenarios.files import registry
+    from scenarios.files import extends, registry, yaml_file
 
     path = registry.find(name_or_path)  # an unknown name is refused before the engines are imported
-    from scenarios.files import extends, yaml_file
     from scenarios.files.scenario import Scenario
 
     path, extending = extends.resolve(path)
@@ -180,7 +180,6 @@ def evaluate(
     """
     folder.settle_inputs(estimate, dataset)
     with folder.updating(out, folder.EVALUATION, "evaluation.json") as new, every_core():
-        truth = None if truth is None else Path(truth)
         return _evaluate(Path(estimate), Path(dataset), new, truth, progress, zeros)
 
 
@@ -209,9 +208,10 @@ def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
 
     progress("simulate", "", 0.0)
     yaml_file.write(out / "scenario.yaml", scenario, beside={"versions": versions()})
-    twin.record(scenario.twin, scenario.seed, out, lambda at, fraction: progress("simulate", at, fraction))
-    (out / "figures").mkdir()
-    picture(scenario.twin, scenario.seed, out / "figures" / "twin.png")
+    with ThreadPoolExecutor(1) as beside:
+        drawn = beside.submit(picture, scenario.twin, scenario.seed, out / "figures" / "twin.png")
+        twin.record(scenario.twin, scenario.seed, out, lambda at, fraction: progress("simulate", at, fraction))
+        drawn.result()
 
 
 def _calibrate(
@@ -252,8 +252,7 @@ def evaluated(
     from calibration.evaluation import read_submission
 
     progress("evaluate", "", 0.0)
-    poses = estimate.suffix.lower() in _POSES
-    found = None if poses else calibration.load_estimate(estimate, zeros)
+    found = None if estimate.suffix.lower() in _POSES else calibration.load_estimate(estimate, zeros)
     with Breakdowns("evaluation"):
         return found, calibration.evaluate(
             read_submission(estimate) if found is None else found,
@@ -266,7 +265,7 @@ def _evaluate(
     estimate: Path,
     dataset: Path,
     out: Path,
-    truth: Path | None,
+    truth: Path | str | None,
     progress: Progress,
     zeros: Path | str | None = None,
 ) -> tuple["Evaluation", "Score | None"]:
@@ -274,13 +273,14 @@ def _evaluate(
     from scenarios.score.score import score
 
     found, evaluation = evaluated(estimate, calibration.load(dataset), zeros, progress)
-    evaluation.save(out)
-    evaluation.save_predictions(out)
-    if truth is None:
-        return evaluation, None
-    progress("score", "", 0.0)
-    scored = score(found, evaluation, truth)
-    scored.save(out)
+    with ThreadPoolExecutor(1) as beside:
+        saved = [beside.submit(save, out) for save in (evaluation.save, evaluation.save_predictions)]
+        scored = None
+        if truth is not None:
+            progress("score", "", 0.0)
+            scored = score(found, evaluation, Path(truth))
+            scored.save(out)
+        _ = [job.result() for job in saved]
     return evaluation, scored
 
 

@@ -4,7 +4,7 @@
     OUT/truth/{truth.json, trials/*.nc}                        what nobody has
 
 Trials run in parallel threads (the simulation holds no interpreter lock); random streams are named after the trial
-and the instrument, so that the files do not depend on the number of threads.
+and the instrument, so that the files depend neither on the number of threads nor on their order, longest first.
 """
 
 import os
@@ -65,19 +65,19 @@ def record(
     starts = EPOCH + np.cumsum([0.0, *(m.duration + config.campaign.pause for m in motions[:-1])])
     done, total = 0.0, sum(m.duration for m in motions)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        sessions = (later if m.role == CONFIRMATION else lab for m in motions)
-        jobs = [
-            pool.submit(_one, s, m, float(t), out, watch) for s, m, t in zip(sessions, motions, starts, strict=True)
-        ]
-        motion_of = dict(zip(jobs, motions, strict=True))
+        jobs = {}
+        for motion, start in sorted(zip(motions, starts, strict=True), key=lambda x: x[0].duration, reverse=True):
+            session = later if motion.role == CONFIRMATION else lab
+            jobs[motion.id] = pool.submit(_one, session, motion, float(start), out, watch)
+        motion_of = {jobs[m.id]: m for m in motions}
         try:
-            for job in as_completed(jobs):
+            for job in as_completed(motion_of):
                 if job.exception():
                     break
                 done += motion_of[job].duration
                 if progress:
                     progress(f"{motion_of[job].id} ({motion_of[job].duration:.0f} s)", done / total)
-            entries = [job.result() for job in jobs]
+            entries = [job.result() for job in motion_of]
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
