@@ -21,6 +21,7 @@ from calibration.numerics.signals import RATE, Signal
 
 _STEPS = 30
 _ENOUGH = 0.5  # share of the motion's variance a lag must explain to be believed [-]
+_RANK = 1e-13  # least eigenvalue of a Gram matrix to its largest
 
 
 @dataclass(frozen=True)
@@ -107,11 +108,20 @@ def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> t
     own, one = np.einsum("nc,cd->ncd", m[:, 0], np.eye(c)), np.tile(np.eye(c), (n, 1, 1))
     A = np.concatenate([own, one, np.swapaxes(m[:, 1:], 1, 2), np.swapaxes(u, 1, 2)], axis=2).reshape(n * c, -1)
     scale = np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
-    U, values, Vt = np.linalg.svd(A / scale, full_matrices=False)
-    U, values, Vt = (x[..., : int((values > 1e-8 * values[0]).sum())] for x in (U, values, Vt.T))
-    a = Vt @ (U.T @ y.ravel() / values) / scale
+    A /= scale
+    square, V = np.linalg.eigh(A.T @ A)
+    kept = square > _RANK * square[-1]
+    inverse = V[:, kept] / square[kept] @ V[:, kept].T
+
+    def explained(x: np.ndarray) -> np.ndarray:
+        """Coefficients of x (n c,), the second time of what rounding left."""
+        found = inverse @ (A.T @ x)
+        return np.asarray(found + inverse @ (A.T @ (x - A @ found)))
+
+    a = explained(y.ravel())
+    r, a = y.ravel() - A @ a, a / scale
     gains, small = a[:c], a[2 * c : 2 * c + k - 1]
     slope = (m_dot[:, 0] * gains + np.einsum("nkc,k->nc", m_dot[:, 1:], small)).ravel()
-    r, slope = (x - U @ (U.T @ x) for x in (y.ravel(), slope))
+    slope -= A @ explained(slope)
     total = float(((y - y.mean(axis=0)) ** 2).sum())
     return r, slope, 1.0 - float(r @ r) / max(total, np.finfo(float).tiny)
