@@ -1,8 +1,10 @@
 """Frozen dataclasses of numbers and arrays as plain JSON values, and back by their type hints.
 
-Arrays are nested lists, NaN is null. A class needs no code of its own to stand in estimate.json.
+Arrays are nested lists, NaN is null; their shapes are those that the class's documentation states: `(n, 3)` has two
+axes, the second one 3 long. A class needs no code of its own to stand in estimate.json.
 """
 
+import re
 from dataclasses import MISSING, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -12,6 +14,8 @@ import numpy as np
 from calibration.errors import InputError, ShapeError
 
 T = TypeVar("T")
+
+_STATED = re.compile(r"^ +(\w+): (?:\w{1,8} )?\((\w+,[\w, ]*)\)", re.MULTILINE)  # attribute, its axes
 
 
 def plain(value: Any) -> Any:
@@ -62,12 +66,27 @@ def _restored(kind: Any, value: Any) -> Any:
         hints = get_type_hints(kind)
         given = [f.name for f in fields(kind) if f.name in value or f.default is f.default_factory is MISSING]
         known = {name: None for name in given if type(None) in get_args(hints[name])} | value
-        return kind(**{name: _restored(hints[name], known[name]) for name in given})  # type: ignore[operator]
+        found = {name: _restored(hints[name], known[name]) for name in given}
+        _check_shapes(kind, found)
+        return kind(**found)  # type: ignore[operator]
     if origin is Literal and value not in arguments:
         raise ValueError(f"{value!r} is none of {arguments}")
     if kind in (str, int) and not isinstance(value, kind):
         raise TypeError(f"{value!r} is no {kind.__name__}")
     return value
+
+
+def _check_shapes(kind: Any, found: dict[str, Any]) -> None:
+    """See that arrays have the axes their documentation states; a letter is the same number in all of a class."""
+    known: dict[str, int] = {}
+    for name, axes in _STATED.findall(kind.__doc__ or ""):
+        if isinstance(array := found.get(name), np.ndarray):
+            stated = [axis for axis in re.split(", *", axes) if axis]
+            sizes = [
+                int(n) if n.isdigit() else known.setdefault(n, m) for n, m in zip(stated, array.shape, strict=False)
+            ]
+            if array.shape != tuple(sizes) or array.ndim != len(stated):
+                raise ShapeError(name, array.shape, stated)
 
 
 def _numbers(value: Any) -> np.ndarray:

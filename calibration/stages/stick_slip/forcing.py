@@ -74,7 +74,12 @@ def planar_force(drive: np.ndarray, source: Source) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Tilting:
-    """The 6x6 compliance that heave and tilt follow: K, C (6, 6)."""
+    """The 6x6 compliance that heave and tilt follow.
+
+    Attributes:
+        K: (6, 6) stiffness [N/m, N.m/rad].
+        C: (6, 6) damping.
+    """
 
     K: np.ndarray
     C: np.ndarray

@@ -26,12 +26,12 @@ _WILD = 25.0  # mean square over the median of the trials
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Sums over each trial when it was left out, (n_trials, 6).
+    """Sums over each trial when it was left out, six axes, or three.
 
     Attributes:
-        error: Squared error.
-        motion: Squared displacement.
-        noise: Squared noise to be expected.
+        error: (n_trials, axes) squared error.
+        motion: (n_trials, axes) squared displacement.
+        noise: (n_trials, axes) squared noise to be expected.
         count: (n_trials,) samples.
     """
 

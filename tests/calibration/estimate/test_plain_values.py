@@ -13,6 +13,13 @@ from calibration.estimate.plain_values import plain, restored
 
 @dataclass(frozen=True)
 class Wheel:
+    """A wheel.
+
+    Attributes:
+        name: Of it.
+        stiffness: K (n, 2) along x and y [N/m].
+    """
+
     name: str
     stiffness: np.ndarray
 
@@ -57,6 +64,8 @@ def test_a_field_that_is_null_or_has_a_default_may_be_absent():
         {"quality": [1.0]},
         {"wheels": [{"name": "left"}]},
         {"wheels": [{"name": 1, "stiffness": [1.0]}]},
+        {"wheels": [{"name": "left", "stiffness": [1.0, 2.0]}]},
+        {"wheels": [{"name": "left", "stiffness": [[1.0], [2.0]]}]},
         {"wheels": 3},
     ],
 )
