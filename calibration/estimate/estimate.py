@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from calibration.errors import NoSuchElement
+from calibration.errors import NoSuchElement, NotCalibrated
 from calibration.inference.parameters import Model, Parameter
 from calibration.options import Options
 from calibration.recording.clock import Clock
@@ -101,6 +101,16 @@ class Estimate:
     def calibrated(self) -> bool:
         """Whether the result may be used."""
         return self.status == "calibrated"
+
+    def require_calibrated(self) -> None:
+        """Check that it may be used.
+
+        Raises:
+            NotCalibrated: It must not; the message has the findings why.
+        """
+        if not self.calibrated:
+            found = [v for v in self.verdicts if v.verdict == "refused"]
+            raise NotCalibrated([v.message for v in found if v.stage != "conclusion"] or [v.message for v in found])
 
     @property
     def exported(self) -> str:

@@ -97,8 +97,7 @@ class Compensator:
             NotCalibrated: The estimate must not be used.
         """
         estimate = load_estimate(folder)
-        if not estimate.calibrated:
-            raise NotCalibrated([v.message for v in estimate.verdicts if v.verdict == "refused"])
+        estimate.require_calibrated()
         if estimate.urdf is None or estimate.robot is None:
             raise InputError(folder, "not a whole estimate: nominal.urdf or the robot's joints and frames are missing")
         return cls.of(estimate, payload)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from calibration.errors import NotCalibrated
 from calibration.estimate.drawings import redrawn
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.rows import LADDER, PARTS
@@ -31,8 +30,7 @@ def predictor(estimate: Estimate, dataset: Dataset) -> Predictor:
     Raises:
         NotCalibrated: The estimate must not be used.
     """
-    if not estimate.calibrated:
-        raise NotCalibrated([v.message for v in estimate.verdicts if v.verdict == "refused"])
+    estimate.require_calibrated()
     description = dataset.description
     nominal_chain = chain_of(dataset.urdf, description)
     frames = nominal_frames(nominal_chain, description)

@@ -62,12 +62,10 @@ def predict(  # noqa: PLR0913  an option each
         CalibrationError: The estimate must not be used, or its postures register nothing.
     """
     from calibration import load, load_estimate, save_estimate
-    from calibration.errors import NotCalibrated
     from calibration.prediction import on_another_day
 
     known = load_estimate(estimate)
-    if not known.calibrated:
-        raise NotCalibrated([v.message for v in known.verdicts if v.verdict == "refused"])
+    known.require_calibrated()
     if known.laboratory is None:
         raise ScenarioError(f"{estimate}: does not contain its laboratory; calibrate again")
     with folder.replacing(out, SESSION) as new, one_blas_thread():

@@ -206,8 +206,7 @@ def export_urdf(estimate: Path, out: Path) -> None:
 
     found = load_estimate(estimate)
     path = (estimate if estimate.is_dir() else estimate.parent) / CALIBRATED
-    if not found.calibrated:
-        raise NotCalibrated([v.message for v in found.verdicts if v.verdict == "refused"])
+    found.require_calibrated()
     if not path.is_file():
         why = [v.message for v in found.verdicts if v.stage == "geometry" and v.verdict == "missing"]
         raise NotCalibrated([f"{estimate}: no geometry in this estimate, so no calibrated URDF", *why])

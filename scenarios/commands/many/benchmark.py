@@ -15,7 +15,7 @@ Tier = Annotated[str, typer.Option(metavar="quick|full", help="4 or 20 robots.")
 def benchmark(  # noqa: PLR0913  an option each
     action: Annotated[
         Literal["make", "calibrate", "score"],
-        typer.Argument(metavar="{make,calibrate,score}", help="Simulate it, calibrate it with this program, or score."),
+        typer.Argument(metavar="make|calibrate|score", help="Simulate it, calibrate it with this program, or score."),
     ],
     out: Out,
     entries: Annotated[list[Path] | None, typer.Argument(metavar="ENTRY...", help="score: folders of entries.")] = None,

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def study(  # noqa: PLR0913  an option each
     kind: Annotated[
         Literal["coverage", "power", "joints", "compare"],
-        typer.Argument(metavar="{coverage,power,joints,compare}", help="What to find out."),
+        typer.Argument(metavar="coverage|power|joints|compare", help="What to find out."),
     ],
     names: Annotated[
         list[str],
