@@ -14,6 +14,12 @@ from scenarios.files import registry
 from tests.scenarios.commands.stand_ins import YAML, Engines, Scenario
 
 
+def picture(config, seed, path):
+    """A file where a picture of the robot would be, in a folder of its own."""
+    path.parent.mkdir()
+    path.write_text("picture")
+
+
 @pytest.fixture
 def engines(monkeypatch, tmp_path):
     """Replace every engine, offer one scenario `small`, and work in an empty folder."""
@@ -35,7 +41,7 @@ def engines(monkeypatch, tmp_path):
         monkeypatch.setitem(sys.modules, module.__name__, module)
         package, _, leaf = module.__name__.rpartition(".")
         monkeypatch.setattr(importlib.import_module(package), leaf, module, raising=False)
-    monkeypatch.setattr(twin.rendering, "picture", lambda config, seed, path: path.write_text("picture"))
+    monkeypatch.setattr(twin.rendering, "picture", picture)
     end = ["Calibrated.", "Report: {}"]
     monkeypatch.setattr(console, "summary", lambda run: [line.format(run / "report.html") for line in end])
     (tmp_path / "known").mkdir()
