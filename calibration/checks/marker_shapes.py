@@ -8,6 +8,10 @@ is what drawing and drilling leave; s has the standard deviation u / sqrt(sum |x
 where the others put it. Motion capture that is 1 % too large makes a robot 1 % too large: joint placements follow it,
 and no residual shows it.
 
+Motion capture whose scale is not the same in all directions strains what it sees, R'E R x_k with E traceless in the
+laboratory: bodies change their shape as they turn. E by least squares with a constant e_k, taken off where it explains
+a fifth of the change.
+
 Within a campaign the e_k of a rigid body stay: where those of some windows differ from what most have by ten times the
 markers' noise, a marker was moved, slipped, or is another.
 """
@@ -33,6 +37,8 @@ _SCALE, _WRONG_SCALE = 1e-3, 5e-3  # off by less is 1 mm at the hand, by more 5 
 _ODD, _FAR = 3.0, 1e-3  # times the usual size, and [m], a marker may be off its drawing unsaid
 _WINDOW = 2.0  # [s]
 _QUIET = 20.0  # times less than declared that markers may scatter unsaid
+_STRAIN, _WRONG_STRAIN = 2e-3, 1e-2  # of one direction against another [-]
+_EXPLAINS, _STRETCH, _TURNS = 0.2, 0.02, 100.0  # share of the change; prior of E [-], and the samples it is worth
 _MOVED, _LASTING = 10.0, 2  # standard deviations of a marker's noise; windows in which it shows, a ghost in one
 
 
@@ -44,11 +50,13 @@ class Shape:
         trial: Its id.
         t: (n,) [s]; None of posture means, whose odd ones are left out one by one.
         e: (n, m, 3) markers less their drawing [m, body], NaN where hidden; all of them are fitted together.
+        R: (n, 3, 3) R_lab_body.
     """
 
     trial: str
     t: np.ndarray | None
     e: np.ndarray
+    R: np.ndarray
 
 
 def wrong_shapes(lab: Laboratory, trials: Sequence[Trial | PostureMeans]) -> Iterator[Verdict]:
@@ -56,6 +64,15 @@ def wrong_shapes(lab: Laboratory, trials: Sequence[Trial | PostureMeans]) -> Ite
     description = lab.description
     shapes = {b.name: [s for t in trials if (s := _shape(b, t)) is not None] for b in description.bodies}
     bodies = {b.name: b for b in description.bodies if shapes[b.name] and len(b.markers) >= 3}
+    E, share = _strain([(_drawn(b), shapes[name]) for name, b in bodies.items()])
+    strain = np.ptp(np.linalg.eigvalsh(E))
+    if share > _EXPLAINS and strain > _STRAIN:
+        message = (
+            f"the motion capture's scale differs by {100.0 * strain:.1f} % between two directions, markers of bodies "
+            "that turn show: calibrate it again (its wand), in all of the room"
+        )
+        yield Verdict(STAGE, "refused" if strain > _WRONG_STRAIN else "warning", message, (_grown(lab, strain),))
+        shapes = {name: [_unstrained(_drawn(bodies[name]), s, E) for s in shapes[name]] for name in bodies}
     usual = {name: _median(np.concatenate([s.e for s in shapes[name]])) for name in bodies}
     known = {name: e for name, e in usual.items() if np.isfinite(e).all()}
     if not known:
@@ -126,7 +143,41 @@ def _shape(body: Body, trial: Trial | PostureMeans) -> Shape | None:
     if not np.isfinite(found.T).any():
         return None
     t = None if isinstance(trial, PostureMeans) else trial.t_mocap[rows]
-    return Shape(trial.id, t, np.einsum("nji,nmj->nmi", found.T[:, :3, :3], found.residual))
+    R = found.T[:, :3, :3]
+    return Shape(trial.id, t, np.einsum("nji,nmj->nmi", R, found.residual), R)
+
+
+_SHEARS = np.zeros((5, 3, 3))  # traceless and symmetric
+_SHEARS[[0, 0, 1, 1], [0, 1, 1, 2], [0, 1, 1, 2]] = 1.0, -1.0, 1.0, -1.0
+_SHEARS[[2, 2, 3, 3, 4, 4], [0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = 1.0
+
+
+def _strain(bodies: Sequence[tuple[np.ndarray, Sequence[Shape]]]) -> tuple[np.ndarray, float]:
+    """E (3, 3), and the share of the changes of shape that it explains, of bodies drawn (m, 3) [m]."""
+    A, y = np.zeros((0, len(_SHEARS))), np.zeros(0)
+    for xyz, shapes in bodies:
+        e, R = (np.concatenate([getattr(s, name) for s in shapes]) for name in ("e", "R"))
+        whole = np.isfinite(e).all(axis=(1, 2))
+        if whole.any():
+            f = np.stack([_stretched(xyz, R[whole], shear) for shear in _SHEARS], axis=3)
+            A = np.concatenate([A, (f - f.mean(axis=0)).reshape(-1, len(_SHEARS))])
+            y = np.append(y, e[whole] - e[whole].mean(axis=0))
+    known = _TURNS * float(np.mean(y**2)) / _STRETCH**2 + np.finfo(float).tiny if len(y) else 1.0
+    c = np.linalg.solve(A.T @ A + known * np.eye(len(_SHEARS)), A.T @ y)
+    left, all_ = float(((y - A @ c) ** 2).sum()), float((y**2).sum())
+    return np.tensordot(c, _SHEARS, axes=1), 1.0 - left / all_ if all_ else 0.0
+
+
+def _stretched(xyz: np.ndarray, R: np.ndarray, E: np.ndarray) -> np.ndarray:
+    """What a strain E of the laboratory leaves of markers (m, 3) [m] fitted as a rigid body R (n, 3, 3): (n, m, 3)."""
+    x = xyz - xyz.mean(axis=0)
+    f = x @ (np.swapaxes(R, 1, 2) @ E @ R)
+    turn = np.cross(x, f).sum(axis=1) @ np.linalg.inv((x**2).sum() * np.eye(3) - x.T @ x)
+    return np.asarray(f - np.cross(turn[:, None], x))
+
+
+def _unstrained(xyz: np.ndarray, shape: Shape, E: np.ndarray) -> Shape:
+    return replace(shape, e=shape.e - _stretched(xyz, shape.R, E))
 
 
 def _median(e: np.ndarray) -> np.ndarray:

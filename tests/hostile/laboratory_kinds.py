@@ -189,6 +189,8 @@ KINDS = (
     Mistake("base and gripper exchanged",
         _labels(_pairs(*((f"base{k}", f"gripper{k}") for k in range(4)))), "times as far apart|drawing"),
     Mistake("base markers one on", _labels({f"base{k}": f"base{(k + 1) % 4}" for k in range(4)}), "drawing|mirror"),
+    Mistake("x 1 % too large", _array("marker_position", lambda p: p * [1.01, 1.0, 1.0]), "between two directions"),
+    Mistake("gripper1 and base1 exchanged", _labels(_pairs(("gripper1", "base1"))), "times as far apart|drawing"),
     Mistake("frames lost for 2 s", _frames_lost(2.0), "holes in the frames"),
 )  # fmt: skip
 
@@ -293,6 +295,8 @@ FITTED = (
     Mistake("readings reversed in time", _array("q_motor", lambda q: q[::-1]), _UP_TO),
     Mistake("readings with 20 ms of jitter", _array("t_robot", lambda t: np.sort(
         t + np.random.default_rng(0).normal(0.0, 0.02, len(t))) + 1e-6 * np.arange(len(t))), "jitter of the stamps"),
+    Mistake("spikes in arm_4", _column(4, lambda q: q + 0.5 * (np.arange(len(q)) % 97 == 0)), "see its readings for"),
+    Mistake("arm_4 late by 30 ms", _column(4, lambda q: np.roll(q, 3)), "see its readings for"),
     Mistake("two postures", _first_dwells(2), "distinct postures"),
     Mistake("five postures", _first_dwells(5), "distinct postures"),
     Mistake("approach reversed", _array("approach", np.negative), ""),
