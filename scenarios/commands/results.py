@@ -42,16 +42,15 @@ def show(
     from scenarios.files.value_paths import value_paths
 
     loaded = steps.load(scenario)
+    found = [one for one in value_paths(loaded) if word.lower() in f"{one.path} {one.meaning}".lower()]
+    if not found:
+        raise ScenarioError(f"{word}: in no path and no meaning of {loaded.name}; without a word every value is shown")
     typer.echo(f"{loaded.name}: {loaded.description}. Seed {loaded.seed}.\n")
-    for one in value_paths(loaded):
-        if word.lower() in f"{one.path} {one.meaning}".lower():
-            notes = [
-                one.range,
-                f"default {one.default}" if one.default and one.default != one.value else "",
-                one.meaning,
-            ]
-            unit = f" [{one.unit}]" if one.unit else ""
-            typer.echo(f"{one.path} = {one.value}{unit}" + "".join(f"; {note}" for note in notes if note))
+    for one in found:
+        default = f"default {one.default}" if one.default and one.default != one.value else ""
+        unit = f" [{one.unit}]" if one.unit else ""
+        notes = "".join(f"; {note}" for note in (one.range, default, one.meaning) if note)
+        typer.echo(f"{one.path} = {one.value}{unit}{notes}")
 
 
 class Renderer(StrEnum):

@@ -164,3 +164,13 @@ def test_a_view_opens_on_a_screen_and_not_in_a_pipe(terminal, options, n, monkey
     monkeypatch.setenv("DISPLAY", ":0")
     assert tiago_twin("view", str(tmp_path), *options)[0] == 0
     assert opened == [(tmp_path / "view.html").as_uri()] * n
+
+
+def test_show_prints_the_values_that_a_word_is_about_and_refuses_one_that_is_nowhere(tiago_twin):
+    code, out, _ = tiago_twin("show", "short", "arm_6_joint.gap")
+    assert (code, out.splitlines()[2:]) == (
+        0,
+        ["twin.arm.arm_6_joint.gap = 0.024 [rad]; 0 <= x <= 0.1; Total backlash"],
+    )
+    code, out, err = tiago_twin("show", "short", "nothing like it")
+    assert (code, out) == (2, "") and "in no path and no meaning of short" in err
