@@ -140,7 +140,7 @@ def commands() -> str:
 def scenarios() -> str:
     """Purpose and picture of every scenario."""
     parts = [
-        "# Scenarios\n\nWhat each is for, its robot, and what a run of it found: errors of the hand against the motion capture.\n"
+        "# Scenarios\n\nPurpose, robot and result of a run of each; errors of the hand are against the motion capture.\n"
     ]
     runs = json.loads(RUNS.read_text(encoding="utf-8"))
     for name in registry.names():
