@@ -139,9 +139,7 @@ def commands() -> str:
 
 def scenarios() -> str:
     """Purpose and picture of every scenario."""
-    parts = [
-        "# Scenarios\n\nPurpose, robot and result of a run of each; errors of the hand are against the motion capture.\n"
-    ]
+    parts = ["# Scenarios\n\nPurpose, robot and result of a run of each; errors against the motion capture.\n"]
     runs = json.loads(RUNS.read_text(encoding="utf-8"))
     for name in registry.names():
         loaded = load(name)
