@@ -25,13 +25,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.special import ndtri
 
 from calibration.numerics.compiled import njit
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.measured import blocks
+from calibration.stages.stick_slip.wheels import DRIVES, NAMES
 
 MEMBERS = 16
 _DRAWS = 64  # from which the members are chosen
+_NORMAL = ndtri((np.arange(MEMBERS - 1) + 0.5) / (MEMBERS - 1))  # as normal as so few are
 _ROUGH = 4.0  # by which the cost varies between points next to each other: whether a wheel slides is a threshold
 LEAST = np.array([5e-6, 5e-6, 2e-5])  # [m, rad]: nothing is known better
 _DEGREES = 6.0  # nu
@@ -113,6 +116,7 @@ def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) 
 
     Such a draw costs no more than its distance squared and a little: a friction that never shows is known on one side
     only, and draws on the other side, where it would show, cost more. Where most do, those that least do are taken.
+    The friction of the drives, of which the model is less certain than the data, varies by DRIVES in addition.
     """
     rng = np.random.Generator(np.random.PCG64(len(trials.ids)))
     variances, axes = np.linalg.eigh(covariance)
@@ -122,7 +126,9 @@ def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) 
     costs = np.array([trials.cost(p, e) for p, e in zip(every, trials.errors(every), strict=True)])
     excess = costs[:-1] - costs[-1] - (far**2).sum(axis=1)
     order = np.argsort(np.maximum(excess, _ROUGH), kind="stable")
-    return np.concatenate([logarithms[None], draws[order[: MEMBERS - 1]]])
+    members = draws[order[: MEMBERS - 1]]
+    members[:, NAMES.index("drive_mu")] += DRIVES * rng.permutation(_NORMAL)
+    return np.concatenate([logarithms[None], members])
 
 
 @dataclass(frozen=True)

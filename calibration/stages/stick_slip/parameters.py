@@ -18,11 +18,11 @@ import numpy as np
 
 from calibration.inference.parameters import Parameter, Status
 from calibration.stages.stick_slip.model import Direction
-from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, WheelSet
+from calibration.stages.stick_slip.wheels import DRIVES, NAMES, PRIOR, PRIOR_SIGMA, WheelSet
 
 KNOWN = 0.3  # sigma of a logarithm
 _SHARPER = 0.5  # sigma over that of the prior, at most
-MODEL = {"k": 0.03, "drive_mu": 0.16, "back_k": 0.08, "mu": 0.03, "c": 0.5, "slip": 0.3}
+MODEL = {"k": 0.03, "drive_mu": DRIVES, "back_k": 0.08, "mu": 0.03, "c": 0.5, "slip": 0.3}
 _WHEEL = {
     "drive": (("kx", "drive_kx"), ("ky", "drive_ky"), ("cx", "drive_c"), ("cy", "drive_c"), ("mu", "drive_mu")),
     "front": (("kx", "front_k"), ("ky", "front_k"), ("cx", "caster_c"), ("cy", "caster_c"), ("mu", "front_mu")),

@@ -26,6 +26,7 @@ NAMES = (
 )  # fmt: skip
 PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0])
 PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5])
+DRIVES = 0.16  # of the logarithm of the drives' friction: a drive slides for hundredths of a second, its mass left out
 PRELOADS = 8  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 2))

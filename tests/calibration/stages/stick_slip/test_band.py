@@ -13,7 +13,7 @@ from calibration.stages.stick_slip.band import (
     reached,
 )
 from calibration.stages.stick_slip.model import believed
-from calibration.stages.stick_slip.wheels import NAMES
+from calibration.stages.stick_slip.wheels import DRIVES, NAMES
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import TRUTH
 
@@ -74,6 +74,8 @@ def test_members_are_draws_of_the_posterior_that_the_data_bear():
     drives = members[1:, NAMES.index("drive_mu")] - p[NAMES.index("drive_mu")]
     assert (drives > 0.0).mean() > 0.6  # less friction would slip, and none of the trials does
     np.testing.assert_array_equal(members, ensemble_of(trials, p, one_sided))
+    spread = ensemble_of(trials, p, 1e-8 * np.eye(len(p))).std(axis=0)
+    np.testing.assert_allclose(spread, np.where([name == "drive_mu" for name in NAMES], DRIVES, 0.0), atol=0.02)
 
 
 def test_an_axis_that_is_not_moved_is_known_the_less_the_more_the_base_is_shaken():
