@@ -30,6 +30,7 @@ def test_a_declared_payload_is_known_to_both(trials):
 LOADED = pytest.mark.xfail(
     reason="a drive wheel near its friction, which no calibration trial showed: docs/limits.md", strict=True
 )
+PUSHED = pytest.mark.xfail(reason="where arm_1 stops in its gap after a push ends: docs/limits.md", strict=True)
 
 
 @pytest.mark.parametrize(
@@ -37,10 +38,10 @@ LOADED = pytest.mark.xfail(
     [
         ("xyz_0kg", "measured"),
         ("xyz_2kg", "measured"),
-        ("push", "measured"),
+        pytest.param("push", "measured", marks=PUSHED),
         ("xyz_0kg", "plate"),
         pytest.param("xyz_2kg", "plate", marks=LOADED),
-        pytest.param("push", "plate", marks=LOADED),
+        ("push", "plate"),
     ],
 )
 def test_row_full_knows_what_loads_it(trials, trial, base):

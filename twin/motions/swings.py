@@ -65,11 +65,12 @@ def in_step(frequency: float, start: tuple[float, ...], amplitudes: tuple[float,
     return Swing(start, amplitudes, (frequency,) * n, (0.0,) * n)
 
 
-# The paper's families: about each axis of the base, folding along two of them. 0.2 Hz, wrists moving along.
+# The paper's families: about each axis of the base, folding along two of them. 0.2 Hz, wrists moving along. Starting
+# and ending, around_z brings the drive wheels nearer their friction than any validation swing does.
 CALIBRATION_SWINGS = {
     "around_x": in_step(0.2, _SIDE, (0.0, 0.0, 0.55, 0.0, 0.0, 0.5, -0.4, 0.5)),
     "around_y": in_step(0.2, FORWARD, (0.0, 0.0, 0.55, 0.0, 0.0, -0.5, 0.4, 0.5)),
-    "around_z": in_step(0.2, FORWARD, (0.0, 0.70, 0.0, 0.0, 0.0, 0.5, 0.4, -0.5)),
+    "around_z": in_step(0.2, FORWARD, (0.0, 1.00, 0.0, 0.0, 0.0, 0.5, 0.4, -0.5)),
     "x_fold": in_step(0.2, (0.12, 1.5, -0.55, -3.0, 1.3, 0.1, 0.1, 0.1), (0.0, 0.0, 0.45, 0.0, -0.7, 0.4, -0.5, 0.4)),
     "y_fold": in_step(0.2, (0.12, 0.4, -0.55, -3.0, 1.3, 0.1, 0.1, 0.1), (0.0, 0.0, 0.45, 0.3, -0.7, -0.4, -0.5, 0.4)),
 }

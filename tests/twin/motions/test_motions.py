@@ -55,6 +55,12 @@ def test_postures_that_do_not_exist_are_reported(nominal, monkeypatch):
         sample_postures(nominal, 3, np.random.default_rng(0))
 
 
+def test_nothing_in_validation_starts_as_abruptly_about_the_vertical_as_a_calibration_swing(config, nominal):
+    """Else drive wheels slide there that slid in no calibration trial."""
+    peak = {m.id: np.abs(np.diff(m.command[:, 1], 2)).max() for m in schedule(config.campaign, nominal, 3)}
+    assert peak["around_z"] > 1.2 * max(peak[name] for name in ("xyz", "xyz_mirror", "postures_validation"))
+
+
 def test_a_soft_start_is_soft(config):
     def first_step(ramp):
         campaign = replace(config.campaign, ramp=ramp)
