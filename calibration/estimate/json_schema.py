@@ -125,9 +125,9 @@ def to_file(estimate: Estimate) -> EstimateFile:
 
 def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, np.ndarray]) -> Estimate:
     """The contents of estimate.json, with the covariances of the models that have one, as an estimate."""
-    robot = _known(RobotNames, file.robot, "robot")
-    if robot is not None and len(file.link_zero) not in (0, len(robot.joints)):
-        raise ValueError(f"link_zero has {len(file.link_zero)} values for {len(robot.joints)} joints")
+    robot, bundle = _known(RobotNames, file.robot, "robot"), _known(BundleParts, file.bundle, "bundle")
+    if robot is not None:
+        _check_sizes(len(robot.joints), file, bundle)
     return Estimate(
         file.status,
         tuple(Verdict(v.stage, v.verdict, v.message) for v in file.verdicts),
@@ -142,8 +142,21 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
         file.options,
         file.laboratory,
         regimes=tuple(_restored(RegimeQuality, x, "regimes") for x in file.regimes),
-        bundle=_known(BundleParts, file.bundle, "bundle"),
+        bundle=bundle,
     )
+
+
+def _check_sizes(joints: int, file: EstimateFile, bundle: BundleParts | None) -> None:
+    """See that there is a value for each joint, and in the bundle for each drive train."""
+    sizes = [("link_zero", len(file.link_zero), joints)]
+    sizes += [(f"{name}: reading_error", len(m.reading_error), joints) for name, m in file.models.items()]
+    if bundle is not None:
+        sizes += [("offset", len(bundle.offset) or -1, joints), ("at_rest", len(bundle.at_rest), len(bundle.trains))]
+        inertials = [len(train.inertials) for train in bundle.trains]
+        sizes += [("inertials", n, max(inertials)) for n in inertials]
+    for name, found, expected in sizes:
+        if found not in (0, expected):
+            raise ValueError(f"{name} has {found} values, not {expected}")
 
 
 def _restored(kind: type[T], part: _Part, at: str) -> T:

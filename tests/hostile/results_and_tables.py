@@ -56,6 +56,12 @@ RESULTS = [
         "do not fit",
     ),
     Case(
+        "estimate whose stiffness is one number",
+        put(ESTIMATE, "suspension", value=_SUSPENSION | {"K": [[1.0]]}),
+        EVALUATE,
+        "expected (6, 6)",
+    ),
+    Case(
         "estimate of a model without parameters of the hand",
         edit(ESTIMATE, lambda e: [m.update(parameters=[], combinations=[]) for m in e["models"].values()]),
         EVALUATE,

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import least_squares
 
+from calibration.errors import ShapeError
 from calibration.numerics.compiled import njit
 from calibration.recording.schema import Wheel
 from calibration.stages.stick_slip.kernel import solved
@@ -122,6 +123,10 @@ class WheelSet:
     types: tuple[str, ...]
     position: np.ndarray
     weight: np.ndarray
+
+    def __post_init__(self) -> None:
+        if not len(self.names) == len(self.types) == len(self.weight):
+            raise ShapeError("weight", self.weight.shape, (len(self.names),))
 
     def rows(self, p: SlipParameters) -> np.ndarray:
         """(m, 10) x, y, kx, ky, c, mu, n, G as the kernel takes them."""
