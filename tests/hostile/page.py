@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests.acceptance.claims import measured, when
-from tests.hostile import findings, random_cases, tried_mistakes
+from tests.hostile import findings, hidden_markers, random_cases, tried_mistakes
 from tests.hostile.case import Case, Judged, judged
 from tests.hostile.child import MEMORY, SECONDS
 from tests.hostile.laboratory import copied, make
@@ -44,6 +44,7 @@ _DAMAGE = """## Random damage
 
 `make fuzz` damages a file of the laboratory at random, bytes, values, cells or numbers, and runs a command that reads
 it, within the bounds above."""
+_HIDDEN = "## Hidden and false markers"
 _RANDOM = "## Mistakes at random, and clean campaigns"
 _COLUMNS = (
     "kind", "cases", "refused by name", "done", "tracebacks or crashes", "written outside", "other faults",
@@ -81,7 +82,7 @@ def page(kept: dict) -> str:
     wrong = [_line(tried_mistakes.COLUMNS), "|---" * len(tried_mistakes.COLUMNS) + "|", *map(_line, kept["mistakes"])]
     parts = (
         "\n".join(table), f"Tried on {when([kept])}.", _MISTAKES, "\n".join(wrong), _FINDINGS, findings.counts(),
-        _DAMAGE, fuzzed(), _RANDOM, random_cases.counts(),
+        _DAMAGE, fuzzed(), _HIDDEN, hidden_markers.counts(), _RANDOM, random_cases.counts(),
     )  # fmt: skip
     return _HEAD + "\n\n".join(parts)
 

@@ -7,7 +7,7 @@ from calibration import load
 from calibration.checks import judged
 from calibration.mocap import relabelled_trials
 from calibration.robot.laboratory import Laboratory
-from tests.hostile import random_cases, tried_mistakes
+from tests.hostile import hidden_markers, random_cases, tried_mistakes
 from tests.hostile.campaign import hidden, scaled
 from tests.hostile.laboratory_kinds import KINDS
 from tests.hostile.spoilt import calibrated, error_of, tried
@@ -79,3 +79,11 @@ def test_mistakes_at_random_were_hardly_ever_silently_wrong_and_clean_campaigns_
     spoilt, good = [r for r in every if r[1]], [r for r in every if not r[1]]
     assert sum(map(random_cases.silent, spoilt)) <= max(1, 0.01 * len(spoilt))
     assert sum(bool(r[3]) for r in good) <= max(1, 0.01 * len(good))
+
+
+def test_hidden_markers_cost_no_more_than_fewer_data_and_outliers_nothing():
+    ratios = hidden_markers.ratios()
+    fewer = ratios.pop(hidden_markers.LEFT_OUT)
+    assert all(len(r) > 12 and r.mean() < 1.1 and np.sqrt(np.mean(r**2)) < 1.1 for r in ratios.values())
+    assert all(np.mean(r**2) < np.mean(fewer**2) for r in ratios.values())
+    assert hidden_markers.of_outliers() < 0.1
