@@ -31,7 +31,8 @@ def implausible_markers(trial: Trial | PostureMeans, description: Description) -
     for body in description.bodies:
         for a, b, d in _pairs(body, trial):
             if np.isfinite(d).any() and np.nanmedian(d) < _SAME:
-                yield f"markers {b} and {a} are at the same place; the same columns are mapped twice, or copied"
+                what = "the same columns are mapped twice, or copied; or see marker_unit"
+                yield f"markers {b} and {a} are at the same place; {what}"
         size = _size(body, trial)
         if np.isfinite(size) and not _SIZE[0] < size < _SIZE[1]:
             yield f"markers of body {body.name} are {size:.2g} m apart; see marker_unit"

@@ -32,7 +32,7 @@ def created(path: Path) -> Iterator[netCDF4.Dataset]:
     try:
         with _one_at_a_time, netCDF4.Dataset(path, "w", format="NETCDF4") as file:
             yield file
-    except RuntimeError as error:  # the library's only word for a full disk
+    except (RuntimeError, PermissionError) as error:  # the library's words for a full disk
         raise OSError(f"{path}: cannot be written ({error}); is the disk full?") from error
 
 

@@ -236,5 +236,5 @@ def _robot(name: str, path: Path) -> str:
         import mjcf
 
         return mjcf.urdf()
-    found = path.parent / name
+    found = (path.parent / name).resolve()  # the mapping's folder need not be there yet
     return checked_urdf(read_text(found, hint=f"it is `urdf` of {path}; or write `urdf: {PACKAGED}`"), found)

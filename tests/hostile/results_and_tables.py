@@ -173,6 +173,18 @@ CSV = [
         codes=(0,),
         slow=True,
     ),
+    Case(
+        "a draft in a folder that is not there",
+        lambda d: None,
+        "import --init out/map.yaml csv/swing.mocap.csv csv/swing.robot.csv --urdf data/nominal.urdf",
+        codes=(0,),
+    ),
+    Case(
+        "markers in metres called millimetres",
+        replaced(MAP, "marker_unit: m", "marker_unit: mm"),
+        IMPORT,
+        "or see marker_unit",
+    ),
     Case("a comment above the header", replaced("csv/swing.robot.csv", "t", "# log\nt"), IMPORT, "is it the header?"),
     Case("mapping with ragged approach", replaced(MAP, "approach:\n", "approach: [[1], [1, 1]]\n"), IMPORT, "approach"),
 ]
