@@ -39,8 +39,7 @@ STAGE = "stick_slip"
 SOURCES: tuple[Source, ...] = ("plate", "dynamics")
 _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
-_BETTER = 0.8  # mean square over that of the slipping base, below which the compliance takes an axis
-_HALF = 0.5  # mean square over that with the plate's correction, below which the correction harms
+_BETTER = 0.8  # mean square over another's, below which a prediction takes its place: the compliance's of an axis
 _WORTH, _LESS = 0.8, 0.1  # R2 of yaw; by which that of the plate may be less
 _ELSEWHERE, _SHOWN = 0.009, 3.0  # [m] a wheel may seem off its place; chi-square of two degrees of freedom
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
@@ -215,7 +214,7 @@ def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
     tried = fit_direction("plate", replace(campaign, corrected=False), fits[1].logarithms)
     calm = _calm((fits[0], tried))
     left = [np.log(d.held_out.only(calm).variance(np.ones(3, dtype=bool))).mean() for d in (fits[0], tried)]
-    return tried if left[1] < left[0] + np.log(_HALF) else fits[0]
+    return tried if left[1] < left[0] + np.log(_BETTER) else fits[0]
 
 
 def _moved(direction: Direction, names: Sequence[str]) -> Iterator[Verdict]:
