@@ -1,10 +1,17 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import mjcf
-from calibration.stages.stick_slip.wheels import NAMES, PRIOR, WIDE, SlipParameters, preloads, prior_by_tilt, wheel_set
+from calibration.stages.stick_slip.wheels import (
+    NAMES,
+    PRIOR,
+    WIDE,
+    SlipParameters,
+    WheelSet,
+    preloads,
+    prior_by_tilt,
+    wheel_set,
+)
 from tests.calibration.stages.stick_slip.slipping import POSITION, TRUTH, WEIGHT, WHEELS
 from tests.doubles.moving_base import WHEELS as DECLARED
 
@@ -95,7 +102,7 @@ def test_heave_that_is_off_by_a_third_moves_shares_by_less_than_their_sigma(off)
 
 
 def test_where_there_are_no_back_casters_their_share_keeps_the_wide_prior():
-    wheels = replace(WHEELS, names=WHEELS.names[:4], types=WHEELS.types[:4], position=POSITION[:4])
+    wheels = WheelSet(WHEELS.names[:4], WHEELS.types[:4], POSITION[:4], WHEELS.weight[:4])
     prior = prior_by_tilt(wheels, tilt_stiffness(wheels))
     assert prior.sigma[12] == pytest.approx(WIDE.sigma[12], rel=0.01)
     assert prior.mean[12] == pytest.approx(WIDE.mean[12], abs=1e-3)
