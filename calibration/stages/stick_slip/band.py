@@ -121,7 +121,8 @@ def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) 
     rng = np.random.Generator(np.random.PCG64(len(trials.ids)))
     variances, axes = np.linalg.eigh(covariance)
     far = rng.standard_normal((_DRAWS, len(logarithms)))
-    draws = logarithms + (far * np.sqrt(np.maximum(variances, 0.0))) @ axes.T
+    root = (axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T  # symmetric: axes may change sign for next to nothing
+    draws = logarithms + far @ root
     every = np.concatenate([draws, logarithms[None]])
     costs = np.array([trials.cost(p, e) for p, e in zip(every, trials.errors(every), strict=True)])
     excess = costs[:-1] - costs[-1] - (far**2).sum(axis=1)

@@ -17,7 +17,7 @@ import numpy as np
 from calibration.stages.stick_slip.band import LeftOut, block_means, ensemble_of, fitted_band, reached
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.model import Direction
-from calibration.stages.stick_slip.search import FRICTIONS, Point, searched, tried, warmed
+from calibration.stages.stick_slip.search import FRICTIONS, Point, searched, settled, tried, warmed
 from calibration.stages.stick_slip.wheels import SlipParameters, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source
@@ -54,6 +54,7 @@ class Fitted:
 def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
     """The parameters that predict the trials best; from a known start (13,), where there is one, without a search."""
     best, starts = searched(trials) if start is None else (warmed(trials, start), ())
+    best = settled(trials, best)
     H_k, g_k = trials.normal(best.logarithms, best.errors, both=True)
     H = H_k.sum(axis=0) + trials.prior.information
     inverse = np.linalg.inv(H)
