@@ -39,7 +39,7 @@ class Session:
     @classmethod
     def remounted(cls, tolerances: Tolerances) -> Self:
         """Both marker bodies put back as drawings have them: on either day off by the tolerances of a body."""
-        one = (np.sqrt(2.0) * tolerances.body_translation, np.sqrt(2.0) * tolerances.body_rotation)
+        one = (2.0**0.5 * tolerances.body_translation, 2.0**0.5 * tolerances.body_rotation)
         return cls(one, one)
 
     @property
