@@ -1,11 +1,12 @@
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from calibration.stages.stick_slip.fit import fit_direction, fitted, left_out
 from calibration.stages.stick_slip.likelihood import joined
-from calibration.stages.stick_slip.search import displaced, searched
+from calibration.stages.stick_slip.search import displaced, searched, settled, tried
 from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, SlipParameters
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import TRUTH
@@ -49,6 +50,33 @@ def test_from_far_off_the_search_comes_to_the_same(trials, found):
     best, _ = searched(trials)
     np.testing.assert_allclose(best.logarithms[STIFFNESSES], found.logarithms[STIFFNESSES], atol=0.03)
     np.testing.assert_allclose(slip_forces(best.logarithms), slip_forces(found.logarithms), atol=0.03)
+
+
+@dataclass(frozen=True)
+class RoughValley:
+    """Trials whose cost is |A (p - 1)|^2 and ripples of .1 with cliffs where the last parameter falls below 0.97."""
+
+    A: np.ndarray
+
+    prior = SimpleNamespace(information=np.zeros((6, 6)))
+
+    def errors(self, points):
+        return list((points - 1.0) @ self.A.T)
+
+    def cost(self, point, error):
+        return (error**2).sum() + 0.1 * np.sin(300.0 * point).sum() + 100.0 * (point[-1] < 0.97)
+
+    def normal(self, point, error, both):
+        return (self.A.T @ self.A)[None], np.zeros((1, 6))
+
+
+def test_ends_a_deviation_apart_come_to_the_same():
+    """A search may end at either, for data that differ by next to nothing."""
+    valley = RoughValley(20.0 * np.eye(6) + 3.0 * np.random.default_rng(1).normal(size=(6, 6)))
+    way = np.linalg.solve(valley.A, np.full(6, 0.5))
+    a, b = (settled(valley, point) for point in tried(valley, 1.0 + np.outer([-1.0, 1.0], way)))
+    for end in (a, b):
+        assert np.linalg.norm(valley.A @ (end.logarithms - 1.0)) < 0.4
 
 
 def test_several_starts_are_made_and_the_best_is_kept(trials):
