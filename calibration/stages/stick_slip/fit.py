@@ -54,8 +54,7 @@ class Fitted:
 def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
     """The parameters that predict the trials best; from a known start (13,), where there is one, without a search."""
     best, starts = searched(trials) if start is None else (warmed(trials, start), ())
-    best = settled(trials, best)
-    H_k, g_k = trials.normal(best.logarithms, best.errors, both=True)
+    best, (H_k, g_k) = settled(trials, best)
     H = H_k.sum(axis=0) + trials.prior.information
     inverse = np.linalg.inv(H)
     covariance = inverse + inverse @ (g_k.T @ g_k) @ inverse

@@ -152,10 +152,14 @@ class Trials:
 
         Derivatives are differences, forward or, if `both`, central.
         """
-        p = len(logarithms)
-        J = np.array(self.errors(logarithms + DIFFERENCE * np.eye(p)))
-        J = (J - self.errors(logarithms - DIFFERENCE * np.eye(p))) / 2.0 if both else J - errors
-        J /= DIFFERENCE
+        steps = DIFFERENCE * np.eye(len(logarithms))
+        E = np.array(self.errors(logarithms + steps))
+        E = 0.5 * (E - self.errors(logarithms - steps)) if both else E - errors
+        return self.weighed(E, steps, errors)
+
+    def weighed(self, E: np.ndarray, steps: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same by what each of the steps (p, p), one a row, adds to the errors, E (p, w, WINDOW, 3)."""
+        p, J = len(steps), np.tensordot(np.linalg.inv(steps), E, 1)
         trial, _, _ = self.windows
         count = np.maximum(self.windows[2].sum(axis=1), 1)
         weight = (self.independent / count)[:, None] / self.variances(errors)

@@ -13,7 +13,7 @@ The cost is rough: data that differ by single precision end half a standard devi
 
     z_i = (c(-1) - c(1)) / 2 / max(c(1) + c(-1) - 2 c(0), 2),    p = p_0 + H^-1/2 z,    c(+-1) at z_i = +-1
 
-and by the side that is no cliff alone, with the information's curvature, where the other one is.
+and none along an axis with a cliff on one side, whose information is that of the other one.
 
 Where wheels are declared is not fitted, but looked for: of each wheel alone, by a step from the best point in the
 parameters and its place, whose prior is PLACE wide. Right places seem off by up to 14 mm on robots of development,
@@ -85,19 +85,39 @@ def warmed(trials: Trials, start: np.ndarray) -> Point:
     return descended(trials, scanned(trials, tried(trials, [start])[0]))
 
 
-def settled(trials: Trials, best: Point) -> Point:
-    """The bottom of the valley, as costs a standard deviation to either side along each axis of z have it."""
-    H_k, _ = trials.normal(best.logarithms, best.errors, both=False)
-    variances, axes = np.linalg.eigh(np.linalg.inv(H_k.sum(axis=0) + trials.prior.information))
-    root = (axes * np.sqrt(variances)) @ axes.T
+def settled(trials: Trials, best: Point) -> tuple[Point, tuple[np.ndarray, np.ndarray]]:
+    """The bottom of the valley by costs a standard deviation to either side along each axis of z.
+
+    And information (k, p, p) and gradient (k, p) of the trials there, by differences as wide.
+    """
+    end, (H_k, _) = best.cost, trials.normal(best.logarithms, best.errors, both=False)
     for _ in range(_ROUNDS):
-        points = tried(trials, best.logarithms + np.concatenate([root, -root]))
-        up, down = np.reshape([p.cost - best.cost for p in points], (2, -1))
-        z = (down - up) / 2.0 / np.maximum(up + down, 2.0)
-        low, high = np.minimum(up, down), np.maximum(up, down)
-        z = np.where((high > _CLIFF) & (low < 1.0), np.sign(down - up) * (1.0 - low) / 2.0, z)
-        (best,) = tried(trials, [best.logarithms + np.clip(z, -1.0, 1.0) @ root])
-    return best
+        root = _root(trials, H_k)
+        z, E = _around(trials, best, root)
+        (new,) = tried(trials, [best.logarithms + np.clip(z, -1.0, 1.0) @ root])
+        if new.cost > end + _GAIN:
+            break
+        (H_k, _), best = trials.weighed(E, root, best.errors), new
+    root = _root(trials, H_k)
+    return best, trials.weighed(_around(trials, best, root)[1], root, best.errors)
+
+
+def _around(trials: Trials, at: Point, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """z (p,) of the least cost along each row of the root (p, p), and what one of z adds to the errors."""
+    points = tried(trials, at.logarithms + np.concatenate([root, -root]))
+    up, down = rises = np.reshape([p.cost - at.cost for p in points], (2, -1))
+    above, below = np.reshape([p.errors - at.errors for p in points], (2, len(root), *at.errors.shape))
+    low, high = rises.min(axis=0), rises.max(axis=0)
+    cliff = (high > _CLIFF) & (low < 1.0)
+    z = np.where(cliff, 0.0, (down - up) / 2.0 / np.maximum(up + down, 2.0))
+    one_sided = np.where((up < down)[:, None, None, None], above, -below)
+    return z, np.where(cliff[:, None, None, None], one_sided, 0.5 * (above - below))
+
+
+def _root(trials: Trials, H_k: np.ndarray) -> np.ndarray:
+    """H^-1/2 (p, p), symmetric: its axes do not depend on the order of like eigenvalues."""
+    variances, axes = np.linalg.eigh(np.linalg.inv(H_k.sum(axis=0) + trials.prior.information))
+    return np.asarray((axes * np.sqrt(variances)) @ axes.T)
 
 
 def descended(trials: Trials, best: Point) -> Point:
