@@ -4,6 +4,7 @@ Robots that no method was developed on; static postures only, so that `full` is 
 """
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from calibration.prediction.second_session import (
     reregistered_compensator,
     session_of,
 )
+from calibration.recording.schema import Description
 from calibration.robot.hand_uncertainty import Session
 from scenarios import load
 from tests.acceptance.claims import keep
@@ -57,22 +59,21 @@ def inside(robot: Compensator, postures: tuple[np.ndarray, ...], xyz: np.ndarray
     return float((np.linalg.norm(found.positions - p, axis=2) <= found.radius_95).mean())
 
 
-@pytest.fixture(scope="module")
-def shares(tmp_path_factory) -> np.ndarray:
-    """Of each robot, the share of markers in each of the bands."""
-    robots = []
-    for seed in SEEDS:
-        folder = tmp_path_factory.mktemp(str(seed))
-        config = load("humanoids2024", [*STATIC, "twin.campaign.confirmation=true"]).twin
-        record(config, seed, folder)
-        dataset = opened(folder / "dataset")
-        estimate = calibrate(dataset)
-        predict, robot = predictor(estimate, dataset), Compensator.of(estimate)
-        assert estimate.main == "full"
-        trials = [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)]
-        again = reregistered_compensator(robot, *_postures(predict, BASELINE, trials), dataset.description)
-        postures = tuple(np.array(x) for x in zip(*seen(dataset, predict.robot), strict=True))
-        robots.append((robot, again, postures, dataset.description))
+def two_days(seed: int, folder: Path) -> tuple[Compensator, Compensator, tuple[np.ndarray, ...], Description]:
+    """A robot as calibrated on the first day and as registered on the second, postures of that one, the laboratory."""
+    record(load("humanoids2024", [*STATIC, "twin.campaign.confirmation=true"]).twin, seed, folder)
+    dataset = opened(folder / "dataset")
+    estimate = calibrate(dataset)
+    predict, robot = predictor(estimate, dataset), Compensator.of(estimate)
+    assert estimate.main == "full"
+    trials = [relabelled_trial(dataset, entry) for entry in registration_trials(dataset)]
+    again = reregistered_compensator(robot, *_postures(predict, BASELINE, trials), dataset.description)
+    postures = tuple(np.array(x) for x in zip(*seen(dataset, predict.robot), strict=True))
+    return robot, again, postures, dataset.description
+
+
+def shares_of(robots: list[tuple]) -> np.ndarray:
+    """Share of markers (n, 5) in each of the bands."""
     changed, found = [changes(robot.hand, again.hand) for robot, again, *_ in robots], []
     for k, (robot, again, postures, lab) in enumerate(robots):
         others = session_of(changed[:k] + changed[k + 1 :])
@@ -80,9 +81,16 @@ def shares(tmp_path_factory) -> np.ndarray:
         pairs = ((again, None), (again, Session()), *((robot, day) for day in days))
         xyz = np.array([m.xyz for m in lab.hand_body.markers])
         found.append([inside(r, postures, xyz, day) for r, day in pairs])
-    for name, share in zip(BANDS, np.array(found).T, strict=True):
-        keep(f"geometry/session/{name}", share)
     return np.array(found)
+
+
+@pytest.fixture(scope="module")
+def shares(tmp_path_factory) -> np.ndarray:
+    """Of each robot."""
+    found = shares_of([two_days(seed, tmp_path_factory.mktemp(str(seed))) for seed in SEEDS])
+    for name, share in zip(BANDS, found.T, strict=True):
+        keep(f"geometry/session/{name}", share)
+    return found
 
 
 @pytest.mark.slow
