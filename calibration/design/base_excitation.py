@@ -122,7 +122,7 @@ class Excitation:
         blank = PlanarMotion(np.zeros((len(forcing.t) // BLOCK, 3)), np.ones(len(forcing.t) // BLOCK, bool), self.noise)
         x, share = joined(self.wheels, [(forcing, blank)]).simulated(p[None])
         seen = joined(self.wheels, [(forcing, PlanarMotion(blocks(x[0]), blank.valid, self.noise))])
-        (H,), _ = seen.normal(p, seen.errors(p[None])[0], both=True)
+        (H,), _ = seen.normal(p, seen.errors(p[None])[0])
         return H, float((share[0] > 0.0).mean())
 
 

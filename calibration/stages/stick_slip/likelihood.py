@@ -147,15 +147,10 @@ class Trials:
         rows = (self.independent[:, None] * np.log(self.variances(errors))).sum(axis=1)
         return np.bincount(self.windows[0], rows, len(self.ids))
 
-    def normal(self, logarithms: np.ndarray, errors: np.ndarray, both: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Information (k, p, p) and gradient (k, p) of half the cost of each trial, prior left out.
-
-        Derivatives are differences, forward or, if `both`, central.
-        """
+    def normal(self, logarithms: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Information (k, p, p) and gradient (k, p) of half the cost of each trial, prior left out."""
         steps = DIFFERENCE * np.eye(len(logarithms))
-        E = np.array(self.errors(logarithms + steps))
-        E = 0.5 * (E - self.errors(logarithms - steps)) if both else E - errors
-        return self.weighed(E, steps, errors)
+        return self.weighed(np.array(self.errors(logarithms + steps)) - errors, steps, errors)
 
     def weighed(self, E: np.ndarray, steps: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The same by what each of the steps (p, p), one a row, adds to the errors, E (p, w, WINDOW, 3)."""

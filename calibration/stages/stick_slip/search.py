@@ -90,7 +90,7 @@ def settled(trials: Trials, best: Point) -> tuple[Point, tuple[np.ndarray, np.nd
 
     And information (k, p, p) and gradient (k, p) of the trials there, by differences as wide.
     """
-    end, (H_k, _) = best.cost, trials.normal(best.logarithms, best.errors, both=False)
+    end, (H_k, _) = best.cost, trials.normal(best.logarithms, best.errors)
     for _ in range(_ROUNDS):
         root = _root(trials, H_k)
         z, E = _around(trials, best, root)
@@ -135,7 +135,7 @@ def shaken(trials: Trials, best: Point) -> Point:
     """The best point, or one of another valley, from draws about it."""
     rng, prior = np.random.Generator(np.random.PCG64(0)), trials.prior
     while True:
-        H_k, _ = trials.normal(best.logarithms, best.errors, both=False)
+        H_k, _ = trials.normal(best.logarithms, best.errors)
         root = np.linalg.cholesky(np.linalg.inv(H_k.sum(axis=0) + prior.information))
         draws = _WIDER[:, None] * (rng.standard_normal((len(_WIDER), len(NAMES))) @ root.T)
         new = min(tried(trials, prior.bounded(best.logarithms + np.concatenate([draws, _PAIRS]))), key=lambda p: p.cost)
@@ -166,7 +166,7 @@ def tried(trials: Trials, logarithms: Sequence[np.ndarray] | np.ndarray) -> list
 
 def stepped(trials: Trials, at: Point) -> Point:
     """One step on, or the same point, ended, where no step gains."""
-    H_k, g_k = trials.normal(at.logarithms, at.errors, both=False)
+    H_k, g_k = trials.normal(at.logarithms, at.errors)
     H = H_k.sum(axis=0) + trials.prior.information
     g = g_k.sum(axis=0) + trials.prior.information @ (at.logarithms - trials.prior.mean)
     _, factor, least, most = _DAMPING
