@@ -22,6 +22,7 @@ from typing import Literal
 
 import numpy as np
 
+from calibration.errors import NotEnoughData
 from calibration.mocap.cluster_pose import body_poses
 from calibration.recording.posture_means import PostureMeans
 from calibration.recording.schema import Body, Description
@@ -38,6 +39,7 @@ _ODD, _FAR = 3.0, 1e-3  # times the usual size, and [m], a marker may be off its
 _WINDOW = 2.0  # [s]
 _QUIET = 20.0  # times less than declared that markers may scatter unsaid
 _STRAIN, _WRONG_STRAIN = 2e-3, 1e-2  # of one direction against another [-]
+_TURNED = 0.1  # [rad] rms of a body that shows directions of the laboratory
 _EXPLAINS, _STRETCH, _TURNS = 0.2, 0.02, 100.0  # share of the change; prior of E [-], and the samples it is worth
 _MOVED, _LASTING = 10.0, 2  # standard deviations of a marker's noise; windows in which it shows, a ghost in one
 
@@ -105,8 +107,11 @@ def wrong_shapes(lab: Laboratory, trials: Sequence[Trial | PostureMeans]) -> Ite
 
 
 def _grown(lab: Laboratory, by: float) -> Direction:
-    """Every length of the robot and its marker frames, longer by a share."""
-    chain, frames = lab.chain, lab.nominal_frames
+    """Every length of the robot and its marker frames, longer by a share; nothing where no hand is seen."""
+    try:
+        chain, frames = lab.chain, lab.nominal_frames
+    except NotEnoughData:
+        return ()
     found: list[tuple[str, float]] = []
     for joint in chain.joints:
         M = chain.nominal.jointPlacements[chain.nominal.getJointId(joint)]
@@ -153,12 +158,15 @@ _SHEARS[[2, 2, 3, 3, 4, 4], [0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = 1.0
 
 
 def _strain(bodies: Sequence[tuple[np.ndarray, Sequence[Shape]]]) -> tuple[np.ndarray, float]:
-    """E (3, 3), and the share of the changes of shape that it explains, of bodies drawn (m, 3) [m]."""
+    """E (3, 3), and the share of the changes of shape that it explains, of bodies drawn (m, 3) [m] that turn."""
     A, y = np.zeros((0, len(_SHEARS))), np.zeros(0)
     for xyz, shapes in bodies:
         e, R = (np.concatenate([getattr(s, name) for s in shapes]) for name in ("e", "R"))
         whole = np.isfinite(e).all(axis=(1, 2))
-        if whole.any():
+        turned = (
+            np.sqrt(((R[whole] - R[whole].mean(axis=0)) ** 2).sum(axis=(1, 2)).mean() / 2.0) if whole.any() else 0.0
+        )
+        if turned > _TURNED:
             f = np.stack([_stretched(xyz, R[whole], shear) for shear in _SHEARS], axis=3)
             A = np.concatenate([A, (f - f.mean(axis=0)).reshape(-1, len(_SHEARS))])
             y = np.append(y, e[whole] - e[whole].mean(axis=0))

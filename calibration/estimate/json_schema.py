@@ -127,7 +127,7 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
     """The contents of estimate.json, with the covariances of the models that have one, as an estimate."""
     robot, bundle = _known(RobotNames, file.robot, "robot"), _known(BundleParts, file.bundle, "bundle")
     if robot is not None:
-        _check_sizes(len(robot.joints), file, bundle)
+        _check_sizes(robot.joints, file, bundle)
     return Estimate(
         file.status,
         tuple(Verdict(v.stage, v.verdict, v.message) for v in file.verdicts),
@@ -146,10 +146,12 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
     )
 
 
-def _check_sizes(joints: int, file: EstimateFile, bundle: BundleParts | None) -> None:
-    """See that there is a value for each joint, and in the bundle for each drive train."""
-    sizes = [("link_zero", len(file.link_zero), joints)]
-    sizes += [(f"{name}: reading_error", len(m.reading_error), joints) for name, m in file.models.items()]
+def _check_sizes(names: tuple[str, ...], file: EstimateFile, bundle: BundleParts | None) -> None:
+    """See that there is a value for each joint, on the way to the hand for readings, and for each drive train."""
+    joints, sizes = len(names), [("link_zero", len(file.link_zero), len(names))]
+    for name, m in file.models.items():
+        on_the_way = [joint for joint in names if joint in {e.joint for e in m.reading_error}]
+        sizes.append((f"{name}: reading_error", len(m.reading_error), len(on_the_way)))
     if bundle is not None:
         sizes += [("offset", len(bundle.offset) or -1, joints), ("at_rest", len(bundle.at_rest), len(bundle.trains))]
         inertials = [len(train.inertials) for train in bundle.trains]
