@@ -26,6 +26,13 @@ OF_KEY = "[key]"
 MOST_FINDINGS = 100
 """Of one file that are shown."""
 
+_PLAIN = (
+    ("Input should be", "must be"),
+    ("less than or equal to", "at most"),
+    ("greater than or equal to", "at least"),
+)
+"""Words of pydantic's, and ours."""
+
 LONGEST_VALUE = 60
 """Characters of a found value that are shown."""
 
@@ -110,6 +117,8 @@ def _message(detail: Mapping[str, Any], path: Sequence[str], known: Sequence[str
     if detail["type"] in UNKNOWN:
         return _unknown("unknown field", path[-1], known)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    for theirs, ours in _PLAIN:
+        message = message.replace(theirs, ours)
     return f"{message} (got {_shown(detail['input'])})"
 
 

@@ -83,7 +83,7 @@ def test_a_signal_leaves_nothing(engines, tiago_twin, number, expected):
 BAD_FILES = [
     (YAML.replace("gap", "gape"), ["f.yaml:5:3: twin.gape: unknown field; did you mean gap?", "twin.gap: missing"]),
     (YAML + "seed: 4\n", ["f.yaml:6:1: not YAML", "duplicate key"]),
-    (YAML.replace("0.01", "0.5"), ["f.yaml:5:8: twin.gap: ", "less than or equal to 0.05 (got 0.5)"]),
+    (YAML.replace("0.01", "0.5"), ["f.yaml:5:8: twin.gap: ", "at most 0.05 (got 0.5)"]),
     (YAML.replace("3", "'3'").replace("0.01", "wide"), ["f.yaml:3:7: seed: ", "f.yaml:5:8: twin.gap: "]),
     ("name: [small\n", ["f.yaml:2:1: not YAML"]),
     ("", ["f.yaml:1:1: the file is empty"]),

@@ -50,15 +50,15 @@ def test_a_file_may_say_only_what_differs(tmp_path):
 @pytest.mark.parametrize(
     ("values", "finding"),
     [
-        (["twin.arm.arm_6_joint.gap: -0.1"], "4:29: twin.arm.arm_6_joint.gap: Input should be greater"),
+        (["twin.arm.arm_6_joint.gap: -0.1"], "4:29: twin.arm.arm_6_joint.gap: must be at least"),
         (["twin.base:", "  drive: {stifness: 3}"], "5:13: twin.base.drive.stifness: unknown field; did you"),
         (["twin.base:", "  drive: {friction: 3}"], "5:5: twin.base.drive.stiffness: missing"),
         (["twin.base.drive.damping: [1.0, 2.0]"], "4:3: twin.base.drive.damping.2: missing"),
         (["twin.campain.push: 1.0"], "4:3: twin.campain: unknown field; did you mean campaign"),
         (["twin..campaign: 1.0"], "4:3: set.twin..campaign: write path.to.field"),
         (["seed.root: 1"], "4:3: seed.root: seed is a single value"),
-        (["seed: 3=4"], "4:9: seed: Input should be a valid integer"),
-        (["twin.timestep: .nan"], "4:18: twin.timestep: Input should be a finite number"),
+        (["seed: 3=4"], "4:9: seed: must be a valid integer"),
+        (["twin.timestep: .nan"], "4:18: twin.timestep: must be a finite number"),
     ],
 )  # fmt: skip
 def test_a_finding_has_the_place_it_stands_at_in_the_file_that_extends(tmp_path, values, finding):
@@ -71,8 +71,8 @@ def test_findings_come_at_once_each_from_its_own_file(tmp_path):
     assert [line.split(": ")[:2] for line in refused(path, "twin.payload.mass=9", "twin.campaign.push=-1")] == [
         ["first.yaml:4:9", "seed"],
         ["second.yaml:4:18", "twin.timestep"],
-        ["--set twin.payload.mass", "Input should be less than or equal to 3 (got 9)"],
-        ["--set twin.campaign.push", "Input should be greater than or equal to 0 (got -1)"],
+        ["--set twin.payload.mass", "must be at most 3 (got 9)"],
+        ["--set twin.campaign.push", "must be at least 0 (got -1)"],
     ]
 
 

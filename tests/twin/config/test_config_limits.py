@@ -27,9 +27,9 @@ def test_postures_beyond_the_joints_limits_are_reported_by_joint_value_and_limit
 @pytest.mark.parametrize("rate", [0.001, 9.0, 1e5])
 def test_rates_no_instrument_has_are_refused(name, rate):
     (line,) = refused(f"twin.instruments.{name}={rate}")
-    assert line.startswith(f"--set twin.instruments.{name}: Input should be ") and line.endswith(f"(got {rate})")
+    assert line.startswith(f"--set twin.instruments.{name}: must be ") and line.endswith(f"(got {rate})")
 
 
 def test_a_time_step_that_takes_for_ever_is_refused():
     (line,) = refused("twin.timestep=1e-9")
-    assert line.startswith("--set twin.timestep: Input should be greater than or equal to 0.00001")
+    assert line.startswith("--set twin.timestep: must be at least 0.00001")

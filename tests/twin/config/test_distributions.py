@@ -77,8 +77,8 @@ def test_distributions_outlive_a_written_file_and_a_changed_field(tmp_path):
         ("{}", "write a number"),
         ("{normal: [0.024, 0.0]}", "standard deviation of a normal must be positive"),
         ("{uniform: [0.03, 0.02]}", "ends of a uniform must rise"),
-        ("{normal: [0.024, 0.010]}", "greater than or equal to 0 .got -0.00"),
-        ("{uniform: [0.02, 0.2]}", "less than or equal to 0.1 .got 0.2"),
+        ("{normal: [0.024, 0.010]}", "at least 0 .got -0.00"),
+        ("{uniform: [0.02, 0.2]}", "at most 0.1 .got 0.2"),
     ],
 )
 def test_a_wrong_distribution_is_reported_with_its_place(value, message):

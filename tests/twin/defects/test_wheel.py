@@ -64,7 +64,7 @@ def test_wheels_without_guides_have_no_friction_in_them(ground):
 @pytest.mark.parametrize(
     ("setting", "reported"),
     [
-        ("caster_back.contact_damping=0", "contact_damping: Input should be greater than 0"),
+        ("caster_back.contact_damping=0", "contact_damping: must be greater than 0"),
         ("drive.torsion_damping=[0, 0, 1]", "needs torsional stiffness about the same axis"),
     ],
 )
