@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from scenarios.steps import Progress
 
@@ -41,19 +42,28 @@ def progress() -> Iterator[Progress]:
 
 @contextmanager
 def _bars(console: Console) -> Iterator[Progress]:
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, ProgressColumn, Task, TaskProgressColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
+
+    class Left(ProgressColumn):
+        """Time left, which passes between two reports as well."""
+
+        def render(self, task: Task) -> Text:
+            done, since = task.completed, time.monotonic() - task.fields["at_time"]
+            passed = (task.elapsed or 0.0) - since
+            left = passed * (1.0 / done - 1.0) - since if _EARLY < done < 1.0 else 0.0
+            return Text(f"{left:.0f} s left" if left > 0.0 else "", style="progress.remaining")
 
     steps: dict[str, TaskID] = {}
     step_name, at_what = (TextColumn(text, markup=False) for text in ("{task.description:<10}", "{task.fields[at]}"))
-    times = TimeElapsedColumn(), TimeRemainingColumn()
+    times = TimeElapsedColumn(), Left()
     with Bars(step_name, BarColumn(), TaskProgressColumn(), *times, at_what, console=console) as bars:
 
         def show(step: str, at: str, fraction: float) -> None:
             if step not in steps:
                 _finish(bars, steps)
-                steps[step] = bars.add_task(step, total=1.0, at=at)
-            bars.update(steps[step], completed=fraction, at=at)
+                steps[step] = bars.add_task(step, total=1.0, at=at, at_time=time.monotonic())
+            bars.update(steps[step], completed=fraction, at=at, at_time=time.monotonic())
 
         yield show
         _finish(bars, steps)

@@ -159,11 +159,10 @@ def options(**chosen: str | None) -> "Options":
 
     given = {name: value for name, value in chosen.items() if value is not None}
     try:
-        found: Options = TypeAdapter(Options).validate_python(given)
+        return TypeAdapter(Options).validate_python(given)
     except ValidationError as error:
         lines = [f"--{e['loc'][0]}: {e['msg']} (got {e['input']!r})" for e in error.errors()]
         raise ScenarioError("\n".join(lines)) from error
-    return found
 
 
 def evaluate(
@@ -272,15 +271,16 @@ def _evaluate(
     import calibration
     from scenarios.score.score import score
 
-    found, evaluation = evaluated(estimate, calibration.load(dataset), zeros, progress)
+    share = 1.0 if truth is None else 0.8
+    scaled: Progress = lambda step, at, fraction: progress(step, at, share * fraction)  # noqa: E731
+    found, evaluation = evaluated(estimate, calibration.load(dataset), zeros, scaled)
     with ThreadPoolExecutor(1) as beside:
         saved = [beside.submit(save, out) for save in (evaluation.save, evaluation.save_predictions)]
-        scored = None
-        if truth is not None:
-            progress("score", "", 0.0)
-            scored = score(found, evaluation, Path(truth))
-            scored.save(out)
+        progress("evaluate", "writing" if truth is None else "against the truth", share)
+        scored = None if truth is None else score(found, evaluation, Path(truth))
         _ = [job.result() for job in saved]
+    if scored is not None:
+        scored.save(out)
     return evaluation, scored
 
 

@@ -51,6 +51,17 @@ def test_a_verdict_keeps_its_brackets():
     assert "0.1 [ms]" in text
 
 
+def test_time_left_passes_between_two_reports():
+    stream = io.StringIO()
+    with console._bars(Console(file=stream, force_terminal=True, width=100)) as show:
+        show("calibrate", "", 0.0)
+        time.sleep(0.1)
+        show("calibrate", "bundle", 0.05)
+        time.sleep(1.1)
+    left = [int(n) for n in re.findall(r"(\d+) s left", stream.getvalue())]
+    assert left[-1] < left[0]
+
+
 def test_steps_are_lines_without_a_terminal(capfd, monkeypatch):
     for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
         monkeypatch.delenv(name, raising=False)
