@@ -147,11 +147,12 @@ def to_estimate(file: EstimateFile, urdf: str | None, covariances: Mapping[str, 
 
 
 def _check_sizes(names: tuple[str, ...], file: EstimateFile, bundle: BundleParts | None) -> None:
-    """See that there is a value for each joint, on the way to the hand for readings, and for each drive train."""
-    joints, sizes = len(names), [("link_zero", len(file.link_zero), len(names))]
-    for name, m in file.models.items():
-        on_the_way = [joint for joint in names if joint in {e.joint for e in m.reading_error}]
-        sizes.append((f"{name}: reading_error", len(m.reading_error), len(on_the_way)))
+    """See that there is a value for each joint, in all models those on the way to the hand, and for each train."""
+    joints, on_the_way = len(names), {e.joint for m in file.models.values() for e in m.reading_error}
+    sizes = [("link_zero", len(file.link_zero), joints)]
+    sizes += [(f"{name}: reading_error", len(m.reading_error), len(on_the_way)) for name, m in file.models.items()]
+    if not on_the_way <= set(names):
+        raise ValueError(f"reading_error is of joints that the robot has not: {', '.join(on_the_way - set(names))}")
     if bundle is not None:
         sizes += [("offset", len(bundle.offset) or -1, joints), ("at_rest", len(bundle.at_rest), len(bundle.trains))]
         inertials = [len(train.inertials) for train in bundle.trains]

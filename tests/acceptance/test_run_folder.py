@@ -1,6 +1,7 @@
 """The short variant of the default scenario, from the simulation to the report."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 import calibration
 from calibration import Compensator, load_estimate
-from calibration.errors import NotEnoughData, ShapeError
+from calibration.errors import InputError, NotEnoughData, ShapeError
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.postures import readings_at
 from calibration.numerics.lie import from_vector, inverse, mean, to_vector
@@ -170,6 +171,15 @@ def compensator(estimate):
 
 def test_the_main_row_is_loaded(result):
     assert Compensator.load(result.folder / "estimate").arm is not None
+
+
+def test_a_model_with_a_joint_less_than_the_others_is_refused(result, tmp_path):
+    folder = shutil.copytree(result.folder / "estimate", tmp_path / "estimate")
+    content = json.loads((folder / "estimate.json").read_text("utf-8"))
+    content["models"]["model_2"]["reading_error"].pop()
+    (folder / "estimate.json").write_text(json.dumps(content), "utf-8")
+    with pytest.raises(InputError, match="model_2: reading_error has"):
+        load_estimate(folder)
 
 
 @pytest.fixture(scope="module")
