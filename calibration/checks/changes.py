@@ -106,7 +106,7 @@ def _best(left: Unexplained, possible: Iterable[Change]) -> Iterator[tuple[str, 
         square = float(value @ np.linalg.solve(S, value))
         over = float(np.abs(value / change.limit).max())
         if square > _CLEAR * chdtri(len(value), _CHANCE) and over > 1.0 and gain > best:
-            text = f"{change.text} by {change.size(value)} (+- {100.0 / np.sqrt(square):.0f} %)"
+            text = f"{change.text} by {change.size(value)} (known to {100.0 / np.sqrt(square):.0f} % of it)"
             best, found = gain, (text, over, change.moved(value))
     if best > 0.0:
         yield found
