@@ -63,7 +63,7 @@ def of_json(path: Path, changes: Sequence[Change]) -> None:
         elif kind == 2:
             other, name = nodes[what // 8 % len(nodes)]
             holder[key] = json.loads(json.dumps(other[name]))
-        elif kind == 3 and isinstance(holder[key], int | float):
+        elif kind == 3 and isinstance(holder[key], int | float) and abs(holder[key]) < 1e300:
             holder[key] = holder[key] * (-1.0, 1e3, 1e-3, 57.3, 0.0)[what // 8 % 5]
         else:
             holder[key] = value

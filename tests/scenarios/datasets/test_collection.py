@@ -215,6 +215,7 @@ def test_ctrl_c_leaves_an_index_of_what_is_complete_and_workers_go_on_to_the_sam
             os.kill(os.getpid(), signal.SIGINT)
 
     out = tmp_path / "c"
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are born without
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr(collection_script.time, "sleep", pause)
         made(out, produce=collection_script.numbers)
