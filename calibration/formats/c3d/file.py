@@ -116,6 +116,46 @@ class C3dFile:
         value = found["value"]
         return [v.strip() for v in value] if isinstance(value, list) else value
 
+    def number(self, group: str, name: str, default: float | None = None) -> float:
+        """The first value of a parameter, which may be written as text.
+
+        Raises:
+            InputError: It is missing without a default, empty, or no finite number.
+        """
+        value = np.ravel(self.parameter(group, name, [default]))
+        try:
+            found = float(value[0])
+        except (IndexError, TypeError, ValueError):
+            found = np.nan
+        if not np.isfinite(found):
+            raise InputError(self.path, f"{group}:{name} is {value.tolist()}, expected a number; export the file again")
+        return found
+
+    def count(self, group: str, name: str, most: int) -> int:
+        """A number of samples of those the file has: `most` where the parameter is missing.
+
+        Raises:
+            InputError: It is not from 1 to `most`.
+        """
+        found = self.number(group, name, most)
+        if not 1 <= found <= most:
+            raise InputError(self.path, f"{group}:{name} is {found:g}, the file has {most}; export the file again")
+        return int(found)
+
+    def array(self, group: str, name: str, least: tuple[int, ...]) -> np.ndarray:
+        """A parameter's values as numbers, with at least so many along each axis.
+
+        Raises:
+            InputError: It is missing or has fewer.
+        """
+        value = self.parameter(group, name, [])
+        found = np.asarray([] if isinstance(value, list) else value, dtype=float)  # text is a list
+        if found.ndim != len(least) or any(n < m for n, m in zip(found.shape, least, strict=True)):
+            raise InputError(
+                self.path, f"{group}:{name} has {found.shape} values, expected {least} or more; export the file again"
+            )
+        return found
+
     def labels(self, group: str) -> list[str]:
         """LABELS, LABELS2, ... in one."""
         found: list[str] = []

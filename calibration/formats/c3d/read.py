@@ -1,11 +1,7 @@
-"""Force plates of a C3D file, as ACTION, lab axes, about the surface centre the setup declares.
+"""Markers and force plates of a C3D file, in SI units, plates as ACTION, lab axes, about the setup's surface centre.
 
 What the file states of a plate is taken from it and compared with the setup; whose wrench it stores is the mapping's.
-
-A C3D file as markers and plates, in SI units, the plates as ACTION, lab axes, about the setup's surface centre.
-
-A C3D file says where its plates are and in which units it is, but not whose wrench it stores nor when it began. The
-second may stand in a group CLOCK (`c3d_write` puts it there); otherwise it is the mapping's `start`.
+When it began may stand in a group CLOCK (`c3d_write` puts it there); otherwise it is the mapping's `start`.
 """
 
 from collections.abc import Sequence
@@ -45,9 +41,9 @@ def read_plates(
         stored = moved_to(lab_wrench(plate, channels), plate.centre, np.array(known[name].centre))
         wrenches.append(stored if mapped.convention == "action" else -stored)
         notes.append(f"plate {name}: type {plate.type}, {mapped.convention} as declared, place as in the setup")
-    rate = float(np.ravel(file.parameter("ANALOG", "RATE"))[0])
-    begin = float((file.parameter(CLOCK, "PLATE_START") or [start])[0])
-    n = int(float((file.parameter(CLOCK, "PLATE_SAMPLES") or [len(analogs)])[0]))
+    rate = file.number("ANALOG", "RATE")
+    begin = file.number(CLOCK, "PLATE_START", start)
+    n = file.count(CLOCK, "PLATE_SAMPLES", len(analogs))
     t = (begin * rate + np.arange(n)) / rate
     centre = np.array([known[name].centre for name in layout.plates])
     return Plates(t, tuple(layout.plates), np.stack(wrenches, axis=1)[:n], centre), tuple(notes)
@@ -55,20 +51,26 @@ def read_plates(
 
 def plate_of(file: C3dFile, mapped: C3dPlateMap, factor: float, analogs: np.ndarray) -> tuple[C3dPlate, np.ndarray]:
     """A plate's parameters and its six channels, SI; type 4 channels stay volts."""
-    k, used = mapped.number - 1, int(np.ravel(file.parameter("FORCE_PLATFORM", "USED", [0]))[0])
+    k, used = mapped.number - 1, int(file.number("FORCE_PLATFORM", "USED", 0.0))
     if k >= used:
         raise InputError(file.path, f"FORCE_PLATFORM:USED is {used}, there is no plate {mapped.number}")
-    kind = int(np.ravel(file.parameter("FORCE_PLATFORM", "TYPE"))[k])
+    kind = int(file.array("FORCE_PLATFORM", "TYPE", (k + 1,))[k])
     if kind not in (2, 4):
         raise InputError(file.path, f"plate {mapped.number} is of type {kind}; export it as type 2 or 4")
-    chosen = np.asarray(file.parameter("FORCE_PLATFORM", "CHANNEL"), dtype=int)[:6, k] - 1
+    chosen = file.array("FORCE_PLATFORM", "CHANNEL", (6, k + 1))[:6, k].astype(int) - 1
+    if chosen.min() < 0 or chosen.max() >= analogs.shape[1]:
+        raise InputError(
+            file.path,
+            f"FORCE_PLATFORM:CHANNEL gives plate {mapped.number} the channels {(chosen + 1).tolist()}, "
+            f"the file has 1 to {analogs.shape[1]}; export it again with all channels of the plate",
+        )
     moments = _moment_unit(file, chosen, mapped, kind, factor)
     scale = np.repeat([1.0, moments], 3)
     matrix = np.diag(scale)
     if kind == 4:
-        matrix = scale[:, None] * np.asarray(file.parameter("FORCE_PLATFORM", "CAL_MATRIX"), dtype=float)[:, :, k]
-    corners = np.asarray(file.parameter("FORCE_PLATFORM", "CORNERS"), dtype=float)[:, :, k] * factor
-    origin = np.asarray(file.parameter("FORCE_PLATFORM", "ORIGIN"), dtype=float)[:, k] * factor
+        matrix = scale[:, None] * file.array("FORCE_PLATFORM", "CAL_MATRIX", (6, 6, k + 1))[:6, :6, k]
+    corners = file.array("FORCE_PLATFORM", "CORNERS", (3, 4, k + 1))[:3, :4, k] * factor
+    origin = file.array("FORCE_PLATFORM", "ORIGIN", (3, k + 1))[:3, k] * factor
     plate = C3dPlate(kind, corners, origin, matrix)
     if mapped.origin == "surface_to_transducer":
         plate = negated_origin(plate)
@@ -141,7 +143,7 @@ def read_c3d(files: Sequence[Path], layout: C3dLayout, setup: Setup) -> Recorded
     if plates is not None and not own:
         notes = (*notes, f"{file.path.name}: no {CLOCK} group: plates sampled with the markers, on one clock")
     dwells = _dwells(file, layout, start)
-    seen = len(t) if own is None else int(own.get("MOCAP_SAMPLES", len(t)))
+    seen = file.count(CLOCK, "MOCAP_SAMPLES", len(t))
     markers = Markers(t[:seen], markers.names, markers.position[:seen])
     together = ("plate",) if plates is not None and not own else ()
     return Recorded(str(file.path), markers, plates=plates, dwells=dwells, together=together, notes=notes)
@@ -155,25 +157,21 @@ def length_unit(file: C3dFile) -> float:
     return LENGTHS[units[0]]
 
 
-def times_of(file: C3dFile) -> tuple[float, float, dict[str, float]]:
-    """Marker rate [Hz], time of the first frame [s], and the file's own clocks."""
-    rate = float(np.ravel(file.parameter("POINT", "RATE", [0.0]))[0])
+def times_of(file: C3dFile) -> tuple[float, float, bool]:
+    """Marker rate [Hz], time of the first frame [s], and whether the file states the instruments' own clocks."""
+    rate = file.number("POINT", "RATE", 0.0)
     if not rate > 0.0:
         raise InputError(file.path, f"POINT:RATE is {rate}; export the file again")
     _check_ratio(file, rate)
-    own = {}
-    for name in ("MOCAP_START", "PLATE_START", "MOCAP_SAMPLES", "PLATE_SAMPLES"):
-        value = file.parameter(CLOCK, name)
-        if value is not None:
-            own[name] = float(value[0])
-    return rate, own.get("MOCAP_START", 0.0), own
+    own = file.parameter(CLOCK, "MOCAP_START") is not None
+    return rate, file.number(CLOCK, "MOCAP_START", 0.0), own
 
 
 def _check_ratio(file: C3dFile, rate: float) -> None:
     header = file.header
     if not header.analog:
         return
-    analog = float(np.ravel(file.parameter("ANALOG", "RATE", [0.0]))[0])
+    analog = file.number("ANALOG", "RATE", 0.0)
     if header.per_frame < 1 or abs(analog - rate * header.per_frame) > 1e-3 * rate:
         raise InputError(
             file.path,
@@ -195,9 +193,12 @@ def _dwells(file: C3dFile, layout: C3dLayout, start: float) -> np.ndarray | None
     """Start and stop of the static postures (n, 2) [s, mocap clock] from the file's events."""
     if layout.dwell_events is None:
         return None
-    labels, times = file.parameter("EVENT", "LABELS", []), file.parameter("EVENT", "TIMES")
+    labels, times = file.parameter("EVENT", "LABELS", []), np.ravel(file.parameter("EVENT", "TIMES", []))
     if not labels:
         return None
+    if len(times) != 2 * len(labels):
+        text = f"EVENT:TIMES has {len(times)} values, expected minutes and seconds of {len(labels)} LABELS"
+        raise InputError(file.path, f"{text}; export it again")
     pairs = []
     for wanted in layout.dwell_events:
         at = [60.0 * m + s for label, m, s in zip(labels, *np.reshape(times, (2, -1)), strict=True) if label == wanted]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.formats.c3d.file import C3dFile
+from calibration.formats.c3d.file import CLOCK, C3dFile
 from calibration.formats.c3d.plate import lab_wrench
 from calibration.formats.c3d.read import length_unit, plate_of, times_of
 from calibration.formats.c3d.write import DWELL_EVENTS
@@ -26,9 +26,9 @@ def view_c3d(path: Path) -> FileView:
     labels = [n for n in file.labels("POINT") if n and not n.startswith(_UNNAMED)]
     columns = [file.labels("POINT").index(n) for n in labels]
     t = (start * rate + np.arange(file.header.frames)) / rate
-    seen = len(t) if own is None else int(own.get("MOCAP_SAMPLES", len(t)))
+    seen = file.count(CLOCK, "MOCAP_SAMPLES", len(t))
     markers = Markers(t[:seen], tuple(labels), (file.positions[:, columns] * factor)[:seen])
-    used = int(np.ravel(file.parameter("FORCE_PLATFORM", "USED", [0]))[0])
+    used = int(file.number("FORCE_PLATFORM", "USED", 0.0))
     plates = tuple(_plate(file, k + 1, factor, used) for k in range(used))
     together = ("plate",) if plates and not own else ()
     lines = ["markers: same"]

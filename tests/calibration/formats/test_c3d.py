@@ -292,6 +292,10 @@ def holes(c3d):
     c3d["data"]["analogs"][0, 2, 500:520] = np.nan
 
 
+def clock(name, value):
+    return set_parameter("CLOCK", name, [value])
+
+
 BAD = {
     "a block of NaN": (holes, "plate: 20 samples are missing, the first is 500; cut them out"),
     "mirrored corners": (corners([1, 0, 3, 2]), "CORNERS put its z axis upwards"),
@@ -306,6 +310,16 @@ BAD = {
     "pounds": (set_parameter("ANALOG", "UNITS", ["lbf"] * 12), "expected N and N.mm"),
     "type 3": (set_parameter("FORCE_PLATFORM", "TYPE", [3, 3]), "is of type 3; export it as type 2 or 4"),
     "one plate": (set_parameter("FORCE_PLATFORM", "USED", [1]), "FORCE_PLATFORM:USED is 1, there is no plate 2"),
+    "fewer types than plates": (set_parameter("FORCE_PLATFORM", "TYPE", [2]), "TYPE has (1,) values, expected (2,)"),
+    "three channels a plate": (
+        set_parameter("FORCE_PLATFORM", "CHANNEL", [[1, 7], [2, 8], [3, 9]]), "CHANNEL has (3, 2) values, expected (6,",
+    ),
+    "a channel the file lacks": (
+        set_parameter("FORCE_PLATFORM", "CHANNEL", [[k, k + 7] for k in range(1, 7)]), "the file has 1 to 12; export",
+    ),
+    "more samples than frames": (clock("MOCAP_SAMPLES", "100000"), "CLOCK:MOCAP_SAMPLES is 100000, the file has"),
+    "fewer plate samples than none": (clock("PLATE_SAMPLES", "-3"), "CLOCK:PLATE_SAMPLES is -3, the file has"),
+    "a start that is no number": (clock("MOCAP_START", "noon"), "CLOCK:MOCAP_START is ['noon'], expected a number"),
     "labels": (set_parameter("POINT", "LABELS", [f"m{i}" for i in range(8)]), "POINT:LABELS: no ['base0', 'base1'"),
     "inches": (set_parameter("POINT", "UNITS", ["in"]), "POINT:UNITS is ['in'], expected mm or m"),
     "metres": (set_parameter("POINT", "UNITS", ["m"]), "m from the laboratory's origin; in millimetres?"),
