@@ -5,7 +5,7 @@ import pytest
 
 from calibration import calibrate, evaluate, load
 from scenarios.score.score import score
-from tests.hostile.campaign import Campaign
+from tests.hostile.rows.campaign import Campaign
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.hostile import datasets, folders, laboratory_kinds, results_and_tables, wrong_data
+from tests.hostile.rows import datasets, folders, laboratory_kinds, results_and_tables, wrong_data
 
 HERE = Path(__file__).parent
 FINDINGS = tuple((f, s) for f, s in list(csv.reader((HERE / "findings.csv").open(encoding="utf-8")))[1:])

@@ -24,8 +24,8 @@ from hypothesis import strategies as st
 
 from tests.acceptance.claims import measured
 from tests.hostile import mutation
-from tests.hostile.case import Case, judged
-from tests.hostile.laboratory import make, make_formats, renew
+from tests.hostile.rows.case import Case, judged
+from tests.hostile.rows.laboratory import make, make_formats, renew
 
 ROOT = Path(__file__).parents[2]
 FOUND, KEPT = ROOT / "runs/fuzz.json", ROOT / "docs/results/fuzz.json"

@@ -19,9 +19,9 @@ import numpy as np
 
 from calibration import load
 from calibration.recording.trial import Trial
-from tests.hostile.campaign import Campaign, Spoil, ghosts, gone, hidden
+from tests.hostile.rows.campaign import Campaign, Spoil, ghosts, gone, hidden
+from tests.hostile.rows.wrong_data import Mistake
 from tests.hostile.spoilt import reference_of, tried
-from tests.hostile.wrong_data import Mistake
 
 TABLE = Path(__file__).parents[2] / "docs/results/hidden_markers.csv"
 COLUMNS = ("robot", "what", "draw", "error [mm]", "clean [mm]")

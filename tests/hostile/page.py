@@ -13,9 +13,9 @@ from pathlib import Path
 
 from tests.acceptance.claims import measured, when
 from tests.hostile import findings, hidden_markers, random_cases, tried_mistakes
-from tests.hostile.case import Case, Judged, judged
-from tests.hostile.child import MEMORY, SECONDS
-from tests.hostile.laboratory import copied, make
+from tests.hostile.rows.case import Case, Judged, judged
+from tests.hostile.rows.child import MEMORY, SECONDS
+from tests.hostile.rows.laboratory import copied, make
 
 DOCS = Path(__file__).parents[2] / "docs"
 FUZZ = DOCS / "results/fuzz.json"

@@ -19,8 +19,8 @@ import numpy as np
 from calibration import calibrate, load
 from calibration.errors import CalibrationError
 from calibration.evaluation.evaluate import evaluate
+from tests.hostile.rows.wrong_data import at_random
 from tests.hostile.spoilt import Tried, reference_of, tried
-from tests.hostile.wrong_data import at_random
 
 TABLE = Path(__file__).parents[2] / "docs/results/random_cases.csv"
 COLUMNS = ("robot", "mistake", "calibrated", "message", "error [mm]", "clean [mm]")

@@ -12,8 +12,8 @@ from calibration.errors import CalibrationError
 from calibration.evaluation.evaluate import evaluate
 from calibration.recording.dataset import Dataset
 from calibration.verdict import Verdict
-from tests.hostile.campaign import Campaign
-from tests.hostile.wrong_data import STAGES, Mistake
+from tests.hostile.rows.campaign import Campaign
+from tests.hostile.rows.wrong_data import STAGES, Mistake
 
 ROW = "model_2"
 _LEAST = 1.0  # [mm] an error that matters

@@ -4,10 +4,10 @@ import shutil
 
 import pytest
 
-from tests.hostile.case import Case, judged
 from tests.hostile.findings import FINDINGS, unshown
-from tests.hostile.laboratory import copied, make
 from tests.hostile.page import tables
+from tests.hostile.rows.case import Case, judged
+from tests.hostile.rows.laboratory import copied, make
 
 ROWS = [
     pytest.param(case, id=f"{group}: {case.name}", marks=[pytest.mark.slow] if case.slow or k % 2 else [])

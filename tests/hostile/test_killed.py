@@ -12,7 +12,7 @@ import pytest
 
 from scenarios.files.errors import ScenarioError
 from scenarios.files.output_folder import EVALUATION, RUN, replacing, settle, updating
-from tests.hostile.child import forked
+from tests.hostile.rows.child import forked
 
 RESULTS = ("evaluation.json", "score.json", "evaluation.nc")
 

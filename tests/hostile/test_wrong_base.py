@@ -7,7 +7,7 @@ import pytest
 
 from calibration import calibrate, load
 from calibration.numerics.lie import from_vector
-from tests.hostile.campaign import Campaign
+from tests.hostile.rows.campaign import Campaign
 
 pytestmark = pytest.mark.slow
 PLATE, BASE = ("suspension",), ("suspension", "bundle")

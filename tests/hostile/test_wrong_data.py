@@ -8,11 +8,11 @@ from calibration.checks import judged
 from calibration.mocap import relabelled_trials
 from calibration.robot.laboratory import Laboratory
 from tests.hostile import hidden_markers, random_cases, tried_mistakes
-from tests.hostile.campaign import hidden, scaled
-from tests.hostile.laboratory_kinds import KINDS
+from tests.hostile.rows.campaign import hidden, scaled
+from tests.hostile.rows.laboratory_kinds import KINDS
+from tests.hostile.rows.wrong_data import FAST
 from tests.hostile.spoilt import calibrated, error_of, tried
 from tests.hostile.tried_mistakes import IN_CALIBRATION, IN_VALIDATION, fault, found_in
-from tests.hostile.wrong_data import FAST
 
 
 @pytest.fixture(scope="module")

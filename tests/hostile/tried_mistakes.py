@@ -13,10 +13,10 @@ from calibration.checks import judged
 from calibration.mocap import relabelled_trials
 from calibration.robot.laboratory import Laboratory
 from tests.doubles import rigid_robot
-from tests.hostile.campaign import Campaign
-from tests.hostile.laboratory_kinds import FITTED, KINDS, PLATE, UNSEEN
+from tests.hostile.rows.campaign import Campaign
+from tests.hostile.rows.laboratory_kinds import FITTED, KINDS, PLATE, UNSEEN
+from tests.hostile.rows.wrong_data import FAST, TABLE, VALIDATION, Mistake
 from tests.hostile.spoilt import Tried, reference_of, tried
-from tests.hostile.wrong_data import FAST, TABLE, VALIDATION, Mistake
 
 COLUMNS = ("mistakes", "rows", "named", "harmless, kept", "silently wrong", "good data lost", "named otherwise",
            "largest error of the kept [x clean]")  # fmt: skip

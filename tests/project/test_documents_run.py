@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = tuple(f"docs/{p}.md" for p in "tutorials python geometry frames commands scale reality".split())
 ELSEWHERE = {
     "README.md": "tests/project/test_wheel.py",
-    "docs/recording.md": "tests/acceptance/test_recording_page.py",
+    "docs/recording.md": "tests/acceptance/own_robot/test_recording_page.py",
     "docs/benchmark.md": "tests/scenarios/benchmarks/test_benchmark_page.py",
     "examples/validate_my_calibration/README.md": "tests/scenarios/testing/test_pytest_plugin.py",
     "CONTRIBUTING.md": "tests/project/test_recipes_twin.py",

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.doubles.recipes import copied, recipe, run_script
+from tests.project.recipes import copied, recipe, run_script
 
 BLOCK = """
 import numpy as np

@@ -1,6 +1,6 @@
 """The recipe of CONTRIBUTING.md for a section of the report is carried out in a copy of the packages."""
 
-from tests.doubles.recipes import copied, insert, recipe, run_script
+from tests.project.recipes import copied, insert, recipe, run_script
 
 SECTION = """
 from pathlib import Path

@@ -9,7 +9,7 @@ import pytest
 
 from scenarios import load
 from scenarios.files.errors import ScenarioError
-from tests.doubles.recipes import copied, recipe, run_script
+from tests.project.recipes import copied, recipe, run_script
 from twin.errors import TwinError
 from twin.motions import JOINTS, RATE, schedule, trajectory
 from twin.motions.csv_trajectory import InvalidTrajectory, read_trajectory

@@ -1,7 +1,7 @@
 """The recipe of CONTRIBUTING.md for a row of the ladder is carried out in a copy of the calibration."""
 
 from calibration import save_estimate
-from tests.doubles.recipes import copied, insert, recipe, run_script
+from tests.project.recipes import copied, insert, recipe, run_script
 
 EVALUATE = """
 import json, sys

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.acceptance.base_lines import lines
+from tests.acceptance.base.base_lines import lines
 from tests.acceptance.series import SAMPLED, kept_series
 
 pytestmark = pytest.mark.slow

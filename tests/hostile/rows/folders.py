@@ -4,7 +4,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.hostile.case import Case
+from tests.hostile.rows.case import Case
 
 _CSV, _LOOK = "export csv one --out out", "look one --out out"
 _STALE = ".tiago-twin.0123456789abcdef.partial"

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import netCDF4
 
-from tests.hostile.case import Case, edit, pipe, put, replaced, text
-from tests.hostile.datasets import EVALUATE, IMPORT, MAP
+from tests.hostile.rows.case import Case, edit, pipe, put, replaced, text
+from tests.hostile.rows.datasets import EVALUATE, IMPORT, MAP
 
 REPORT, SCENARIO = "report run", "simulate scenario.yaml --out out"
 ESTIMATE = "run/estimate/estimate.json"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.hostile.child import Outcome, command
+from tests.hostile.rows.child import Outcome, command
 
 REFUSED = (2,)
 """Exit codes of wrong input."""

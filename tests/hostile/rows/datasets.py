@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from calibration.recording.trial import read_trial, write_trial
-from tests.hostile.case import Case, edit, linked, pipe, put, replaced, text
-from tests.hostile.laboratory import renew, trial, values
+from tests.hostile.rows.case import Case, edit, linked, pipe, put, replaced, text
+from tests.hostile.rows.laboratory import renew, trial, values
 
 LOOK_ONE = "look data --trial xyz --out out"
 CALIBRATE, LOOK, EXPORT = "calibrate data --out out", "look data --out out", "export csv data --out out"

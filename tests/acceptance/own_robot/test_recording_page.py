@@ -13,7 +13,7 @@ from scenarios.commands import main
 from scenarios.steps import import_export
 from tests.doubles import rigid_robot
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs/recording.md").read_text(encoding="utf-8")
 COMMANDS = [
     line.partition("  #")[0]

@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tests.hostile.campaign import (
+from tests.hostile.rows.campaign import (
     Spoil,
     commanded,
     commands,

@@ -1,6 +1,6 @@
 """Every line that a base that sticks and slips must hold, measured on the score.json of runs.
 
-    python -m tests.acceptance.base_lines RUN...        prints each line: its figure, its bound, whether it holds
+    python -m tests.acceptance.base.base_lines RUN...        prints each line: its figure, its bound, whether it holds
 
 Errors are of the hand by the base alone, joints true, root mean square per component [mm]; a trial is named `jolts`
 where its tour is abrupt, `static` where it is soft, `swing` else.

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.recording.trial import Trial
-from tests.hostile.campaign import (
+from tests.hostile.rows.campaign import (
     Campaign,
     Spoil,
     exchanged_columns,
@@ -16,7 +16,7 @@ from tests.hostile.campaign import (
     plate_gain,
     shifted_dwells,
 )
-from tests.hostile.wrong_data import STAGES, Mistake
+from tests.hostile.rows.wrong_data import STAGES, Mistake
 
 _DEGREES = 180.0 / np.pi
 _SWAPPED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
