@@ -163,8 +163,9 @@ class BaseState(NamedTuple):
         y: (k,) where the modes are.
         x: (6,) displacement by the springs on all axes [m, rad, frame 0].
         moved: (1, 4, 4) how the base moved in the lab.
-        acceleration: (2, 3) linear and angular of the base frame [m/s2, rad/s2, lab axes], as far as it slips.
+        acceleration: (2, 3) linear and angular of the base frame [m/s2, rad/s2, lab axes], of a base that slips.
         slip: State of a base that slips; None of one that does not.
+        lags: (2, 3) z and tilt through one lag and two, of a base that slips.
     """
 
     start: float
@@ -178,6 +179,7 @@ class BaseState(NamedTuple):
     moved: np.ndarray
     acceleration: np.ndarray
     slip: SlipState | None = None
+    lags: np.ndarray = _STILL
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,11 @@
     T_lab_base(t) = T_lab_0 exp(x(t)) T_lab_0^-1 T_lab_base(start)        covariance of x: diag V(t), in frame 0
 
 x, y, yaw by the stick-slip model, z and tilt by the compliance, as in the evaluation's row. Sample by sample the
-wrench is taken as it comes, and inverse dynamics leave out the inertia of heave and tilt.
+wrench is taken as it comes, and heave and tilt h accelerate as two equal lags in a row show it,
+
+    a = d2 h / dt2 / (1 + tau s)^2 = (h - 2 f1 + f2) / tau^2,     tau df1/dt = h - f1,     tau df2/dt = f1 - f2
+
+tau = 1 / (2 pi 20 Hz), the cutoff of a recording's wrench: 16 ms late.
 """
 
 from dataclasses import dataclass
@@ -39,6 +43,8 @@ from calibration.stages.suspension.model import Source
 
 _UPPER = tuple((PLANE[i], PLANE[j]) for i, j in UPPER)
 _UNMOVED = np.zeros((3, 0))
+_LAG = 1.0 / (2.0 * np.pi * CUTOFF)  # [s] tau
+_LEVEL = np.zeros(3)  # accelerations of heave and tilt
 
 
 class Place(NamedTuple):
@@ -64,11 +70,13 @@ class Place(NamedTuple):
 
 
 class Earlier(NamedTuple):
-    """What a sample carries on: `rest`, `y`, `u` of `BaseState`; `rest`, `before`, `found`, `band` of `SlipState`."""
+    """What a sample carries on of `BaseState`, `heave` of its x, and of `SlipState`, `row` its `before`."""
 
     wrench: np.ndarray
     y: np.ndarray
     u: np.ndarray
+    heave: np.ndarray
+    lags: np.ndarray
     rest: np.ndarray
     row: np.ndarray
     found: np.ndarray
@@ -127,10 +135,12 @@ class SlippingBase:
         place = Place(
             at.action, self.model.wheels.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity
         )
-        earlier = Earlier(before.rest, before.y, before.u, slip.rest, slip.before, slip.found, slip.band)
+        earlier = Earlier(
+            before.rest, before.y, before.u, before.x[2:5], before.lags, slip.rest, slip.before, slip.found, slip.band
+        )
         motion = _UNMOVED if moving is None else moving
         tree, actions, work, room = self._robot
-        w, (y, u), x, moved, a, row, state, wheels, found = carried(
+        w, (y, u), x, lags, moved, a, row, state, wheels, found = carried(
             wrench, motion, t - before.t, earlier, slip.bases, place, stream.fitted, tree, *actions, work, room
         )
         slip = SlipState(
@@ -144,7 +154,7 @@ class SlippingBase:
             slip.band,
             found[1] * stream.fitted.moves,
         )
-        return BaseState(before.start, t, w, before.rest, before.n, u, y, x, moved, a, slip)
+        return BaseState(before.start, t, w, before.rest, before.n, u, y, x, moved, a, slip, lags)
 
     def variance(self, state: BaseState) -> np.ndarray:
         """(6,) of the displacement in frame 0 [m2, rad2]."""
@@ -156,7 +166,7 @@ class SlippingBase:
     def _driven(self, gravity: np.ndarray, moving: np.ndarray) -> np.ndarray:
         """What the arm does to the base in the floor's plane (9,), see `Sample`; gravity (3,) in frame 0."""
         tree, actions, work, found = self._robot
-        return np.asarray(driven(tree, actions, gravity, moving, work, found))
+        return np.asarray(driven(tree, actions, gravity, _LEVEL, moving, work, found))
 
     @cached_property
     def _robot(self) -> tuple[RigidTree, tuple[np.ndarray, np.ndarray], np.ndarray, TreeDynamics]:
@@ -175,15 +185,16 @@ def driven(
     tree: RigidTree,
     actions: tuple[np.ndarray, np.ndarray],
     gravity: np.ndarray,
+    heaving: np.ndarray,
     moving: np.ndarray,
     work: np.ndarray,
     found: TreeDynamics,
 ) -> np.ndarray:
-    """`SlippingBase._driven` at readings, velocities and accelerations (3, k)."""
+    """`SlippingBase._driven` at readings, velocities and accelerations (3, k), heave and tilt accelerating by (3,)."""
     (dual, back), root, out = actions, np.zeros((1, 12)), np.zeros(9)
-    for i in range(3):
+    for i in range(6):
         for c in range(3):
-            root[0, 6 + i] -= back[i, c] * gravity[c]
+            root[0, 6 + i] += back[i, 2 + c] * heaving[c] - back[i, c] * gravity[c]
     sample(tree, moving[0:1], moving[1:2], moving[2:3], root, work, found)
     for i in range(3):
         for r in range(6):
@@ -194,6 +205,33 @@ def driven(
             for c in range(6):
                 out[3 + k] += dual[i, r] * found.composite[0, r, c] * back[c, j]
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def lagged(h: np.ndarray, before: np.ndarray, lags: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """f1, f2 (2, 3) after dt [s] in which h (3,) changed evenly from `before`, and a (3,)."""
+    e, after, a = np.exp(-dt / _LAG), np.empty((2, 3)), np.empty(3)
+    b = 1.0 - _LAG * (1.0 - e) / dt
+    for i in range(3):
+        after[0, i] = e * lags[0, i] + (1.0 - e - b) * before[i] + b * h[i]
+        after[1, i] = e * lags[1, i] + (1.0 - e - b) * lags[0, i] + b * after[0, i]
+        a[i] = (h[i] - 2.0 * after[0, i] + after[1, i]) / _LAG**2
+    return after, a
+
+
+@njit(cache=True, error_model="numpy")
+def accelerating(state: np.ndarray, members: int, heaving: np.ndarray, T_lab_0: np.ndarray) -> np.ndarray:
+    """(2, 3) linear and angular, lab axes: the members' mean in the plane, (3,) of heave and tilt."""
+    own, a = np.zeros(6), np.zeros((2, 3))
+    for k in range(3):
+        own[HEAVE[k]] = heaving[k]
+        for e in range(members):
+            own[PLANE[k]] += state[e // LANES, ACCELERATION + k, e % LANES] / members
+    for i in range(3):
+        for c in range(3):
+            a[0, i] += T_lab_0[i, c] * own[c]
+            a[1, i] += T_lab_0[i, c] * own[3 + c]
+    return a
 
 
 @njit(cache=True, error_model="numpy")
@@ -214,7 +252,7 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     """`SlippingBase.stepped` after the first second: fields of the states.
 
     Returns:
-        wrench, y and u, x, moved, acceleration of `BaseState`; row, state, wheels of bases and found of `SlipState`.
+        wrench, y and u, x, lags, moved, acceleration of `BaseState`; row, state, wheels of bases, found of `SlipState`.
     """
     w, x, own, change, turn = np.zeros((1, 6)), np.empty(6), np.empty((1, 6)), np.empty(6), np.zeros((1, 4, 4))
     row, found, driving = np.empty(COLUMNS), np.empty((4, 3)), UNDRIVEN.copy()
@@ -225,8 +263,9 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     for i in range(6):
         change[i] = w[0, i] - before.wrench[i]
     modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, change, dt, x)
+    lags, heaving = lagged(x[2:5], before.heave, before.lags, dt)
     if moving.shape[1]:
-        driving = driven(tree, (dual, back), place.gravity, moving, work, room)
+        driving = driven(tree, (dual, back), place.gravity, heaving, moving, work, room)
     after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes)
     readings = w[0], x[3:5], driving, before.rest, before.row, before.found
     step_members(after, readings, fitted, before.band, dt / STEPS, row, found)
@@ -236,15 +275,8 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
         if not fitted.linear[k]:
             own[0, PLANE[k]] = found[1, k] * fitted.moves[k]
     from_vectors(own, turn)
-    moved, scratch, a = place.T_lab_0.copy().reshape(1, 4, 4), np.empty((3, 4)), np.zeros((2, 3))
+    moved, scratch = place.T_lab_0.copy().reshape(1, 4, 4), np.empty((3, 4))
     shift(moved[0], turn[0], scratch)
     shift(moved[0], place.T_0_lab, scratch)
-    for e in range(fitted.members):
-        state, lane = after.state[e // LANES], e % LANES
-        forward = state[ACCELERATION, lane] / fitted.members
-        sideward = state[ACCELERATION + 1, lane] / fitted.members
-        yaw = state[ACCELERATION + 2, lane] / fitted.members
-        for i in range(3):
-            a[0, i] += place.T_lab_0[i, 0] * forward + place.T_lab_0[i, 1] * sideward
-            a[1, i] += place.T_lab_0[i, 2] * yaw
-    return w[0], modes, x, moved, a, row, after.state, after.wheels, found
+    a = accelerating(after.state, fitted.members, heaving, place.T_lab_0)
+    return w[0], modes, x, lags, moved, a, row, after.state, after.wheels, found

@@ -300,10 +300,7 @@ def test_a_step_is_the_prediction_of_its_sample(estimate, compensator, swing):
         np.testing.assert_allclose(one.covariance[0], whole.covariance[k], atol=1e-15)
 
 
-def test_steps_under_a_wrench_follow_the_prediction_but_for_its_filter(compensator, swing, request):
-    if compensator.slipping is not None:
-        why = "where drive wheels slide, steps are off by .12 of the motion, and filters are no cause"
-        request.applymarker(pytest.mark.xfail(reason=why, strict=True))
+def test_steps_under_a_wrench_follow_the_prediction_but_for_its_filter(compensator, swing):
     t, q, w, start, *_ = swing
     v, whole, before, found = velocities(t, q), compensator.predict(t, q, w, start), None, []
     for k in range(500):

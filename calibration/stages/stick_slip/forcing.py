@@ -5,8 +5,10 @@
 
 all in frame 0, about its origin; p: x, y, yaw, h: z, rx, ry; M(q) the composite inertia of the nominal robot with the
 payload of the trial. Heave and tilt are those of the 6x6 compliance under the same source. Forces in the floor's plane
-count from their mean in the first second. Where there are no joint readings the base has no inertia: then the plate
-alone moves it, at the rate of the correction.
+count from their mean in the first second. A sample takes STEPS steps, the first at its time: its position is that of
+the last one, 5 ms later. One that ends at its time follows the plate 5 ms late, for a correction acts a step after its
+force. Where there are no joint readings the base has no inertia: then the plate alone moves it, at the rate of the
+correction.
 """
 
 from dataclasses import dataclass, replace

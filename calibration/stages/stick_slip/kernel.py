@@ -36,8 +36,8 @@ COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
 LANES = 16  # bases side by side
 _VECTOR = 4  # lanes that one instruction takes
 _WHEEL, _E = 12, 10  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), and its deflections from row _E on
-_X, _V, _DX, _STICKS, _P = 0, 3, 6, 12, 13  # rows of a state: x, v, correction to come, wheels that stuck plus one, P
-ACCELERATION = 9  # three rows
+VELOCITY, ACCELERATION = 3, 9  # three rows each of a state
+_X, _V, _DX, _STICKS, _P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels that stuck plus one, P
 _D, _F, SLID, _BITS = 19, 25, 28, 29  # of the step: d, force, wheels that slide, which stick
 _BODY, _ROWS = 30, 34  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 

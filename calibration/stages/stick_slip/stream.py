@@ -1,9 +1,10 @@
 """The stick-slip base sample by sample: each member of the ensemble is carried from one sample to the next.
 
-    state_e(t + dt) = advance(state_e(t), sample),     x = mean_e x_e,    V as in `band`
+    state_e(t + dt) = advance(state_e(t), sample),     x = mean_e (x_e + STEP v_e),    V as in `band`
 
 The first second is the rest the forces count from. Between two samples they are linear; nothing after a sample is
-used. Without the wrench of inverse dynamics, which needs accelerations, the base has no inertia, and the plate alone
+used. A recording's sample ends with a step of STEP = 5 ms after its time, see `forcing`: here the velocity takes its
+place. Without the wrench of inverse dynamics, which needs accelerations, the base has no inertia, and the plate alone
 moves it.
 """
 
@@ -15,8 +16,8 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.band import banded
-from calibration.stages.stick_slip.forcing import UNMOVED
-from calibration.stages.stick_slip.kernel import COLUMNS, LANES, PLATE, STEPS, Bases, advance, at_rest
+from calibration.stages.stick_slip.forcing import STEP, UNMOVED
+from calibration.stages.stick_slip.kernel import COLUMNS, LANES, PLATE, STEPS, VELOCITY, Bases, advance, at_rest
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
@@ -167,21 +168,21 @@ def advance_members(
         k: Of all.
 
     Returns:
-        Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first.
+        Mean and variance (3,) of the members STEP later, mean square (3,) of the preloaded about the first.
     """
-    mean, variance, preloaded = np.zeros(3), np.zeros(3), np.zeros(3)
+    mean, variance, preloaded, x = np.zeros(3), np.zeros(3), np.zeros(3), np.empty(k)
     for g in range(len(bases.lanes)):
         advance(bases.state[g], bases.wheels[g], drive, inertia, h, bases.lanes[g])
     for a in range(3):
-        first = bases.state[0, a, 0]
+        for i in range(k):
+            state, lane = bases.state[i // LANES], i % LANES
+            x[i] = state[a, lane] + STEP * state[VELOCITY + a, lane]
         for i in range(members):
-            mean[a] += bases.state[i // LANES, a, i % LANES]
+            mean[a] += x[i] / members
+        for i in range(members):
+            variance[a] += (x[i] - mean[a]) ** 2 / members
         for i in range(members, k):
-            preloaded[a] += (bases.state[i // LANES, a, i % LANES] - first) ** 2
-        mean[a] /= members
-        preloaded[a] /= max(k - members, 1)
-        for i in range(members):
-            variance[a] += (bases.state[i // LANES, a, i % LANES] - mean[a]) ** 2 / members
+            preloaded[a] += (x[i] - x[0]) ** 2 / max(k - members, 1)
     return mean, variance, preloaded
 
 
