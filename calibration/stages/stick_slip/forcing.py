@@ -109,17 +109,17 @@ class Wrenches:
 
 
 def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wrenches:
-    """What the instruments of a trial show of its wrench."""
-    start, plate = float(trial.t_mocap[0]), None
+    """What the instruments of a trial show of its wrench, by the nominal robot with the payload of the trial."""
+    start, plate, lab = float(trial.t_mocap[0]), None, sources.lab.of_trial(trial.id)
     if sources.plate is not None and len(trial.t_plate):
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
     if sources.robot is None or not len(trial.t_robot):
-        plate = None if plate is None else borne(sources.lab.description, sources.lab.urdf, plate)
+        plate = None if plate is None else borne(lab.description, lab.urdf, plate)
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)))
-    lab, known = sources.lab, np.isfinite(trial.q_motor).all(axis=1)
+    known = np.isfinite(trial.q_motor).all(axis=1)
     t, q = sources.robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
     push = hand_push(lab.urdf, lab.description, t, q, trial.wrist_wrench[known])
-    return replace(wrenches_along(sources.lab, t, q, plate, T_lab_0, push), trial_id=trial.id, start=start)
+    return replace(wrenches_along(lab, t, q, plate, T_lab_0, push), trial_id=trial.id, start=start)
 
 
 def wrenches_along(  # noqa: PLR0913  what the instruments show

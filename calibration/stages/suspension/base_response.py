@@ -163,14 +163,15 @@ class WrenchSources:
         return plate_load(trial, self.plate, T_lab_0)
 
     def dynamics_load(self, trial: Trial, T_lab_0: np.ndarray) -> Load:
-        """The wrench by inverse dynamics.
+        """The wrench by inverse dynamics, with the payload of the trial.
 
         Raises:
             NotEnoughData: There are no encoder readings on a known clock.
         """
         if self.robot is None or len(trial.t_robot) == 0:
             raise NotEnoughData(f"{trial.id}: no encoder readings on a known clock")
-        return motion_load(self.lab, self.robot.to_mocap(trial.t_robot), trial.q_motor, T_lab_0, CUTOFF)
+        lab = self.lab.of_trial(trial.id)
+        return motion_load(lab, self.robot.to_mocap(trial.t_robot), trial.q_motor, T_lab_0, CUTOFF)
 
 
 @dataclass(frozen=True)

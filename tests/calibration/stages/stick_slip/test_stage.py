@@ -6,7 +6,8 @@ import pytest
 
 import mjcf
 from calibration.recording.clock import Clock
-from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses
+from calibration.recording.schema import Description
+from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
 from calibration.stages.stick_slip.stage import _behind, _linear, _misplaced
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
@@ -76,6 +77,23 @@ def test_without_joints_the_plate_alone_moves_the_base(recorded, suspension):
     error = heading - heading[:50].mean() - true
     assert (error**2).sum() < 0.1 * (true**2).sum()
     assert found.motion.variance.shape == (len(new.t_mocap), 6)
+
+
+def test_inverse_dynamics_carry_the_payload_of_the_trial(recorded):
+    """2 kg in place of 0.4 in a trial for calibration weigh on the floor and in the inertia."""
+    trial = recorded[0][0]
+    entry = {"id": trial.id, "role": "calibration", "kind": "swing", "motion": "a", "file": "a.nc", "sha256": "0" * 64}
+    payload = {"link": "gripper_grasping_frame", "mass": 0.4, "com": [0.0, 0.0, 0.0], "tolerance": 0.1}
+
+    def found(**own):
+        data = rigid_robot.description([{**entry, **own}], payload=payload, wheels=[w.model_dump() for w in WHEELS])
+        sources = laboratory(mjcf.urdf(), Description.model_validate(data), ROBOT, PLATE)
+        wrenches = wrenches_of(sources, trial, T_LAB_BASE)
+        floor = sources.dynamics_load(trial, T_LAB_BASE).signal.x[:, 2].mean()
+        return floor, wrenches.dynamics.signal.x[:, 2].mean(), -9.81 * wrenches.M[0, 0, 0]
+
+    for light, heavy in zip(found(), found(payload=2.0), strict=True):
+        assert heavy - light == pytest.approx(-1.6 * 9.81, rel=0.02)  # the arm swings
 
 
 def test_a_base_that_was_moved_is_named(recorded, suspension):
