@@ -25,8 +25,9 @@ from calibration.estimate.estimate import Estimate, RobotNames
 from calibration.estimate.rows import MAIN
 from calibration.inference.parameters import scaled, widened
 from calibration.mocap.dwells import resting
-from calibration.mocap.labels import relabelled_trials
+from calibration.mocap.labels import relabelled_trial
 from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.side_by_side import side_by_side
 from calibration.options import Options
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
@@ -161,7 +162,9 @@ def _read(
     Raises:
         InputError: There are none.
     """
-    read, means = tuple(relabelled_trials(dataset, "calibration")), tuple(m for _, m in dataset.means("calibration"))
+    entries = [entry for entry in dataset.entries("calibration") if not dataset.has_means(entry)]
+    read = tuple(zip(entries, side_by_side(lambda entry: relabelled_trial(dataset, entry), entries), strict=True))
+    means = tuple(m for _, m in dataset.means("calibration"))
     if not read and not means:
         raise InputError(
             dataset.folder / "dataset.json",

@@ -6,13 +6,14 @@ The equations are those of `clocks`.
 """
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import Signal, body_rates, even, interpolate_columns, low_passed, play
 from calibration.numerics.time_delay import Pair, coarse_lag
 from calibration.recording.clock import Clock
@@ -36,17 +37,20 @@ class Motion:
     pair: Pair
 
 
-def robot_motions(description: Description, chain: Chain, trials: Sequence[Trial]) -> Iterator[Motion]:
+def robot_motions(description: Description, chain: Chain, trials: Sequence[Trial]) -> list[Motion]:
     """Angular velocity of the hand in the base, of every trial that shows one."""
-    for trial in trials:
+
+    def shown(trial: Trial) -> Motion | None:
         try:
             T_base_hand = MeasuredTrial.of(description, trial).T_base_hand
             y = low_passed(even(*body_rates(trial.t_mocap, T_base_hand[:, :3, :3])), _CUTOFF)
             x, nuisance = _robot_rates(chain, trial, description.tolerances.joint_play)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
-            continue
-        yield Motion(trial.id, Pair(_aligned(y, x), x, nuisance, np.zeros((len(y.t), 0, 3))))
+            return None
+        return Motion(trial.id, Pair(_aligned(y, x), x, nuisance, np.zeros((len(y.t), 0, 3))))
+
+    return [motion for motion in side_by_side(shown, trials) if motion is not None]
 
 
 def _aligned(y: Signal, x: Signal) -> Signal:
@@ -89,9 +93,10 @@ def plate_motions(
     trials: Sequence[Trial],
     robot: Clock,
     model: Provisional | None,
-) -> Iterator[Motion]:
+) -> list[Motion]:
     """Moments Mx, My of the model and of the plate, of every trial; markers are noisier than plates."""
-    for trial in trials:
+
+    def shown(trial: Trial) -> Motion | None:
         try:
             joints = JointMotion(robot.to_mocap(trial.t_robot), trial.q_motor)
             if model is not None:
@@ -99,5 +104,7 @@ def plate_motions(
             x, (y, nuisance) = plate_moments(trial), model_moments(parts, MeasuredTrial.of(description, trial), joints)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
-            continue
-        yield Motion(trial.id, Pair(y, x, np.zeros((len(x.t), 0, 2)), nuisance))
+            return None
+        return Motion(trial.id, Pair(y, x, np.zeros((len(x.t), 0, 2)), nuisance))
+
+    return [motion for motion in side_by_side(shown, trials) if motion is not None]

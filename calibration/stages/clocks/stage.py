@@ -13,13 +13,14 @@ markers and encoders say: `inverse_dynamics`.
 """
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.time_delay import coarse_lag, fit_lag
 from calibration.recording.clock import Clock, shared_clock
 from calibration.recording.schema import Description, Tolerances
@@ -108,7 +109,7 @@ def _plate_clock(
     if robot is None:
         return None, _missing("plate", "the plate's clock is determined from encoder readings, and there are none")
     parts = carriers(lab.floating, description, trials)
-    motions = list(plate_motions(parts, description, trials, robot, model))
+    motions = plate_motions(parts, description, trials, robot, model)
     Q = plate_axes([m.pair for m in motions])
     try:
         return _clock("plate", [replace(m, pair=m.pair.turned(Q)) for m in motions], 2, description.tolerances)
@@ -117,13 +118,14 @@ def _plate_clock(
 
 
 def _clock(
-    instrument: str, motions: Iterable[Motion], passes: int, known: Tolerances
+    instrument: str, motions: Sequence[Motion], passes: int, known: Tolerances
 ) -> tuple[Clock, tuple[Verdict, ...]]:
     """The clock from lags of all motions; every pass after the first knows the drift within a trial."""
-    kept, drift, lags = list(motions), 0.0, []
-    starts = {m.trial_id: coarse_lag(m.pair.y, m.pair.x) for m in kept}
+    drift, lags = 0.0, []
+    coarse = side_by_side(lambda m: coarse_lag(m.pair.y, m.pair.x), motions)
+    starts = {m.trial_id: lag for m, lag in zip(motions, coarse, strict=True)}
     for _ in range(passes):
-        lags = _lags(kept, starts, drift)
+        lags = _lags(motions, starts, drift)
         starts = {t.trial_id: t.lag.value for t in lags}
         drift = fit_clock(instrument, lags)[0].drift
     return _concluded(instrument, lags, known)
@@ -147,13 +149,15 @@ def _concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tupl
 
 def _lags(motions: Sequence[Motion], starts: Mapping[str, float], drift: float) -> list[TrialLag]:
     """Lags of the motions that have a start [s] and show the same on both clocks."""
-    found = []
-    for motion in (m for m in motions if m.trial_id in starts):
+
+    def found(motion: Motion) -> TrialLag | None:
         try:
             lag = fit_lag(motion.pair, starts[motion.trial_id], drift)
         except NotEnoughData as error:
             _log.info("%s: %s", motion.trial_id, error)
-            continue
+            return None
         middle = 0.5 * (motion.pair.y.t[0] + motion.pair.y.t[-1])
-        found.append(TrialLag(motion.trial_id, middle - lag.value, lag))
-    return found
+        return TrialLag(motion.trial_id, middle - lag.value, lag)
+
+    known = [motion for motion in motions if motion.trial_id in starts]
+    return [lag for lag in side_by_side(found, known) if lag is not None]

@@ -20,6 +20,7 @@ from calibration.inference.parameters import Model
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import Postures, dwell_windows, passing_postures, readings_at, static_postures
 from calibration.numerics.lie import inverse
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -90,7 +91,7 @@ def refit_geometry(
     Raises:
         NotEnoughData: The trials show no posture and no motion.
     """
-    corrected = [corrected_trial(trains, trial, robot, hand) for trial in trials]
+    corrected = side_by_side(lambda trial: corrected_trial(trains, trial, robot, hand), trials)
     bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
     at_rest = trains.by_joint(rest_errors(trains, corrected, robot))
     parts = list(_postures(description, corrected, robot, hand, bending, at_rest))
@@ -121,7 +122,8 @@ def refit_geometry(
     offset[chain.columns] = fitted.offset
     joints = tuple(referred(train, model, trains) for train in trains.trains)
     trains = replace(trains, trains=joints).with_offset(offset)
-    static = [corrected_trial(trains, trial, robot, fitted) for trial in trials if len(trial.dwell_start)]
+    resting = [trial for trial in trials if len(trial.dwell_start)]
+    static = side_by_side(lambda trial: corrected_trial(trains, trial, robot, fitted), resting)
     return RefittedGeometry(model, bending, trains, rest_errors(trains, static, robot), departed.shown)
 
 

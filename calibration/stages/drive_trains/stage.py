@@ -58,7 +58,7 @@ def fit_drive_trains(
     if refused:
         return bare, tuple(Verdict(STAGE, v.verdict, v.message) for v in refused)
     used = [trial for trial in trials if is_long(trial)]
-    loads = [loads_of_trial(bare, trial, robot, hand) for trial in used]
+    loads = side_by_side(lambda trial: loads_of_trial(bare, trial, robot, hand), used)
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
     tried = _identified(bare, loads, differences, hand)
     trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
+from calibration.numerics.side_by_side import side_by_side
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.stages.stick_slip.band import PlainBand, plain_band, reached
@@ -88,27 +89,29 @@ def fit_stick_slip(
 
 
 def _read(sources: WrenchSources, trials: Sequence[Trial]) -> list[Read]:
-    found = []
-    for trial in trials:
+    def read(trial: Trial) -> Read | None:
         try:
             rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-            found.append(Read(trial, rest, wrenches_of(sources, trial, rest.T_lab_0)))
+            return Read(trial, rest, wrenches_of(sources, trial, rest.T_lab_0))
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
-    return found
+            return None
+
+    return [one for one in side_by_side(read, trials) if one is not None]
 
 
 def _rows(
     description: Description, read: Sequence[Read], tilting: Tilting, source: Source
 ) -> list[tuple[PlanarForcing, PlanarMotion]]:
-    found = []
-    for one in read:
+    def row(one: Read) -> tuple[PlanarForcing, PlanarMotion] | None:
         try:
             forcing = planar_forcing(one.wrenches, tilting, source)
-            found.append((forcing, planar_motion(description, one.trial, one.rest, forcing)))
+            return forcing, planar_motion(description, one.trial, one.rest, forcing)
         except NotEnoughData as error:
             _log.info("%s from %s: %s", one.trial.id, source, error)
-    return found
+            return None
+
+    return [found for found in side_by_side(row, read) if found is not None]
 
 
 def _linear(direction: Direction, suspension: Suspension) -> Direction:

@@ -25,6 +25,7 @@ from scipy.interpolate import CubicSpline
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import adjoint, from_vector, skew
+from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import CUTOFF, RATE, even, low_passed
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
@@ -211,14 +212,17 @@ def read_responses(wrenches: WrenchSources, trials: Sequence[Trial]) -> BaseResp
         sources["dynamics"] = wrenches.dynamics_load
     if wrenches.plate is not None and any(len(t.t_plate) for t in trials):
         sources["plate"] = wrenches.plate_load
-    rows, description = [], wrenches.lab.description
-    for trial in trials:
+    description = wrenches.lab.description
+
+    def found(trial: Trial) -> list[BaseResponse] | None:
         try:
             rest = rest_of(description, trial, wrenches.T_base_B)
-            rows.append(
-                [base_response_of(description, trial, rest, load(trial, rest.T_lab_0)) for load in sources.values()]
-            )
+            loads = [load(trial, rest.T_lab_0) for load in sources.values()]
+            return [base_response_of(description, trial, rest, load) for load in loads]
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
+            return None
+
+    rows = [row for row in side_by_side(found, trials) if row is not None]
     columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(sources)}
     return BaseResponses(columns.get("plate", ()), columns.get("dynamics", ()))
