@@ -12,8 +12,8 @@ from scenarios.steps.run_steps import (
     run,
     silent,
     simulate,
-    versions,
 )
+from scenarios.steps.versions import versions
 
 __all__ = [
     "Progress",

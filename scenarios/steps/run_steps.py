@@ -7,7 +7,6 @@ Only dataset/ crosses from the simulation to the calibration. What a step writes
 Importing this module is cheap: the engines are imported by the step that needs them.
 """
 
-import platform
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -17,7 +16,8 @@ from typing import TYPE_CHECKING, cast
 
 from scenarios.files import output_folder as folder
 from scenarios.files.errors import ScenarioError
-from scenarios.steps.threads import every_core, one_blas_thread
+from scenarios.steps.threads import every_core, import_ahead, one_blas_thread
+from scenarios.steps.versions import versions
 
 if TYPE_CHECKING:
     from calibration import Dataset, Estimate, Evaluation
@@ -29,7 +29,6 @@ Progress = Callable[[str, str, float], None]
 """Called with the step, what it is at, and the fraction of the step that is done [-]."""
 
 _POSES = (".csv", ".nc")  # predicted poses instead of an estimate
-PACKAGES = ("tiago-twin", "mujoco", "pin", "numpy", "scipy")
 
 
 @dataclass(frozen=True)
@@ -90,16 +89,20 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
 
     scenario = scenario.quick() if quick else scenario
     refused: NotCalibrated | NotEnoughData | NumericalFailure | None = None
-    with folder.replacing(out, folder.RUN) as new, every_core():
+    with folder.replacing(out, folder.RUN) as new, every_core(), ThreadPoolExecutor(1) as beside:
+        beside.submit(import_ahead)
         _simulate(scenario, new, progress)
+        drawn = beside.submit(_draw, scenario, new)  # the calibration leaves more of the cores idle
         try:
             estimate = _calibrate(
                 new / "dataset", new / "estimate", None, scenario.calibration, progress, cross_validate=True
             )
             evaluation, score = _evaluate(new / "estimate", new / "dataset", new, new / "truth", progress)
+            drawn.result()
             _report(new, progress)
         except (NotCalibrated, NotEnoughData, NumericalFailure) as error:
             refused = error
+            drawn.result()
             _refuse(new, error, progress)
     if refused is not None:
         refused.add_note(f"The recordings are kept, with a report of why: {Path(out) / 'report.html'}")
@@ -109,8 +112,10 @@ def run(scenario: "Scenario", out: Path | str, *, quick: bool = False, progress:
 
 def simulate(scenario: "Scenario", out: Path | str, progress: Progress = silent) -> None:
     """Write dataset/, truth/ and scenario.yaml into the run folder `out`."""
-    with folder.replacing(out, folder.SIMULATED) as new, one_blas_thread():
+    with folder.replacing(out, folder.SIMULATED) as new, one_blas_thread(), ThreadPoolExecutor(1) as beside:
+        drawn = beside.submit(_draw, scenario, new)
         _simulate(scenario, new, progress)
+        drawn.result()
 
 
 def calibrate(
@@ -193,24 +198,19 @@ def report(run_folder: Path | str, progress: Progress = silent) -> Path:
     return Path(run_folder) / "report.html"
 
 
-def versions() -> dict[str, str]:
-    """Versions of what decides the figures of a run."""
-    from importlib.metadata import version
-
-    return {"python": platform.python_version(), **{package: version(package) for package in PACKAGES}}
-
-
 def _simulate(scenario: "Scenario", out: Path, progress: Progress) -> None:
     import twin
     from scenarios.files import yaml_file
-    from twin.rendering import picture
 
     progress("simulate", "", 0.0)
     yaml_file.write(out / "scenario.yaml", scenario, beside={"versions": versions()})
-    with ThreadPoolExecutor(1) as beside:
-        drawn = beside.submit(picture, scenario.twin, scenario.seed, out / "figures" / "twin.png")
-        twin.record(scenario.twin, scenario.seed, out, lambda at, fraction: progress("simulate", at, fraction))
-        drawn.result()
+    twin.record(scenario.twin, scenario.seed, out, lambda at, fraction: progress("simulate", at, fraction))
+
+
+def _draw(scenario: "Scenario", out: Path) -> None:
+    from twin.rendering import picture
+
+    picture(scenario.twin, scenario.seed, out / "figures" / "twin.png")
 
 
 def _calibrate(

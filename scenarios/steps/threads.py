@@ -3,6 +3,9 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
+
+_LATER = ("twin.campaign", "calibration.pipeline", "scenarios.score.score", "scenarios.report.page")
 
 
 @contextmanager
@@ -24,3 +27,12 @@ def every_core() -> Iterator[None]:
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     with one_blas_thread(), on_cores(cores):
         yield
+
+
+def import_ahead() -> None:
+    """Import what the steps of a run need after the simulation, whose loops hold no interpreter lock.
+
+    First what the simulation needs itself, so that two threads never import in different orders.
+    """
+    for name in _LATER:
+        import_module(name)
