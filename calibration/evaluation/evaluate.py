@@ -93,7 +93,7 @@ def evaluate(
     if not entries:
         raise NotEnoughData(f"no trial has role {role}; keep trials aside in the mapping (`trials: {{{role}: [...]}}`)")
     submitted, estimate = (estimate, NOTHING) if isinstance(estimate, Submission) else (None, estimate)
-    read = tuple(recorded(dataset, entry) for entry in entries)
+    read = tuple(side_by_side(lambda entry: recorded(dataset, entry), entries))
     remarks = (*check_names(estimate, dataset), *believable(dataset, role, read))
     estimate = estimate if estimate.registered else registered(estimate, dataset)
     estimate, redrawn_bodies = redrawn(estimate, dataset.description)

@@ -159,7 +159,8 @@ def _write_traces(path: Path, traces: tuple[TrialErrors, ...]) -> None:
                 ("scored_position_error", ("scored", "axis"), "m", trace.scored.position),
                 ("scored_rotation_error", ("scored", "axis"), "rad", trace.scored.rotation),
             ):
-                netcdf.write_variable(group, name, data, dims, "f8" if name == "t" else "f4", {"units": units})
+                kind = "f8" if name == "t" else "f4"
+                netcdf.write_variable(group, name, data, dims, kind, {"units": units}, packed=name == "t")
     os.replace(part, path)
 
 

@@ -168,7 +168,8 @@ class PredictedTrial:
             if self.base is not None:
                 group = file.createGroup("base")
                 for name, x in (("measured", self.base.measured), *self.base.predicted):
-                    netcdf.write_variable(group, name, x, ("t", "twist"), "f4", {"units": "m, rad", "frame": "0"})
+                    about = {"units": "m, rad", "frame": "0"}
+                    netcdf.write_variable(group, name, x, ("t", "twist"), "f4", about, packed=False)
                 if self.base.slipping is not None:
                     _write_slipping(group.createGroup("slipping"), self.base.slipping)
             for joint in self.joints:
@@ -180,8 +181,11 @@ def _write_row(group: netcdf.Group, T: np.ndarray) -> None:
     known = np.isfinite(T).all(axis=(1, 2))
     wxyz = np.full((len(T), 4), np.nan)
     wxyz[known] = Rotation.from_matrix(T[known, :3, :3]).as_quat(canonical=True, scalar_first=True)
-    netcdf.write_variable(group, "position", T[:, :3, 3], ("t", "axis"), "f4", {"units": "m", "frame": "lab"})
-    netcdf.write_variable(group, "quaternion_wxyz", wxyz, ("t", "quaternion"), "f4", {"units": "-", "frame": "lab"})
+    for name, x, last, unit in (
+        ("position", T[:, :3, 3], "axis", "m"),
+        ("quaternion_wxyz", wxyz, "quaternion", "-"),
+    ):
+        netcdf.write_variable(group, name, x, ("t", last), "f4", {"units": unit, "frame": "lab"}, packed=False)
 
 
 _SLIPPING = (

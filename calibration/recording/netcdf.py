@@ -1,6 +1,7 @@
 """netCDF4 files, written and read by the format's own C library.
 
-Signals are packed; the same data give the same bytes. The library is not safe for threads: one file at a time.
+Signals are packed, but for errors and predictions in f4, a quarter of whose bytes it takes time to save; the same data
+give the same bytes. The library is not safe for threads: one file at a time.
 """
 
 from collections.abc import Iterator, Mapping
@@ -67,10 +68,17 @@ def write_labels(group: Group, names: Mapping[str, tuple[str, ...]]) -> None:
 
 
 def write_variable(
-    group: Group, name: str, data: np.ndarray, dims: tuple[str, ...], kind: str, attributes: Mapping[str, str]
+    group: Group,
+    name: str,
+    data: np.ndarray,
+    dims: tuple[str, ...],
+    kind: str,
+    attributes: Mapping[str, str],
+    packed: bool = True,
 ) -> None:
-    """Write an array, packed, with its attributes; one that is empty says `none`."""
-    packing: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True} if data.size else {}
+    """Write an array, packed or as it is, with its attributes; one that is empty says `none`."""
+    packs = packed and data.size > 0
+    packing: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True} if packs else {}
     variable = group.createVariable(name, kind, dims, fill_value=False, **packing)
     variable.setncatts({key: value or "none" for key, value in attributes.items()})
     variable[...] = data.astype(kind)
