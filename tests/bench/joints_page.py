@@ -1,12 +1,14 @@
 """Write docs/results/joints.md: corrections of the joints of calibrated robots, head to head.
 
 python -m tests.bench.joints_page FOLDER...     run folders of `tiago-twin run`, or the DIR of `tiago-twin study joints`
+
+A scenario measured again replaces the robots it had; the others keep theirs, with date and tree of their measurement.
 """
 
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from calibration import load, load_estimate
@@ -29,15 +31,11 @@ calibrate and 20 s for the table, a robot and core, beside its simulation."""
 
 def page(kept: dict) -> str:
     """The page from what is kept."""
-    found = {
-        name: [
-            Row(k, "ok", magnitudes=tuple(Magnitude(*x) for x in robot["mrad"].items())) for k, robot in enumerate(of)
-        ]
-        for name, of in kept["scenarios"].items()
-    }
-    named = {name: ", ".join(r["robot"] for r in of if r["robot"]) for name, of in kept["scenarios"].items()}
-    robots = "; ".join(f"`{name}`, {of or 'sampled robots'}" for name, of in named.items())
-    return table(found, _ORIGIN.format(when=when([kept]), robots=robots))
+    robots = {name: of["robots"] for name, of in kept.items()}
+    found = {name: [_row(k, robot) for k, robot in enumerate(of)] for name, of in robots.items()}
+    named = {name: ", ".join(r["robot"] for r in of if r["robot"]) for name, of in robots.items()}
+    listed = "; ".join(f"`{name}`, {of or f'{len(robots[name])} sampled robots'}" for name, of in named.items())
+    return table(found, _ORIGIN.format(when=when(list(kept.values())), robots=listed))
 
 
 def _row(id: int, robot: dict) -> Row:
@@ -47,17 +45,22 @@ def _row(id: int, robot: dict) -> Row:
 def robots(folder: Path) -> list[tuple[str, dict]]:
     """Name of the scenario and figures of each robot of a folder."""
     if not (folder / "dataset").is_dir():
-        return [
-            (part.parent.name, {"robot": "", "mrad": _plain(row.magnitudes)})
-            for part in sorted(folder.glob("*/collection.json"))
-            for row in open_collection(part.parent).rows
-            if row.status == "ok"
-        ]
+        return [one for part in sorted(folder.glob("*/collection.json")) for one in _sampled(part)]
     about = mapping(folder / "scenario.yaml")
     found = figures(load(folder / "dataset"), load_estimate(folder / "estimate"), folder / "truth")
-    spread = about["twin"]["widths"]["spread"]
-    name = about["name"] + (f", twin.widths.spread={spread:g}" if spread else "")
-    return [(name, {"robot": f"seed {about['seed']}", "mrad": _plain(found)})]
+    return [(_name(about), {"robot": f"seed {about['seed']}", "mrad": _plain(found)})]
+
+
+def _sampled(collection: Path) -> Iterator[tuple[str, dict]]:
+    name = _name(json.loads(collection.read_text(encoding="utf-8"))["scenario"])
+    for row in open_collection(collection.parent).rows:
+        if row.status == "ok":
+            yield name, {"robot": "", "mrad": _plain(row.magnitudes)}
+
+
+def _name(scenario: dict) -> str:
+    spread = scenario["twin"]["widths"]["spread"]
+    return scenario["name"] + (f", twin.widths.spread={spread:g}" if spread else "")
 
 
 def _plain(found: Sequence[Magnitude]) -> dict[str, float]:
@@ -65,8 +68,10 @@ def _plain(found: Sequence[Magnitude]) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    scenarios = defaultdict(list)
+    again = defaultdict(list)
     for name, robot in (one for path in sys.argv[1:] for one in robots(Path(path))):
-        scenarios[name].append(robot)
-    KEPT.write_text(json.dumps({**measured(), "scenarios": scenarios}, indent=1) + "\n", encoding="utf-8")
-    PAGE.write_text(page(json.loads(KEPT.read_text(encoding="utf-8"))), encoding="utf-8")
+        again[name].append(robot)
+    kept = json.loads(KEPT.read_text(encoding="utf-8"))
+    kept |= {name: {**measured(), "robots": of} for name, of in again.items()}
+    KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(page(kept), encoding="utf-8")
