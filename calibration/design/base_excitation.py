@@ -30,7 +30,7 @@ from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, blocks
 from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, WheelSet, wheel_set
 
 SECONDS, RAMP = 10.0, 0.12
-_CANDIDATES = 48
+_CANDIDATES = 400  # a tenth of them shows less than the campaign's swings, by the draw
 _HERTZ = (0.2, 0.4)
 _SPEEDS = (0.25, 1.0)  # shares of the highest speed
 _FASTEST = 1.2  # [rad/s]

@@ -8,6 +8,7 @@ from tests.acceptance.series import SAMPLED, kept_series
 pytestmark = pytest.mark.slow
 OPEN = {  # as docs/limits.md says; bounds are the default robot's
     "fixed": {"share in the 95 % band, swing"},
+    "jolts": {"share in the 95 % band, swing", "share in the 95 % band, jolts"},
     "sampled": {
         "max of swing/plate",
         "median of swing/dynamics",

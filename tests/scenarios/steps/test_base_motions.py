@@ -1,4 +1,4 @@
-"""Designed base motions: they show the wheels better than the campaign's swings do in as much time."""
+"""Designed base motions: they are expected to show the wheels better than the campaign's swings in as much time."""
 
 import json
 
@@ -31,22 +31,24 @@ def test_motions_are_chosen_for_what_the_others_leave_open():
 
 
 @pytest.mark.slow
-def test_they_are_expected_to_show_every_wheel_better_than_the_swings():
+@pytest.mark.parametrize("seed", [0, 1])
+def test_they_are_expected_to_show_every_wheel_better_than_the_swings(seed):
     described = describe_dataset(run_steps.load("humanoids2024").twin, ())
-    found = base_motions(mjcf.urdf(), described, len(SWINGS), np.random.default_rng(0))
+    found = base_motions(mjcf.urdf(), described, len(SWINGS), np.random.default_rng(seed))
     excitation, t = Excitation.of(Laboratory(mjcf.urdf(), described)), found.motions[0].t
     moves = [CALIBRATION_SWINGS[name].at(path_time(t - 1.5, SECONDS, RAMP)) for name in SWINGS]
     H = np.array([excitation.information(t, q)[0] for q in moves])
     _, total = chosen_in_turn(H, len(H))
     usual = np.sqrt(np.mean([np.diag(np.linalg.inv(each)) for each in total], axis=0))
     rows = [NAMES.index(name) for name in SHOWN]
-    assert np.all(found.sigma[rows] < 0.9 * usual[rows])
+    assert np.all(found.sigma[rows] < usual[rows])
+    assert np.median(found.sigma[rows] / usual[rows]) < 0.7
     for motion in found.motions:
         trajectory("base", motion.t, motion.q)  # within the robot's limits, speeds included
 
 
 @pytest.mark.slow
-def test_a_robot_that_plays_them_has_its_springs_identified_better(tmp_path, claim):
+def test_a_robot_that_plays_them_has_its_springs_identified_to_a_tenth(tmp_path, claim):
     length = [f"twin.campaign.calibration_swing={SECONDS}", "twin.campaign.sweep=0.0", "seed=3"]
     scenario = run_steps.load("humanoids2024", [*length, f"twin.campaign.only=[postures,{','.join(SWINGS)}]"])
     only = run_steps.load("humanoids2024", [*length, "twin.campaign.only=[postures]"])
@@ -64,4 +66,5 @@ def test_a_robot_that_plays_them_has_its_springs_identified_better(tmp_path, cla
         springs = np.array(["right.k" in p.name for p in found])
         for p, error in zip(found, off[name], strict=True):
             claim(f"design/base/{name}/{p.name} off by, share", error)
-    assert np.median(off["base motions"][springs]) < 0.5 * np.median(off["swings"][springs])
+    for found in off.values():
+        assert np.median(found[springs]) < 0.1
