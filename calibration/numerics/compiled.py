@@ -1,12 +1,23 @@
-"""Loops over scalars, compiled by numba when they are first called: a command that calls none does not import numba."""
+"""Loops over scalars, compiled by numba when they are first called: a command that calls none does not import numba.
 
-from collections.abc import Callable
-from functools import update_wrapper
+Compiled code is kept beside this package, in a folder of its own for each content of what it was made of: the source
+files of a loop and of those it calls, and their constants. Numba looks at the loop's own file alone.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache, update_wrapper
+from hashlib import sha256
+from pathlib import Path
 from threading import RLock
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 _compiling = RLock()  # threads that call a kernel first at the same time compile it once
+_KEPT = Path(__file__).parents[1] / "__pycache__" / "kernels"
+_CONSTANTS = (bool, int, float, complex, str, tuple)
 
 
 class Kernel:
@@ -14,7 +25,7 @@ class Kernel:
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         """Keep what `numba.njit` needs."""
-        self._function, self._options, self._compiled = function, options, None
+        self._function, self._options, self._compiled = cast(FunctionType, function), options, None
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -27,12 +38,19 @@ class Kernel:
             if self._compiled is None:
                 from numba import njit as compile_
 
-                self._compiled = compile_(nogil=True, **self._options)(self._function)
+                options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, **self._options}  # no C calls it
+                with _kept_in(_KEPT / digest(self._function)):
+                    self._compiled = compile_(**options)(self._function)
                 known = self._function.__globals__
                 for name in (self._function.__name__, *self._function.__code__.co_names):
                     if isinstance(other := known.get(name), Kernel):
                         known[name] = other.compiled()
             return self._compiled
+
+    @property
+    def py_func(self) -> FunctionType:
+        """The function that is compiled, as numba's form names it."""
+        return self._function
 
 
 def njit(**options: Any) -> Callable[[F], F]:
@@ -42,3 +60,44 @@ def njit(**options: Any) -> Callable[[F], F]:
         return cast(F, Kernel(function, options))
 
     return decorated
+
+
+def digest(function: FunctionType) -> str:
+    """Of all that the compiled form of a function is made of."""
+    parts = set()
+    for one in _called(function, {}).values():
+        parts.add(_digest_of(one.__code__.co_filename))
+        values = ((name, one.__globals__.get(name)) for name in one.__code__.co_names)
+        parts |= {f"{name} = {x!r}" for name, x in values if isinstance(x, _CONSTANTS) or hasattr(x, "tobytes")}
+    return sha256("\n".join(sorted(parts)).encode()).hexdigest()[:16]
+
+
+def _called(function: FunctionType, found: dict[int, FunctionType]) -> dict[int, FunctionType]:
+    """The function and all compiled ones that it calls, by their identity."""
+    if id(function) not in found:
+        found[id(function)] = function
+        for name in function.__code__.co_names:
+            other = getattr(function.__globals__.get(name), "py_func", None)
+            if isinstance(other, FunctionType):
+                _called(other, found)
+    return found
+
+
+@lru_cache(maxsize=256)
+def _digest_of(file: str) -> str:
+    path = Path(file)
+    return sha256(path.read_bytes()).hexdigest() if path.is_file() else file
+
+
+@contextmanager
+def _kept_in(folder: Path) -> Iterator[None]:
+    """Let numba keep what is made now in a folder, unless the user names another or it cannot be written."""
+    from numba import config
+
+    before = config.CACHE_DIR
+    if not before and os.access(_KEPT.parents[1], os.W_OK):
+        config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
