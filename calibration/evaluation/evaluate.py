@@ -17,7 +17,7 @@ from calibration.checks.plates import moved_by
 from calibration.errors import NotEnoughData
 from calibration.estimate.drawings import redrawn
 from calibration.estimate.estimate import Estimate
-from calibration.estimate.rows import NOMINAL
+from calibration.estimate.rows import NOMINAL, SOURCES
 from calibration.evaluation.bands import Bands, place_noise
 from calibration.evaluation.budget import Causes, budget, causes
 from calibration.evaluation.joint_regimes import TrialResiduals, residuals, validation_qualities
@@ -34,7 +34,7 @@ from calibration.numerics.side_by_side import side_by_side
 from calibration.prediction.foreign import check_names, registered
 from calibration.prediction.predict import predictor
 from calibration.prediction.predicted_trial import BaseMotion, PredictedTrial, Prediction
-from calibration.prediction.predictor import Predictor
+from calibration.prediction.predictor import Predictor, TrialPoses
 from calibration.prediction.second_session import registration_trials, reregistered
 from calibration.recording.dataset import Dataset
 from calibration.recording.posture_means import PostureMeans
@@ -139,24 +139,31 @@ def _each(
     report: Progress,
     submitted: Submission | None = None,
 ) -> list[_Scored]:
-    def scored(k: int, entry: TrialEntry, trial: MeasuredTrial | PostureMeans) -> _Scored:
+    def posed(entry: TrialEntry, trial: MeasuredTrial | PostureMeans) -> TrialPoses | None:
+        return None if isinstance(trial, PostureMeans) else predict.poses(entry, trial)
+
+    def scored(k: int, entry: TrialEntry, trial: MeasuredTrial | PostureMeans, made: TrialPoses | None) -> _Scored:
         report(f"evaluating {entry.id}", k / len(read))
         if isinstance(trial, PostureMeans):
             return _of_means(predict, dataset, (entry, trial), submitted)
-        return _of_trial(predict, promised, dataset, (entry, trial), submitted)
+        return _of_trial(predict, promised, dataset, (entry, trial, made), submitted)
 
-    return side_by_side(scored, range(len(read)), *zip(*read, strict=True))
+    entries, trials = zip(*read, strict=True)
+    poses = side_by_side(posed, entries, trials)
+    shared = [(one, source) for one in poses if one is not None for source in ("measured", *SOURCES)]
+    side_by_side(lambda of: of[0].prepare(of[1]), shared)  # of three trials, two cores share more than whole ones
+    return side_by_side(scored, range(len(read)), entries, trials, poses)
 
 
 def _of_trial(
     predict: Predictor,
     promised: Bands | None,
     dataset: Dataset,
-    read: tuple[TrialEntry, MeasuredTrial],
+    read: tuple[TrialEntry, MeasuredTrial, TrialPoses | None],
     submitted: Submission | None,
 ) -> _Scored:
-    entry, trial = read
-    T_measured, predicted = poses_of(dataset.description.hand_body, trial).T, predict(entry, trial)
+    entry, trial, poses = read
+    T_measured, predicted = poses_of(dataset.description.hand_body, trial).T, predict(entry, trial, poses)
     predicted = predicted if promised is None else promised.on(predicted, entry, trial)
     own = None if submitted is None else submitted.row(entry, trial.t_mocap, T_measured)
     predicted = predicted if own is None else replace(predicted, rows=(*predicted.rows, own))

@@ -72,9 +72,9 @@ class Predictor:
     bundled: BundledRobot | None = None
     main: str = ""
 
-    def __call__(self, entry: TrialEntry, trial: Trial) -> PredictedTrial:
+    def __call__(self, entry: TrialEntry, trial: Trial, poses: "TrialPoses | None" = None) -> PredictedTrial:
         """Predictions of one trial by every model, every source of the base's motion and every encoder it has."""
-        poses = self.poses(entry, trial)
+        poses = poses or self.poses(entry, trial)
         rows = tuple(
             Prediction(
                 row.name,
@@ -208,6 +208,12 @@ class TrialPoses:
         row = next(row for row in LADDER if row.bundle)
         chosen: Base = next(s for s in ((source,) if source else SOURCES) if self.base(row, s) is not None)
         return self._once(("geared", chosen), lambda: bundled.corrected(self.trial, robot, self.base(row, chosen)))
+
+    def prepare(self, source: Base) -> None:
+        """Compute what many rows share under a source of the base's motion."""
+        rows = [row for row in LADDER if row.bundle and row.name in self.predictor.models]
+        if any(self.base(row, source) is not None for row in rows):
+            self.geared(source)
 
     def base_variance(self, row: LadderRow, source: Base) -> np.ndarray | None:
         """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known.

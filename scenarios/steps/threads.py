@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 
-_LATER = ("twin.campaign", "calibration.pipeline", "scenarios.score.score", "scenarios.report.page")
+_LATER = ("twin.campaign", "calibration.pipeline", "scenarios.score.score", "scenarios.report.page", "numba")
 
 
 @contextmanager
