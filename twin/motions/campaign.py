@@ -25,6 +25,7 @@ TRIALS = (
 TrialName = Annotated[str, one_of("trial", lambda: TRIALS)]
 OwnName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]+$"), other_than("trial", lambda: TRIALS)]
 Form = Literal["kinematic", "wheels"]
+Payloads = tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...]
 Rests = Annotated[int, Field(ge=4, le=100)]
 
 
@@ -89,6 +90,7 @@ class Campaign:
         validation_swing: Duration of each validation swing [s]; 0: none.
         pause: Pause between trials, on every clock [s].
         payloads: Further masses [kg] with which the first validation swing is repeated.
+        calibration_payloads: Further masses [kg] with which the calibration swing `around_z` is repeated.
         push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed again.
         driving: Trials in which the base moves.
@@ -109,7 +111,8 @@ class Campaign:
     calibration_swing: FixedNonNegative
     validation_swing: FixedNonNegative
     pause: FixedNonNegative
-    payloads: tuple[Annotated[float, Field(ge=0.0, le=3.0)], ...] = ()
+    payloads: Payloads = ()
+    calibration_payloads: Payloads = ()
     push: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     confirmation: bool = False
     driving: Driving = field(default_factory=Driving)

@@ -16,6 +16,7 @@ from twin.motions.swings import CALIBRATION_SWINGS, FURTHER_SWINGS, JOINTS, VALI
 from twin.random_streams import generator
 
 REGISTRATION = "registration"
+_LOADED = "around_z"  # the calibration swing that brings wheels nearest their friction
 _REGISTRATION_POSTURES = 8
 
 
@@ -30,9 +31,10 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *driving.trials(campaign),
         *_sweeps(campaign),
         *_swings("calibration", campaign.calibration_swing, CALIBRATION_SWINGS, campaign),
+        *_loaded("calibration", _LOADED, campaign.calibration_payloads, campaign.calibration_swing, campaign),
         *_swings("validation", campaign.validation_swing, VALIDATION_SWINGS, campaign),
         *_swings("validation", campaign.validation_swing, further, campaign),
-        *_loaded(campaign),
+        *_loaded("validation", next(iter(VALIDATION_SWINGS)), campaign.payloads, campaign.validation_swing, campaign),
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
         *(read_trajectory(m.file, name, m.role, campaign.rest) for name, m in campaign.motions.items()),
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
@@ -101,15 +103,14 @@ def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:
     )
 
 
-def _loaded(campaign: Campaign) -> tuple[Motion, ...]:
-    """The first validation swing with each further payload."""
-    name, path = next(iter(VALIDATION_SWINGS.items()))
-    trials = ((f"{name}_{mass:g}kg".replace(".", "_"), mass) for mass in campaign.payloads)
+def _loaded(
+    role: schema.Role, name: str, masses: tuple[float, ...], duration: float, campaign: Campaign
+) -> tuple[Motion, ...]:
+    """A swing with each of further payloads [kg] in the hand."""
+    path = {**CALIBRATION_SWINGS, **VALIDATION_SWINGS}[name]
+    trials = ((f"{name}_{mass:g}kg".replace(".", "_"), mass) for mass in masses)
     return tuple(
-        replace(
-            motions.swing(id, "validation", "swing", path, campaign.validation_swing, campaign), name=name, payload=m
-        )
-        for id, m in trials
+        replace(motions.swing(id, role, "swing", path, duration, campaign), name=name, payload=m) for id, m in trials
     )
 
 

@@ -1,4 +1,15 @@
-"""What inverse dynamics cannot know and a plate can: slow, run by `make slow`."""
+"""What inverse dynamics cannot know and a plate can: slow, run by `make slow`.
+
+Row `full`, seed 4, per component [mm], calibrated with the usual load and, in brackets, with 1 kg as well:
+
+    campaign         plate: usual     0 kg         2 kg          push         dynamics: 2 kg
+    whole            .22 (.22)        .21 (.22)    2.39 (1.75)   .87 (.72)    1.56 (1.22)
+    short, as here   .27 (.25)        .30 (.27)    2.09 (1.51)   .26 (.56)    1.35 (1.23)
+
+Drives' friction: .39 +- .19 (.39 +- .06), truly .5. True parameters leave as much of the short push as those with 1 kg.
+After a push arm_1 stops 1.3 mrad off in its gap; with true gears and markers without noise .8, of which 1.2 times the
+usual error remain.
+"""
 
 import json
 
@@ -27,10 +38,8 @@ def test_a_declared_payload_is_known_to_both(trials):
         assert dynamics < 1.25 * plate
 
 
-LOADED = pytest.mark.xfail(
-    reason="a drive wheel near its friction, which no calibration trial showed: docs/limits.md", strict=True
-)
-PUSHED = pytest.mark.xfail(reason="where arm_1 stops in its gap after a push ends: docs/limits.md", strict=True)
+LOADED = pytest.mark.xfail(reason="drive wheels nearer their friction than in calibration: docs/models.md", strict=True)
+PUSHED = pytest.mark.xfail(reason="where arm_1 stops in its gap after a push: docs/limits.md", strict=True)
 
 
 @pytest.mark.parametrize(
@@ -41,7 +50,7 @@ PUSHED = pytest.mark.xfail(reason="where arm_1 stops in its gap after a push end
         pytest.param("push", "measured", marks=PUSHED),
         ("xyz_0kg", "plate"),
         pytest.param("xyz_2kg", "plate", marks=LOADED),
-        ("push", "plate"),
+        pytest.param("push", "plate", marks=LOADED),
     ],
 )
 def test_row_full_knows_what_loads_it(trials, trial, base):

@@ -112,9 +112,10 @@ def test_the_plate_sees_a_push_at_the_hand(lab, config):
 def test_a_payload_weighs_what_its_trial_says(lab, config, nominal):
     from twin.motions import schedule
 
-    campaign = replace(config.campaign, payloads=(0.0, 2.0))
-    masses = {
-        m.id: lab.twin_in(m, 0.0).model.body_mass.sum() for m in schedule(campaign, nominal, 0) if m.name == "xyz"
-    }
+    campaign = replace(config.campaign, payloads=(0.0, 2.0), calibration_payloads=(1.0,))
+    trials = {m.id: m for m in schedule(campaign, nominal, 0) if m.name in ("xyz", "around_z")}
+    masses = {name: lab.twin_in(m, 0.0).model.body_mass.sum() for name, m in trials.items()}
     assert masses["xyz_0kg"] == pytest.approx(masses["xyz"] - 0.437)
     assert masses["xyz_2kg"] == pytest.approx(masses["xyz"] + 2.0 - 0.437)
+    assert masses["around_z_1kg"] == pytest.approx(masses["around_z"] + 1.0 - 0.437)
+    assert trials["around_z_1kg"].role == "calibration" and trials["xyz_2kg"].role == "validation"
