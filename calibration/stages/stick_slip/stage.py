@@ -118,7 +118,8 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
     """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off.
 
     Trials that slipped too far to be predicted decide nothing: what one of them shows is chance. Where slip does not
-    explain yaw in the others either, wheels yield otherwise: they decide, and the compliance need not be better.
+    explain yaw in the others either, wheels yield otherwise: they decide, and the compliance need not be better. Nor
+    along x and y where yaw is linear: no wheel slid then, in any trial.
     """
     held_out = dict(suspension.held_out)
     tried = held_out.get(direction.source, suspension.held_out[0][1])
@@ -135,6 +136,9 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
         plane = tried.variance(np.ones(6, dtype=bool))[list(PLANE)]
     worth = _BETTER if explained else 1.0 / _BETTER
     linear = tried.moves[list(PLANE)] & (plane < worth * judged.variance(direction.moved))
+    if linear[2]:
+        every = held_out[direction.source].moves[list(PLANE)]
+        linear |= every & (variance[list(PLANE)] < direction.held_out.variance(direction.moved) / _BETTER)
     return replace(direction, linear=linear, heave_variance=heave)
 
 

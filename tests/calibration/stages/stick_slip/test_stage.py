@@ -128,6 +128,18 @@ def test_an_axis_that_is_linear_from_dynamics_alone_speaks_against_no_plate(reco
     assert _behind((half, plate)) == ["x", "y", "yaw"]
 
 
+def test_where_yaw_is_linear_no_wheel_slides_along_x_or_y(recorded, suspension):
+    """A trial in which slip is predicted where there is none is no wild one."""
+    (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    sums, count, yaw = np.ones((8, 6)), np.full(8, 100.0), np.arange(6) == 5
+    left = np.where(yaw, 1e-8, 0.2e-6) * sums
+    tried = replace(suspension, held_out=(("plate", HeldOut(left, 1e-6 * sums, 1e-10 * sums, count)),))
+    own = np.concatenate([np.repeat([[0.1e-6, 0.1e-6, 1e-7]], 7, axis=0), np.full((1, 3), 1e-5)])
+    found = replace(direction, held_out=HeldOut(own, 1e-6 * sums[:, :3], 1e-10 * sums[:, :3], count))
+    assert found.held_out.wild.tolist() == [False] * 7 + [True]
+    assert _linear(found, tried).linear.all()
+
+
 def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
     """One wild trial of eight would make a good prediction look worse than a base at rest."""
     (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
