@@ -40,11 +40,12 @@ class Kernel:
 
                 options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, **self._options}  # no C calls it
                 with _kept_in(_KEPT / digest(self._function)):
-                    self._compiled = compile_(**options)(self._function)
+                    own = compile_(**options)(self._function)
                 known = self._function.__globals__
                 for name in (self._function.__name__, *self._function.__code__.co_names):
                     if isinstance(other := known.get(name), Kernel):
-                        known[name] = other.compiled()
+                        known[name] = own if other is self else other.compiled()
+                self._compiled = own  # the last: other threads call it at once
             return self._compiled
 
     @property

@@ -43,3 +43,16 @@ def test_a_digest_is_of_callees_and_constants(tmp_path, monkeypatch):
 
     found = [digest(2.0, 0.5), digest(3.0, 0.5), digest(2.0, 0.7), digest(2.0, 0.5)]
     assert found[0] == found[3] and len(set(found)) == 3
+
+
+def test_no_thread_sees_a_loop_before_those_it_calls_are_compiled():
+    class Slow(compiled.Kernel):
+        def compiled(self):
+            seen.append(outer._compiled)
+            return super().compiled()
+
+    seen, known = [], {}
+    exec("def inner(x):\n    return 2 * x\ndef outer(x):\n    return inner(x) + 1\n", known)
+    outer = compiled.Kernel(known["outer"], {})
+    known |= {"inner": Slow(known["inner"], {}), "outer": outer}
+    assert outer(3) == 7 and seen[0] is None
