@@ -3,7 +3,6 @@
 The counts are kept in docs/results/reliability.json.
 """
 
-import importlib
 import json
 import shutil
 import sys
@@ -13,6 +12,7 @@ from pathlib import Path
 
 from tests.acceptance.claims import measured, when
 from tests.hostile import findings, hidden_markers, random_cases, tried_mistakes
+from tests.hostile.rows import datasets, folders, results_and_tables
 from tests.hostile.rows.case import Case, Judged, judged
 from tests.hostile.rows.child import MEMORY, SECONDS
 from tests.hostile.rows.laboratory import copied, make
@@ -50,15 +50,13 @@ _COLUMNS = (
     "kind", "cases", "refused by name", "done", "tracebacks or crashes", "written outside", "other faults",
     "most memory [MB]", "longest [s]",
 )  # fmt: skip
-_TABLES = ("datasets", "results_and_tables", "folders", "wrong_data")
+_TABLES = (datasets, results_and_tables, folders)
 
 
 def tables() -> Iterator[tuple[str, Sequence[Case]]]:
-    """Groups of rows of every table that there is; rows of other kinds than `Case` have tests of their own."""
-    for name in _TABLES:
-        if (Path(__file__).parent / f"{name}.py").is_file():
-            groups = getattr(importlib.import_module(f"tests.hostile.{name}"), "GROUPS", {})
-            yield from ((g, rows) for g, rows in groups.items() if all(isinstance(row, Case) for row in rows))
+    """Groups of rows of every table of `Case`; rows of other kinds have tests of their own."""
+    for table in _TABLES:
+        yield from table.GROUPS.items()
 
 
 def row(group: str, found: Sequence[Judged]) -> list[str | int]:
