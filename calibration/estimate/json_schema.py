@@ -152,7 +152,9 @@ def _check_sizes(names: tuple[str, ...], file: EstimateFile, bundle: BundleParts
     sizes = [("link_zero", len(file.link_zero), joints)]
     sizes += [(f"{name}: reading_error", len(m.reading_error), len(on_the_way)) for name, m in file.models.items()]
     if not on_the_way <= set(names):
-        raise ValueError(f"reading_error is of joints that the robot has not: {', '.join(on_the_way - set(names))}")
+        raise ValueError(
+            f"reading_error is of joints that the robot does not have: {', '.join(on_the_way - set(names))}"
+        )
     if bundle is not None:
         sizes += [("offset", len(bundle.offset) or -1, joints), ("at_rest", len(bundle.at_rest), len(bundle.trains))]
         inertials = [len(train.inertials) for train in bundle.trains]

@@ -151,7 +151,7 @@ def _each(
     entries, trials = zip(*read, strict=True)
     poses = side_by_side(posed, entries, trials)
     shared = [(one, source) for one in poses if one is not None for source in ("measured", *SOURCES)]
-    side_by_side(lambda of: of[0].prepare(of[1]), shared)  # of three trials, two cores share more than whole ones
+    side_by_side(lambda of: of[0].prepare(of[1]), shared)  # three trials do not divide by two cores
     return side_by_side(scored, range(len(read)), entries, trials, poses)
 
 

@@ -160,7 +160,7 @@ def _write_traces(path: Path, traces: tuple[TrialErrors, ...]) -> None:
                 ("scored_rotation_error", ("scored", "axis"), "rad", trace.scored.rotation),
             ):
                 kind = "f8" if name == "t" else "f4"
-                netcdf.write_variable(group, name, data, dims, kind, {"units": units}, packed=name == "t")
+                netcdf.write_variable(group, name, data, dims, kind, {"units": units}, compressed=name == "t")
     os.replace(part, path)
 
 

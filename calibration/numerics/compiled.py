@@ -1,7 +1,7 @@
 """Loops over scalars, compiled by numba when they are first called: a command that calls none does not import numba.
 
-Compiled code is kept beside this package, in a folder of its own for each content of what it was made of: the source
-files of a loop and of those it calls, and their constants. Numba looks at the loop's own file alone.
+Compiled code is cached beside this package, in a folder named by a digest of the source files of a loop and of those it
+calls, and of their constants: numba compares the loop's own file alone.
 """
 
 import os

@@ -169,7 +169,7 @@ class PredictedTrial:
                 group = file.createGroup("base")
                 for name, x in (("measured", self.base.measured), *self.base.predicted):
                     about = {"units": "m, rad", "frame": "0"}
-                    netcdf.write_variable(group, name, x, ("t", "twist"), "f4", about, packed=False)
+                    netcdf.write_variable(group, name, x, ("t", "twist"), "f4", about, compressed=False)
                 if self.base.slipping is not None:
                     _write_slipping(group.createGroup("slipping"), self.base.slipping)
             for joint in self.joints:
@@ -185,7 +185,7 @@ def _write_row(group: netcdf.Group, T: np.ndarray) -> None:
         ("position", T[:, :3, 3], "axis", "m"),
         ("quaternion_wxyz", wxyz, "quaternion", "-"),
     ):
-        netcdf.write_variable(group, name, x, ("t", last), "f4", {"units": unit, "frame": "lab"}, packed=False)
+        netcdf.write_variable(group, name, x, ("t", last), "f4", {"units": unit, "frame": "lab"}, compressed=False)
 
 
 _SLIPPING = (

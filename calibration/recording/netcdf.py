@@ -1,7 +1,7 @@
 """netCDF4 files, written and read by the format's own C library.
 
-Signals are packed, but for errors and predictions in f4, a quarter of whose bytes it takes time to save; the same data
-give the same bytes. The library is not safe for threads: one file at a time.
+Signals are compressed, but for errors and predictions in f4, of which it saves a quarter of the bytes and takes longer
+than writing them. The same data give the same bytes. The library is not safe for threads: one file at a time.
 """
 
 from collections.abc import Iterator, Mapping
@@ -74,12 +74,12 @@ def write_variable(
     dims: tuple[str, ...],
     kind: str,
     attributes: Mapping[str, str],
-    packed: bool = True,
+    compressed: bool = True,
 ) -> None:
-    """Write an array, packed or as it is, with its attributes; one that is empty says `none`."""
-    packs = packed and data.size > 0
-    packing: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True} if packs else {}
-    variable = group.createVariable(name, kind, dims, fill_value=False, **packing)
+    """Write an array, compressed or as it is, with its attributes; one that is empty says `none`."""
+    zlib: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True}
+    options = zlib if compressed and data.size else {}
+    variable = group.createVariable(name, kind, dims, fill_value=False, **options)
     variable.setncatts({key: value or "none" for key, value in attributes.items()})
     variable[...] = data.astype(kind)
 

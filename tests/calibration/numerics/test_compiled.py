@@ -1,4 +1,4 @@
-"""Compiled code is made anew when anything that it is made of changes."""
+"""Loops are compiled again when their source, what they call or their constants change."""
 
 import subprocess
 import sys

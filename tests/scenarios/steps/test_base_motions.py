@@ -31,8 +31,8 @@ def test_motions_are_chosen_for_what_the_others_leave_open():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1])
-def test_they_are_expected_to_show_every_wheel_better_than_the_swings(seed):
+@pytest.mark.parametrize(("seed", "most"), [(0, 0.9), (1, 1.0)])  # of others the drives' friction gains least
+def test_they_are_expected_to_show_every_wheel_better_than_the_swings(seed, most):
     described = describe_dataset(run_steps.load("humanoids2024").twin, ())
     found = base_motions(mjcf.urdf(), described, len(SWINGS), np.random.default_rng(seed))
     excitation, t = Excitation.of(Laboratory(mjcf.urdf(), described)), found.motions[0].t
@@ -41,30 +41,47 @@ def test_they_are_expected_to_show_every_wheel_better_than_the_swings(seed):
     _, total = chosen_in_turn(H, len(H))
     usual = np.sqrt(np.mean([np.diag(np.linalg.inv(each)) for each in total], axis=0))
     rows = [NAMES.index(name) for name in SHOWN]
-    assert np.all(found.sigma[rows] < usual[rows])
+    assert np.all(found.sigma[rows] < most * usual[rows])
     assert np.median(found.sigma[rows] / usual[rows]) < 0.7
     for motion in found.motions:
         trajectory("base", motion.t, motion.q)  # within the robot's limits, speeds included
 
 
-@pytest.mark.slow
-def test_a_robot_that_plays_them_has_its_springs_identified_to_a_tenth(tmp_path, claim):
+@pytest.fixture(scope="module")
+def off(tmp_path_factory):
+    """|log of estimate over truth| of the springs and frictions of right wheels, by what the robot played."""
     length = [f"twin.campaign.calibration_swing={SECONDS}", "twin.campaign.sweep=0.0", "seed=3"]
     scenario = run_steps.load("humanoids2024", [*length, f"twin.campaign.only=[postures,{','.join(SWINGS)}]"])
-    only = run_steps.load("humanoids2024", [*length, "twin.campaign.only=[postures]"])
-    planned, plan = with_base_motions(only, tmp_path / "motions")
+    only, folder = (
+        run_steps.load("humanoids2024", [*length, "twin.campaign.only=[postures]"]),
+        tmp_path_factory.mktemp("off"),
+    )
+    planned, plan = with_base_motions(only, folder / "motions")
     assert len(plan.motions) == BASE_MOTIONS
-    off, springs = {}, np.zeros(0, dtype=bool)
-    for name, one in {"swings": scenario, "base motions": planned}.items():
-        run_steps.simulate(one, tmp_path / name)
-        truth = json.loads((tmp_path / name / "truth/truth.json").read_text())["parameters"]
-        true = {p["name"]: p["value"] for p in truth}
-        model = calibrate(load(tmp_path / name / "dataset"), ("suspension", "bundle")).bundle.stick_slip
-        every = wheel_parameters(model.wheels, model.direction("plate"))
-        found = [p for p in every if "right.k" in p.name or "right.mu" in p.name]
-        off[name] = np.array([abs(np.log(p.value / true[p.name])) for p in found])
-        springs = np.array(["right.k" in p.name for p in found])
-        for p, error in zip(found, off[name], strict=True):
-            claim(f"design/base/{name}/{p.name} off by, share", error)
-    for found in off.values():
-        assert np.median(found[springs]) < 0.1
+    return {name: errors(one, folder / name) for name, one in {"swings": scenario, "base motions": planned}.items()}
+
+
+def errors(scenario, folder):
+    run_steps.simulate(scenario, folder)
+    true = {p["name"]: p["value"] for p in json.loads((folder / "truth/truth.json").read_text())["parameters"]}
+    model = calibrate(load(folder / "dataset"), ("suspension", "bundle")).bundle.stick_slip
+    found = wheel_parameters(model.wheels, model.direction("plate"))
+    return {p.name: abs(np.log(p.value / true[p.name])) for p in found if "right.k" in p.name or "right.mu" in p.name}
+
+
+def of_springs(found):
+    return np.median([error for name, error in found.items() if "right.k" in name])
+
+
+@pytest.mark.slow
+def test_a_robot_that_plays_them_has_its_springs_identified_to_a_tenth(off, claim):
+    for what, found in off.items():
+        for name, error in found.items():
+            claim(f"design/base/{what}/{name} off by, share", error)
+    assert max(of_springs(found) for found in off.values()) < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(reason="the model of a wheel errs by more than either leaves uncertain: docs/limits.md", strict=True)
+def test_a_robot_that_plays_them_has_its_springs_identified_better(off):
+    assert of_springs(off["base motions"]) < 0.5 * of_springs(off["swings"])
