@@ -25,7 +25,7 @@ from calibration.robot.kinematics import shift
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, planar_forcing, wrenches_along
-from calibration.stages.stick_slip.kernel import ACCELERATION, COLUMNS, LANES, STEPS, Bases
+from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, LANES, STEPS, Bases
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.stream import (
     UNDRIVEN,
@@ -130,7 +130,7 @@ class SlippingBase:
             state = at.sprung(t, wrench, before, self.model.wheels.borne)
             driving = None if moving is None else self._driven(at.gravity, moving)
             slip = None if before is None else before.slip
-            return state._replace(slip=self._stream.stepped(Sample(t, state.wrench, state.x[3:5], driving), slip))
+            return state._replace(slip=self._stream.stepped(Sample(t, at.action @ wrench, state.x[3:5], driving), slip))
         slip, modes, stream = before.slip, at.suspension.modes, self._stream
         place = Place(
             at.action, self.model.wheels.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity
@@ -259,9 +259,10 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     for i in range(6):
         for c in range(6):
             w[0, i] += place.action[i, c] * wrench[c]
-    bear(place.standing, w)
+    sprung = w.copy()
+    bear(place.standing, sprung)
     for i in range(6):
-        change[i] = w[0, i] - before.wrench[i]
+        change[i] = sprung[0, i] - before.wrench[i]
     modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, change, dt, x)
     lags, heaving = lagged(x[2:5], before.heave, before.lags, dt)
     if moving.shape[1]:
@@ -279,4 +280,4 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     shift(moved[0], turn[0], scratch)
     shift(moved[0], place.T_0_lab, scratch)
     a = accelerating(after.state, fitted.members, heaving, place.T_lab_0)
-    return w[0], modes, x, lags, moved, a, row, after.state, after.wheels, found
+    return sprung[0], modes, x, lags, moved, a, row, after.state, after.wheels, found

@@ -41,6 +41,14 @@ def path_time(t: np.ndarray, duration: float, ramp: float) -> np.ndarray:
     return t - ramp / 2.0 - np.where(t < ramp, t - ramp / 2.0 - up**2 / (2 * ramp), 0.0) - down**2 / (2 * ramp)
 
 
+def halting_time(t: np.ndarray, duration: float, ramp: float, period: float) -> np.ndarray:
+    """The same with equal rests between parts of a period each [s of the path]; one part where only one has room."""
+    part = min(period + ramp, duration)
+    n = int(duration / part + 1e-9)
+    each = (duration - part) / max(n - 1, 1)
+    return np.sum([path_time(t - k * each, part, ramp) for k in range(n)], axis=0)
+
+
 def _times(duration: float) -> np.ndarray:
     return np.arange(round(duration * RATE) + 1) / RATE
 
@@ -137,7 +145,8 @@ class Motion:
 def swing(id: str, role: schema.Role, kind: schema.Kind, path: Swing, duration: float, campaign: Campaign) -> Motion:
     """A swing between two rests."""
     t = _times(duration + 2.0 * campaign.rest)
-    s = path_time(t - campaign.rest, duration, campaign.ramp)
+    period = 1.0 / min(path.frequency) if path.halts else np.inf
+    s = halting_time(t - campaign.rest, duration, campaign.ramp, period)
     return Motion(id, role, kind, id, path.at(s), *no_dwells())
 
 

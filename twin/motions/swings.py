@@ -27,12 +27,14 @@ class Swing:
         amplitude: (8,) [m, rad].
         frequency: (8,) [Hz].
         phase: (8,) [rad].
+        halts: Whether it stops after each period of its lowest frequency.
     """
 
     start: tuple[float, ...]
     amplitude: tuple[float, ...]
     frequency: tuple[float, ...]
     phase: tuple[float, ...]
+    halts: bool = False
 
     def at(self, s: np.ndarray) -> np.ndarray:
         """Path (n, 8) at path times s (n,) [s]."""
@@ -59,18 +61,18 @@ FURTHER_SWINGS: dict[str, Swing] = {}
 """Swings that are recorded where a campaign's `only` names them, in the role of validation."""
 
 
-def in_step(frequency: float, start: tuple[float, ...], amplitudes: tuple[float, ...]) -> Swing:
+def in_step(frequency: float, start: tuple[float, ...], amplitudes: tuple[float, ...], halts: bool = False) -> Swing:
     """A swing of all joints at one frequency [Hz] and without phase."""
     n = len(JOINTS)
-    return Swing(start, amplitudes, (frequency,) * n, (0.0,) * n)
+    return Swing(start, amplitudes, (frequency,) * n, (0.0,) * n, halts)
 
 
 # The paper's families: about each axis of the base, folding along two of them. 0.2 Hz, wrists moving along. Starting
-# and ending, around_z brings the drive wheels nearer their friction than any validation swing does.
+# and ending, around_z brings the drive wheels nearer their friction than any validation swing does: it does so often.
 CALIBRATION_SWINGS = {
     "around_x": in_step(0.2, _SIDE, (0.0, 0.0, 0.55, 0.0, 0.0, 0.5, -0.4, 0.5)),
     "around_y": in_step(0.2, FORWARD, (0.0, 0.0, 0.55, 0.0, 0.0, -0.5, 0.4, 0.5)),
-    "around_z": in_step(0.2, FORWARD, (0.0, 1.00, 0.0, 0.0, 0.0, 0.5, 0.4, -0.5)),
+    "around_z": in_step(0.2, FORWARD, (0.0, 1.00, 0.0, 0.0, 0.0, 0.5, 0.4, -0.5), halts=True),
     "x_fold": in_step(0.2, (0.12, 1.5, -0.55, -3.0, 1.3, 0.1, 0.1, 0.1), (0.0, 0.0, 0.45, 0.0, -0.7, 0.4, -0.5, 0.4)),
     "y_fold": in_step(0.2, (0.12, 0.4, -0.55, -3.0, 1.3, 0.1, 0.1, 0.1), (0.0, 0.0, 0.45, 0.3, -0.7, -0.4, -0.5, 0.4)),
 }

@@ -11,20 +11,20 @@ force. Where there are no joint readings the base has no inertia: then the plate
 correction.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE, Signal, even, low_passed
-from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
 from calibration.robot.wrist_sensor import hand_push
-from calibration.stages.stick_slip.kernel import COLUMNS, PLATE, STEPS
-from calibration.stages.stick_slip.wheels import wheel_set
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS
+from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load, root_in_base
 from calibration.stages.suspension.modal_response import predicted
@@ -34,6 +34,7 @@ CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+PLACED, WEIGHED = 5e-3, 2e-3  # [m] a plate under a base, the centre of mass of a nominal robot: sigmas
 _INERTIA_STRIDE = 5  # samples from one composite inertia to the next
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
 
@@ -46,7 +47,7 @@ class PlanarForcing:
         trial_id: The trial.
         source: `plate` or `dynamics`.
         t: (n,) [s, mocap clock], spacing 1 / RATE.
-        drive: (STEPS n, 11), see `kernel.advance`.
+        drive: (STEPS n, 11), see `kernel.integration.advance`.
         inertia: (n, 15).
         heave: (n, 3) z, rx, ry by the compliance [m, rad].
         rest: (n,) True in the first second.
@@ -76,15 +77,17 @@ def planar_force(drive: np.ndarray, source: Source) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Tilting:
-    """The 6x6 compliance that heave and tilt follow.
+    """The 6x6 compliance that heave and tilt follow, and where the plate is.
 
     Attributes:
         K: (6, 6) stiffness [N/m, N.m/rad].
         C: (6, 6) damping.
+        off: (2,) how far the plate seems from its declared place under the base [m], see `plate_off`.
     """
 
     K: np.ndarray
     C: np.ndarray
+    off: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,7 @@ class Wrenches:
         dynamics: By inverse dynamics; None without joint readings.
         t: (k,) times of the inertia; empty without.
         M: (k, 6, 6) composite inertia.
+        wheels: Of the robot.
     """
 
     trial_id: str
@@ -106,6 +110,7 @@ class Wrenches:
     dynamics: Load | None
     t: np.ndarray
     M: np.ndarray
+    wheels: WheelSet
 
 
 def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wrenches:
@@ -114,8 +119,7 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wr
     if sources.plate is not None and len(trial.t_plate):
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
     if sources.robot is None or not len(trial.t_robot):
-        plate = None if plate is None else borne(lab.description, lab.urdf, plate)
-        return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)))
+        return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)), wheels_of(lab))
     known = np.isfinite(trial.q_motor).all(axis=1)
     t, q = sources.robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
     push = hand_push(lab.urdf, lab.description, t, q, trial.wrist_wrench[known])
@@ -134,17 +138,35 @@ def wrenches_along(  # noqa: PLR0913  what the instruments show
 
     `push` (n, 6) on the hand as `WristSensor.push` has it.
     """
-    plate, dynamics = (
-        None if load is None else borne(lab.description, lab.urdf, load)
-        for load in (plate, motion_load(lab, t, q_motor, T_lab_0, CUTOFF, push))
-    )
-    return Wrenches("readings", float(t[0]), plate, dynamics, *composite_inertia(lab, t, q_motor, T_lab_0))
+    dynamics, M = motion_load(lab, t, q_motor, T_lab_0, CUTOFF, push), composite_inertia(lab, t, q_motor, T_lab_0)
+    return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab))
 
 
-def borne(description: Description, urdf: str, load: Load) -> Load:
-    """The load as `WheelSet.borne` has it."""
-    wheels = wheel_set(urdf, description.wheels, float(np.linalg.norm(description.gravity)))
-    return replace(load, signal=replace(load.signal, x=wheels.borne(load.signal.x)))
+def wheels_of(lab: Laboratory) -> WheelSet:
+    """The wheels of a laboratory's robot."""
+    return wheel_set(lab.urdf, lab.description.wheels, float(np.linalg.norm(lab.description.gravity)))
+
+
+def vertical(wrench: np.ndarray) -> np.ndarray:
+    """(-Fz, My, -Mx) (n, 3) of wrenches (n, 6)."""
+    return np.asarray(wrench[:, (2, 4, 3)] * (-1.0, 1.0, -1.0))
+
+
+def plate_off(wrenches: Sequence[Wrenches]) -> np.ndarray:
+    """How far (2,) [m] the plate seems from its declared place under the base, 0 without joint readings.
+
+    By what it and inverse dynamics have for (My, -Mx) at rest, each as far as it is known.
+    """
+    found = []
+    for one in wrenches:
+        if one.plate is not None and one.dynamics is not None:
+            plate, dynamics = (
+                vertical(load.signal.x[load.signal.t <= one.start + REST]).mean(axis=0)
+                for load in (one.plate, one.dynamics)
+            )
+            found.append((plate - dynamics)[1:] / plate[0])
+    share = PLACED**2 / (PLACED**2 + WEIGHED**2)
+    return share * np.median(found, axis=0) if found else np.zeros(2)
 
 
 def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> PlanarForcing:
@@ -157,7 +179,7 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     if main is None:
         what = "force plate" if source == "plate" else "encoder readings"
         raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")
-    lower = forcing_of(main, wrenches.start)
+    lower = forcing_of(_sprung(wrenches.wheels, main), wrenches.start)
     first, last = lower.t[0], lower.t[-1]
     if dynamics is not None:
         first, last = max(first, dynamics.signal.t[0]), min(last, dynamics.signal.t[-1])
@@ -177,12 +199,20 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
         if main is dynamics:
             load = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0)
             rows[:, 6:] = (M[:, (2, 4, 3)][:, :, PLANE] * np.array([1.0, -1.0, 1.0])[:, None]).reshape(n, 9)
-    drive[:, 3:6] = load[:, (2, 4, 3)] * (-1.0, 1.0, -1.0)
+    drive[:, 3:6] = vertical(load)
     drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:]
     if source == "plate":
-        drive[:, PLATE:] = load[:, PLANE] - load[rest][:, PLANE].mean(axis=0)
+        drive[:, 4:6], drive[:, PLATE:] = (
+            drive[:, 4:6] - drive[:, 3:4] * tilting.off,
+            load[:, PLANE] - load[rest][:, PLANE].mean(axis=0),
+        )
     early = t <= wrenches.start + REST
     return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[::STEPS], early, linear(t))
+
+
+def _sprung(wheels: WheelSet, load: Load) -> Load:
+    """The load as the springs of wheels on the floor have it, see `WheelSet.borne`."""
+    return replace(load, signal=replace(load.signal, x=wheels.borne(load.signal.x)))
 
 
 def _at(signal: Signal, t: np.ndarray) -> np.ndarray:

@@ -18,12 +18,13 @@ from calibration.numerics.compiled import njit
 from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_force
-from calibration.stages.stick_slip.kernel import Bases, at_rest, simulated
+from calibration.stages.stick_slip.kernel.bases import Bases, at_rest
+from calibration.stages.stick_slip.kernel.integration import simulated
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, pooled_noise
 from calibration.stages.stick_slip.wheels import WIDE, Prior, SlipParameters, WheelSet
 from calibration.stages.suspension.model import Source
 
-CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel`
+CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel.corrector`
 WINDOW = round(4.0 * RATE / BLOCK)  # blocks
 _MEMORY = 1.0  # [s] between independent samples of the error
 _FAR = 0.2  # [m, rad] an error that counts as no larger

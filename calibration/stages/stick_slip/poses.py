@@ -10,7 +10,8 @@ import numpy as np
 
 from calibration.recording.trial import Trial
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_forcing, wrenches_of
-from calibration.stages.stick_slip.kernel import advance
+from calibration.stages.stick_slip.kernel.bases import LOAD
+from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
@@ -72,23 +73,14 @@ def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
     if not found.slips.any():
         return np.zeros((len(forcing.t), len(model.wheels.names)))
     rows, base = model.wheels.rows(found.parameters), bases_of(model.wheels, found.logarithms[None], found.corrected)
-    e, x = np.zeros((len(forcing.t), *model.wheels.position.shape)), np.zeros((len(forcing.t), 3))
+    e, load = np.zeros((len(forcing.t), *model.wheels.position.shape)), np.zeros((len(forcing.t), 3))
     for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):
         advance(base.state[0], base.wheels[0], drive, forcing.inertia[k], STEP, base.lanes[0])
-        e[k], x[k] = base.deflection(0), base.state[0, :3, 0]
-    drive = forcing.drive[STEPS - 1 :: STEPS]
-    load = about_base(drive[:, 3:6], x) if found.corrected else drive[:, 3:6]
-    N = np.maximum(rows[:, 6] + load @ rows[:, 7:].T, 0.0)
+        e[k], load[k] = base.deflection(0), base.state[0, LOAD : LOAD + 3, 0]
+    drive, N = forcing.drive[STEPS - 1 :: STEPS], np.maximum(rows[:, 6] + load @ rows[:, 7:10].T, 0.0)
     force = rows[:, 2:4] * e + N[..., None] * np.stack([-drive[:, 7], drive[:, 6]], axis=1)[:, None]
     used, limit = np.linalg.norm(force, axis=2), rows[:, 5] * N
     return np.minimum(np.divide(used, limit, out=np.ones_like(used), where=limit > 0.0), 1.0)
-
-
-def about_base(load: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """-Fz, My, -Mx (n, 3) about the axes of a base at x (n, 3) [m, rad], of those about a plate's, see `kernel`."""
-    moment, c, s = load[:, 1:] - load[:, :1] * x[:, :2], np.cos(x[:, 2]), np.sin(x[:, 2])
-    first, second = moment.T
-    return np.column_stack([load[:, 0], c * first + s * second, c * second - s * first])
 
 
 def _at(t: np.ndarray, grid: np.ndarray, columns: np.ndarray) -> np.ndarray:

@@ -24,11 +24,12 @@ from calibration.stages.stick_slip.forcing import (
     Tilting,
     Wrenches,
     planar_forcing,
+    plate_off,
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import Trials, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
-from calibration.stages.stick_slip.model import Direction, StickSlip
+from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.search import descended, displaced, tried
 from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, prior_by_tilt, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
@@ -41,7 +42,7 @@ SOURCES: tuple[Source, ...] = ("plate", "dynamics")
 _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _BETTER = 0.8  # mean square over another's, below which a prediction takes its place: the compliance's of an axis
-_WORTH, _LESS = 0.8, 0.1  # R2 of yaw; by which that of the plate may be less
+_LESS = 0.1  # by which R2 of the plate may be less
 _ELSEWHERE, _SHOWN = 0.009, 3.0  # [m] a wheel may seem off its place; chi-square of two degrees of freedom
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
@@ -64,9 +65,9 @@ def fit_stick_slip(
     description = sources.lab.description
     if len(description.wheels) < _LEAST_WHEELS:
         return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
-    tilting = Tilting(suspension.K, suspension.C)
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials)
+    tilting = Tilting(suspension.K, suspension.C, plate_off([one.wrenches for one in read]))
     by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
     prior = _prior(wheels, suspension)
     usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
@@ -117,28 +118,24 @@ def _rows(
 def _linear(direction: Direction, suspension: Suspension) -> Direction:
     """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off.
 
-    Trials that slipped too far to be predicted decide nothing: what one of them shows is chance. Where slip does not
-    explain yaw in the others either, wheels yield otherwise: they decide, and the compliance need not be better. Nor
-    along x and y where yaw is linear: no wheel slid then, in any trial.
+    With trials that slipped too far to be predicted and without: what one of them shows is chance, that one slipped is
+    not. Where slip does not explain yaw in the others either, wheels yield otherwise: then all trials decide, and the
+    compliance need not be better. Nor along x and y where yaw is linear: no wheel slid then, in any trial.
     """
-    held_out = dict(suspension.held_out)
+    slips, held_out = direction.held_out, dict(suspension.held_out)
     tried = held_out.get(direction.source, suspension.held_out[0][1])
     variance = tried.variance(np.ones(6, dtype=bool))
     plane, heave = variance[list(PLANE)], variance[list(HEAVE)]
     if direction.source not in held_out:
         return replace(direction, heave_variance=heave)
-    judged = direction.held_out.only(~direction.held_out.wild)
-    explained = judged.r2[2] >= _WORTH
-    if not explained:
-        judged = direction.held_out
-    elif len(tried.count) == len(direction.held_out.count):
-        tried = tried.only(~direction.held_out.wild)
-        plane = tried.variance(np.ones(6, dtype=bool))[list(PLANE)]
-    worth = _BETTER if explained else 1.0 / _BETTER
-    linear = tried.moves[list(PLANE)] & (plane < worth * judged.variance(direction.moved))
+    calm, moved = slips.only(~slips.wild), direction.moved
+    linear = tried.moves[list(PLANE)] & (plane < slips.variance(moved) / _BETTER)
+    if calm.r2[2] >= EXPLAINED:
+        same = len(tried.count) == len(slips.count)
+        still = tried.only(~slips.wild).variance(np.ones(6, dtype=bool))[list(PLANE)] if same else plane
+        linear &= (plane < _BETTER * slips.variance(moved)) & (still < _BETTER * calm.variance(moved))
     if linear[2]:
-        every = held_out[direction.source].moves[list(PLANE)]
-        linear |= every & (variance[list(PLANE)] < direction.held_out.variance(direction.moved) / _BETTER)
+        linear |= tried.moves[list(PLANE)] & (plane < slips.variance(moved) / _BETTER)
     return replace(direction, linear=linear, heave_variance=heave)
 
 
@@ -251,6 +248,6 @@ def _judged(direction: Direction) -> Verdict:
     still = [a for a, moves in zip(_AXES, direction.moved | direction.linear, strict=True) if not moves]
     if still:
         message += f"; not moved: {', '.join(still)}"
-    if r2[2] < _WORTH and not direction.linear[2]:
+    if r2[2] < EXPLAINED and not direction.linear[2]:
         message += "; check the wheels' declared places, the plate's axes and clock, and that nobody moved the base"
-    return Verdict(STAGE, "ok" if r2[2] >= _WORTH or direction.linear[2] else "warning", message)
+    return Verdict(STAGE, "ok" if r2[2] >= EXPLAINED or direction.linear[2] else "warning", message)

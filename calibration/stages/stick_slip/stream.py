@@ -17,7 +17,8 @@ from calibration.numerics.compiled import njit
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.band import banded
 from calibration.stages.stick_slip.forcing import STEP, UNMOVED
-from calibration.stages.stick_slip.kernel import COLUMNS, LANES, PLATE, STEPS, VELOCITY, Bases, advance, at_rest
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, PLATE, STEPS, VELOCITY, Bases, at_rest
+from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
@@ -53,6 +54,7 @@ class Fitted(NamedTuple):
         compliance: (3, 3) K_0^-1 of the optimum.
         moves: (3,) axes that are moved.
         linear: (3,) axes that the compliance moves, see `loaded_base`.
+        off: (2,) of the plate [m], see `Tilting`.
     """
 
     members: int
@@ -60,6 +62,7 @@ class Fitted(NamedTuple):
     compliance: np.ndarray
     moves: np.ndarray
     linear: np.ndarray
+    off: np.ndarray
 
 
 class SlipState(NamedTuple):
@@ -115,7 +118,7 @@ class SlipStream:
         driving = UNDRIVEN if sample.driving is None else sample.driving
         if before is None or sample.t <= before.start + REST:
             row = np.empty(COLUMNS)
-            sample_row(sample.wrench, sample.tilt, driving, _NO_REST, row)
+            sample_row(sample.wrench, sample.tilt, driving, _NO_REST, self.fitted.off, row)
             planar, row = np.concatenate([row[PLATE:], row[:3]]), row * _LOADS
             if before is None:
                 return self._first(sample.t, row, planar)
@@ -149,7 +152,8 @@ def slip_stream(model: StickSlip) -> SlipStream:
     wheels = np.array([model.wheels.rows(p) for p in parameters])
     bodies = np.array([body(p, found.corrected) for p in parameters])
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
-    fitted = Fitted(len(found.ensemble), len(bodies), compliance, found.slips, np.asarray(found.linear, dtype=bool))
+    linear, off = np.asarray(found.linear, dtype=bool), model.tilting.off
+    fitted = Fitted(len(found.ensemble), len(bodies), compliance, found.slips, linear, off)
     return SlipStream(found, model.wheels, wheels, bodies, fitted)
 
 
@@ -187,11 +191,14 @@ def advance_members(
 
 
 @njit(cache=True, error_model="numpy")
-def sample_row(wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: np.ndarray, row: np.ndarray) -> None:
+def sample_row(
+    wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: np.ndarray, off: np.ndarray, row: np.ndarray
+) -> None:
     """A sample as `advance` takes it (11,), less what rests (6,): the plate's (Fx, Fy, Mz), inverse dynamics'."""
     for a in range(3):
         row[a] = driving[a] - rest[3 + a]
-    row[3], row[4], row[5], row[6], row[7] = -wrench[2], wrench[4], -wrench[3], tilt[0], tilt[1]
+    row[3], row[4], row[5] = -wrench[2], wrench[4] + wrench[2] * off[0], -wrench[3] + wrench[2] * off[1]
+    row[6], row[7] = tilt[0], tilt[1]
     row[8], row[9], row[10] = wrench[0] - rest[0], wrench[1] - rest[1], wrench[5] - rest[2]
 
 
@@ -218,7 +225,7 @@ def step_members(
     """
     wrench, tilt, driving, rest, earlier, before = readings
     drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
-    sample_row(wrench, tilt, driving, rest, row)
+    sample_row(wrench, tilt, driving, rest, fitted.off, row)
     for s in range(STEPS):
         for c in range(COLUMNS):
             drive[s, c] = earlier[c] + (s + 1.0) / STEPS * (row[c] - earlier[c])

@@ -3,8 +3,9 @@
     k = (kx, ky) of a drive, (k, k) of a front or back caster       c of drives, of casters      mu of the three types
     N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i, y_i) = (-Fz, My, -Mx)        k_i 1 of a front caster
 
-A wheel carries its own weight n_i, of the nominal robot; the base's weight is shared as by vertical springs under a
-rigid base, and a wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors
+The base's weight is shared as by vertical springs under a rigid base. A wheel carries n_i of its own weight m_i g, of
+the nominal robot: it stands on a tyre in series with its spring, n_i = m_i g (1 - k / k_tyre), k of both; the rest goes
+to all wheels. A wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors
 are log-normal and wide, but for the shares of the load where the tilt shows them: nothing here is of one robot.
 """
 
@@ -13,12 +14,13 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin
+from scipy.constants import g as STANDARD_GRAVITY
 from scipy.optimize import least_squares
 
 from calibration.errors import ShapeError
 from calibration.numerics.compiled import njit
 from calibration.recording.schema import Wheel
-from calibration.stages.stick_slip.kernel import solved
+from calibration.stages.stick_slip.kernel.corrector import solved
 
 NAMES = (
     "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
@@ -27,7 +29,8 @@ NAMES = (
 )  # fmt: skip
 PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0])
 PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5])
-DRIVES = 0.16  # of the logarithm of the drives' friction: a drive slides for hundredths of a second, its mass left out
+DRIVES = 0.1  # of the logarithm of the drives' friction: a drive slides for hundredths of a second, seldom
+_OWN = 0.8  # 1 - k / k_tyre
 PRELOADS = 8  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 2))
@@ -128,13 +131,18 @@ class WheelSet:
         if not len(self.names) == len(self.types) == len(self.weight):
             raise ShapeError("weight", self.weight.shape, (len(self.names),))
 
+    @property
+    def mass(self) -> np.ndarray:
+        """(m,) of the wheels [kg]."""
+        return self.weight / STANDARD_GRAVITY
+
     def rows(self, p: SlipParameters) -> np.ndarray:
-        """(m, 10) x, y, kx, ky, c, mu, n, G as the kernel takes them."""
+        """(m, 11) x, y, kx, ky, c, mu, n, G, mass as the kernel takes them."""
         k = {"drive": (p.drive_kx, p.drive_ky), "front": (p.front_k, p.front_k), "back": (p.back_k, p.back_k)}
         mu = {"drive": p.drive_mu, "front": p.front_mu, "back": p.back_mu}
         c = [p.drive_c if kind == "drive" else p.caster_c for kind in self.types]
         n, G = self.loads(p.drive_load, p.back_load)
-        columns = self.position, [k[kind] for kind in self.types], c, [mu[kind] for kind in self.types], n, G
+        columns = self.position, [k[kind] for kind in self.types], c, [mu[kind] for kind in self.types], n, G, self.mass
         return np.ascontiguousarray(np.column_stack(columns))
 
     def loads(self, drive_load: float, back_load: float) -> tuple[np.ndarray, np.ndarray]:
@@ -142,7 +150,8 @@ class WheelSet:
         share = np.array([{"drive": drive_load, "front": 1.0, "back": back_load}[kind] for kind in self.types])
         A = np.column_stack([np.ones(len(share)), self.position])
         G = share[:, None] * (A @ np.linalg.pinv(A.T @ (share[:, None] * A)))
-        return self.weight - G @ (A.T @ self.weight), G
+        own = _OWN * self.weight
+        return own - G @ (A.T @ own), G
 
     def borne(self, wrench: np.ndarray) -> np.ndarray:
         """Wrenches (n, 6) on the floor [N, N.m, frame 0] as if wheels could pull, for those of wheels that lift off.
@@ -257,7 +266,7 @@ def preloads(wheels: WheelSet, p: SlipParameters, load: np.ndarray) -> np.ndarra
     is (-Fz, My, -Mx) at rest.
     """
     rows = wheels.rows(p)
-    N = np.maximum(rows[:, 6] + rows[:, 7:] @ load, 0.0)
+    N = np.maximum(rows[:, 6] + rows[:, 7:10] @ load, 0.0)
     limit = np.minimum(rows[:, 5] * N, PRELOAD)
     rng = np.random.Generator(np.random.PCG64(0))
     shape = PRELOADS, len(rows)

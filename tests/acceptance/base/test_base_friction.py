@@ -13,7 +13,8 @@ import pytest
 import calibration
 from calibration.stages.stick_slip import planar_forcing, wrenches_of
 from calibration.stages.stick_slip.forcing import STEP
-from calibration.stages.stick_slip.kernel import at_rest, simulated
+from calibration.stages.stick_slip.kernel.bases import at_rest
+from calibration.stages.stick_slip.kernel.integration import simulated
 from calibration.stages.stick_slip.likelihood import body
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.rest_frame import rest_of

@@ -20,6 +20,19 @@ def test_path_time_ramps_cruises_and_stops():
     np.testing.assert_allclose(speed[np.abs(t - 0.25) < 0.005], 0.5, atol=0.03)
 
 
+@pytest.mark.parametrize(("duration", "parts"), [(25.0, 4), (12.0, 2), (4.0, 1)])
+def test_a_halting_swing_stops_after_each_period_for_as_long(duration, parts):
+    t = np.linspace(0.0, duration, 2501)
+    moves = np.diff(motions.halting_time(t, duration, 0.12, 5.0)) > 1e-9
+    change = np.diff(np.concatenate([[False], moves, [False]]).astype(int))
+    starts, stops = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+    assert len(starts) == len(stops) == parts and starts[0] == 0 and abs(stops[-1] - 2500) <= 1
+    np.testing.assert_allclose(t[stops - 1] - t[starts], min(5.12, duration), atol=0.02)
+    rests = t[starts[1:]] - t[stops[:-1]]
+    np.testing.assert_allclose(rests, (duration - 5.12 * parts) / max(parts - 1, 1), atol=0.02)
+    assert motions.halting_time(t, duration, 0.12, 5.0)[-1] == pytest.approx(parts * min(5.0, duration - 0.12))
+
+
 def test_every_trial_starts_and_ends_with_a_second_of_rest_inside_the_limits(config, nominal):
     limits = np.array([nominal.joint(j).range for j in JOINTS])
     for motion in schedule(config.campaign, nominal, 3):

@@ -6,7 +6,8 @@ import numpy as np
 
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing
-from calibration.stages.stick_slip.kernel import advance
+from calibration.stages.stick_slip.kernel.bases import F
+from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks
 from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet
@@ -44,30 +45,39 @@ def about(x: np.ndarray, load: np.ndarray) -> np.ndarray:
 def literal(
     w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.ndarray | None = None, plate: bool = False
 ) -> Motion:
-    """The equations of `kernel` as its docstring has them, under w (n, 3); a plate reads the load, corrects nothing."""
+    """The equations of `integration` by its docstring, under w (n, 3); a plate reads the load, corrects nothing."""
     rows = WHEELS.rows(p)
-    x, v, e = np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
-    out = []
+    at = [np.array([[1.0, 0.0, -py], [0.0, 1.0, px]]) for px, py in WHEELS.position]
+    M = MASS - sum(m * A.T @ A for m, A in zip(WHEELS.mass, at, strict=True))
+    x, v, e, u, more, out = (
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros((len(rows), 2)),
+        np.zeros((len(rows), 2)),
+        np.zeros(3),
+        [],
+    )
     for k, force in enumerate(w):
-        F = np.array([p.body_c, p.body_c, p.body_cr]) * v
+        load, more = (about(x, WEIGHT) if plate else WEIGHT) + more, np.zeros(3)
+        assert np.all(rows[:, 6] + rows[:, 7:10] @ load > 0.0)
+        floor, on_base = np.array([p.body_c, p.body_c, p.body_cr]) * v, np.zeros(3)
         rx, ry = (0.0, 0.0) if tilt is None else tilt[k]
         slides = np.zeros(len(rows), dtype=bool)
-        for i, (px, py, kx, ky, c, mu, n, *G) in enumerate(rows):
-            A = np.array([[1.0, 0.0, -py], [0.0, 1.0, px]])
-            N, K = max(n + np.dot(G, about(x, WEIGHT) if plate else WEIGHT), 0.0), np.array([kx, ky])
-            q = N * np.array([-ry, rx])
-            new = e[i] + A @ v * h
-            f = K * new + c * (A @ v) + q
+        for i, (kx, ky, c, mu, n, *G, m) in enumerate(rows[:, 2:]):
+            N, K, q = n + np.dot(G, load), np.array([kx, ky]), np.array([-ry, rx])
+            f = K * (e[i] + at[i] @ v * h) + c * (at[i] @ v) + N * q + m / h * u[i]
+            faster = np.zeros(2)
             if np.linalg.norm(f) > mu * N:
-                f = f * mu * N / np.linalg.norm(f)
-                new = (f - q + c / h * e[i]) / (K + c / h)
-                slides[i] = True
-            e[i] = new
-            F += A.T @ f
+                left = f * (1.0 - mu * N / np.linalg.norm(f))
+                f, slides[i], faster = f - left, True, left / (m / h + c + K * h)
+            g = f + m * (faster - u[i]) / h
+            e[i] += (at[i] @ v - faster) * h
+            u[i] = faster
+            more[1:] += N * e[i]
+            floor, on_base = floor + at[i].T @ f, on_base + at[i].T @ (g - f)
         x = x + h * v
-        a = np.linalg.solve(MASS, force - F)
-        out.append((x, v, F, e.copy(), slides))
-        v = v + h * a
+        out.append((x, v, floor, e.copy(), slides))
+        v = v + h * np.linalg.solve(M, force - floor - on_base)
     return Motion(*(np.array(column) for column in zip(*out, strict=True)))
 
 
@@ -76,11 +86,11 @@ def slid(w: np.ndarray, p: SlipParameters = TRUTH) -> tuple[np.ndarray, np.ndarr
     (state,), (wheels,), (lanes,) = bases_of(WHEELS, p.logarithms[None], False)
     drive, inertia = np.zeros((len(w), 11)), np.zeros(15)
     drive[:, :3], drive[:, 3:6], inertia[:6] = w, WEIGHT, MASS[np.triu_indices(3)]
-    x, a = np.empty((len(w), 3)), np.empty((len(w), 3))
+    x, force = np.empty((len(w), 3)), np.empty((len(w), 3))
     for k in range(len(w)):
         advance(state, wheels, drive[k : k + 1], inertia, STEP, lanes)
-        x[k], a[k] = state[:3, 0], state[9:12, 0]
-    return x, w - a @ MASS
+        x[k], force[k] = state[:3, 0], state[F : F + 3, 0]
+    return x, force
 
 
 def push(rng: np.random.Generator, seconds: float = 8.0, size: float = 1.0) -> np.ndarray:

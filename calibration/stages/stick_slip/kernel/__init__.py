@@ -1,0 +1,7 @@
+"""A rigid base on wheels that stick, slip and lift off, integrated in compiled code.
+
+integration    `simulated`: some bases in trials one after the other; `advance`: one sample on
+bases          `Bases`: how they lie in memory; `at_rest`
+corrector      what a force plate corrects of their positions
+lifted         the load of wheels that are left on the floor
+"""

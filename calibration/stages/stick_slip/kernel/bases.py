@@ -1,0 +1,55 @@
+"""Bases side by side, as the kernel integrates them: LANES numbers to a row, rows one after the other."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+PLATE = 8  # first of the plate's columns of `drive`
+STEPS = 2  # of the integration to a sample
+COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
+LANES = 16  # bases side by side
+VECTOR = 4  # lanes that one instruction takes
+WHEEL, E, U, MASS = 15, 10, 12, 14  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), mass
+VELOCITY, ACCELERATION = 3, 9  # three rows each of a state
+X, V, DX, STICKS, P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels that stuck plus one, P
+D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, force, wheels that slide, which stick
+BODY = 30  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
+LEANS, PULL, W, ROWS = 34, 36, 37, 40  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
+
+
+class Bases(NamedTuple):
+    """k bases of m wheels, LANES to a group; the last ones of the last group repeat the last base.
+
+    Attributes:
+        state: (groups, ROWS, LANES), see above.
+        wheels: (groups, m, WHEEL, LANES).
+        lanes: (groups,) that count, a multiple of VECTOR.
+    """
+
+    state: np.ndarray
+    wheels: np.ndarray
+    lanes: np.ndarray
+
+    def deflection(self, i: int) -> np.ndarray:
+        """Of the wheels (m, 2) of a base [m]."""
+        return self.wheels[i // LANES, :, E:U, i % LANES]
+
+
+def at_rest(wheels: np.ndarray, bodies: np.ndarray, preload: np.ndarray | None = None) -> Bases:
+    """Bases at rest.
+
+    Args:
+        wheels: (k, m, 11) x, y, kx, ky, c, mu, n, G, mass.
+        bodies: (k, 4), see BODY.
+        preload: (k, m, 2) deflections [m]; None: none.
+    """
+    k, m = wheels.shape[:2]
+    groups = -(-k // LANES)
+    own = np.minimum(np.arange(groups * LANES), k - 1)
+    e = np.zeros((k, m, 2)) if preload is None else preload
+    each = np.concatenate([wheels[..., :E], e, np.zeros_like(e), wheels[..., E:]], axis=2)[own]
+    rows = each.reshape(groups, LANES, m, WHEEL).transpose(0, 2, 3, 1)
+    lanes = np.minimum(k - LANES * np.arange(groups), LANES)
+    state = np.zeros((groups, ROWS, LANES))
+    state[:, BODY:LEANS] = bodies[own].reshape(groups, LANES, 4).transpose(0, 2, 1)
+    return Bases(state, np.ascontiguousarray(rows), -(-lanes // VECTOR) * VECTOR)

@@ -1,0 +1,250 @@
+"""Integration of a rigid base that sticks and slips on its wheels, in the floor's plane.
+
+    M(t) dv/dt + sum_i A_i' g_i + B v = w(t),     dx/dt = v,     x = (x, y, yaw),   A_i = [1 0 -y_i; 0 1 x_i]
+    g_i = K_i e_i + C_i de_i/dt + N_i (-ry, rx),    m_i du_i/dt = g_i - f_i,   |f_i| <= mu_i N_i
+    e_i = A_i x - s_i,    ds_i/dt = u_i, 0 where it sticks          s_i, u_i how far and how fast wheel i has slid
+    N_i = n_i + G_i (-Fz, My, -Mx)                                  shares of the load about the wheels
+
+f_i is wheel i's action on the floor and g_i the base's on the wheel [N, frame 0]; M is of the robot without wheels. The
+bushings turn with the tilt (rx, ry), which brings a share of N_i into the floor's plane. A wheel whose force would
+exceed mu_i N_i slides: the force is cut to that length, and u_i is what that leaves, implicit in time. The rest is
+explicit, velocity first (symplectic Euler).
+
+A wheel bears where it touches the floor, e_i behind its place under the base, by the forces of the step before:
+
+    (My, -Mx) <- (My, -Mx) + sum_i N_i e_i
+
+and does not pull, see `lifted`. A force plate stands still: (My, -Mx) about the base is
+R(yaw)' ((My, -Mx)_0 + Fz (x, y)). Seven millimetres move 10 N from one drive to the other.
+
+With a force plate the position is corrected, see `corrector`. Some bases that differ in their parameters or preloads
+are integrated side by side under the same load, see `Bases`.
+Reference: Simo, Hughes, Computational Inelasticity, 1998, ch. 1 (return mapping).
+"""
+
+import numpy as np
+
+from calibration.numerics.compiled import njit
+from calibration.numerics.side_by_side import side_by_side
+from calibration.stages.stick_slip.kernel.bases import (
+    ACCELERATION,
+    BITS,
+    BODY,
+    DX,
+    LANES,
+    LEANS,
+    LOAD,
+    MASS,
+    PLATE,
+    PULL,
+    SLID,
+    STICKS,
+    WHEEL,
+    Bases,
+    D,
+    E,
+    F,
+    P,
+    U,
+    V,
+    W,
+    X,
+)
+from calibration.stages.stick_slip.kernel.corrector import cofactors, corrector
+from calibration.stages.stick_slip.kernel.lifted import lifted
+
+_NONE = 1e-30  # [N2]
+
+
+@njit(cache=True, error_model="numpy")
+def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
+    """d of a step in n lanes of a flat state, its last parts those of the load, and the base's dampers' force."""
+    z, my, mx = u[3], u[4], u[5]
+    z0, z1, z2, my0, my1, my2, mx0, mx1, mx2 = (
+        inertia[6], inertia[7], inertia[8], inertia[9], inertia[10], inertia[11], inertia[12], inertia[13], inertia[14]
+    )  # fmt: skip
+    for l in range(n):
+        a0, a1, a2 = s[ACCELERATION * LANES + l], s[(ACCELERATION + 1) * LANES + l], s[(ACCELERATION + 2) * LANES + l]
+        s[D * LANES + l] = h * s[V * LANES + l] + s[DX * LANES + l]
+        s[(D + 1) * LANES + l] = h * s[(V + 1) * LANES + l] + s[(DX + 1) * LANES + l]
+        s[(D + 2) * LANES + l] = h * s[(V + 2) * LANES + l] + s[(DX + 2) * LANES + l]
+        moved = 1.0 if s[(BODY + 2) * LANES + l] > 0.0 else 0.0
+        pitching = my + my0 * a0 + my1 * a1 + my2 * a2 - moved * z * s[X * LANES + l]
+        rolling = mx + mx0 * a0 + mx1 * a1 + mx2 * a2 - moved * z * s[(X + 1) * LANES + l]
+        yaw = moved * s[(X + 2) * LANES + l]
+        s[LOAD * LANES + l] = z + z0 * a0 + z1 * a1 + z2 * a2
+        s[(LOAD + 1) * LANES + l] = pitching + yaw * rolling + s[LEANS * LANES + l]
+        s[(LOAD + 2) * LANES + l] = rolling - yaw * pitching + s[(LEANS + 1) * LANES + l]
+        s[F * LANES + l] = s[BODY * LANES + l] * s[V * LANES + l]
+        s[(F + 1) * LANES + l] = s[BODY * LANES + l] * s[(V + 1) * LANES + l]
+        s[(F + 2) * LANES + l] = s[(BODY + 1) * LANES + l] * s[(V + 2) * LANES + l]
+        s[BITS * LANES + l] = 1.0
+        s[LEANS * LANES + l] = s[(LEANS + 1) * LANES + l] = 0.0
+        s[W * LANES + l] = s[(W + 1) * LANES + l] = s[(W + 2) * LANES + l] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float, n: int) -> None:
+    """Add the forces of wheels in n lanes of a flat state, and bit i where wheel i sticks; deflections follow."""
+    rows, rate = WHEEL * LANES, 1.0 / h
+    for i in range(len(wheels) // rows):
+        w, bit = wheels[i * rows : (i + 1) * rows], float(1 << i)
+        for l in range(n):
+            px, py, kx, ky = w[l], w[LANES + l], w[2 * LANES + l], w[3 * LANES + l]
+            c, before_x, before_y = w[4 * LANES + l], w[E * LANES + l], w[(E + 1) * LANES + l]
+            d3, d4, d5 = s[LOAD * LANES + l], s[(LOAD + 1) * LANES + l], s[(LOAD + 2) * LANES + l]
+            load = w[6 * LANES + l] + w[7 * LANES + l] * d3 + w[8 * LANES + l] * d4 + w[9 * LANES + l] * d5
+            N = max(load, 0.0)
+            turn, spin = s[(D + 2) * LANES + l], s[(V + 2) * LANES + l]
+            mass, ux, uy = w[MASS * LANES + l] * rate, w[U * LANES + l], w[(U + 1) * LANES + l]
+            ex, ey = before_x + s[D * LANES + l] - turn * py, before_y + s[(D + 1) * LANES + l] + turn * px
+            fx = kx * ex + c * (s[V * LANES + l] - spin * py) - N * ry + mass * ux
+            fy = ky * ey + c * (s[(V + 1) * LANES + l] + spin * px) + N * rx + mass * uy
+            square, limit = fx * fx + fy * fy, w[5 * LANES + l] * N
+            cut = min(limit / np.sqrt(square + _NONE), 1.0)
+            x, y = fx * (1.0 - cut) / (kx * h + c + mass), fy * (1.0 - cut) / (ky * h + c + mass)
+            w[U * LANES + l], w[(U + 1) * LANES + l] = x, y
+            fx, fy, gx, gy = fx * cut, fy * cut, mass * (x - ux), mass * (y - uy)
+            w[E * LANES + l], w[(E + 1) * LANES + l] = ex, ey = ex - h * x, ey - h * y
+            s[LEANS * LANES + l] += N * ex
+            s[(LEANS + 1) * LANES + l] += N * ey
+            s[PULL * LANES + l] += min(load, 0.0)
+            s[W * LANES + l] += gx
+            s[(W + 1) * LANES + l] += gy
+            s[(W + 2) * LANES + l] += px * gy - py * gx
+            s[F * LANES + l] += fx
+            s[(F + 1) * LANES + l] += fy
+            s[(F + 2) * LANES + l] += px * fy - py * fx
+            s[SLID * LANES + l] += 1.0 if cut < 1.0 else 0.0
+            s[BITS * LANES + l] += 0.0 if cut < 1.0 else bit
+
+
+@njit(cache=True, error_model="numpy")
+def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int) -> None:
+    """The correction of the next step, by P and the plate's force."""
+    for l in range(n):
+        gain = s[(BODY + 2) * LANES + l] * h
+        r0 = gain * (fx - s[F * LANES + l])
+        r1 = gain * (fy - s[(F + 1) * LANES + l])
+        r2 = gain * (mz - s[(F + 2) * LANES + l])
+        p0, p1, p2 = s[P * LANES + l], s[(P + 1) * LANES + l], s[(P + 2) * LANES + l]
+        p3, p4, p5 = s[(P + 3) * LANES + l], s[(P + 4) * LANES + l], s[(P + 5) * LANES + l]
+        s[DX * LANES + l] = p0 * r0 + p1 * r1 + p2 * r2
+        s[(DX + 1) * LANES + l] = p1 * r0 + p3 * r1 + p4 * r2
+        s[(DX + 2) * LANES + l] = p2 * r0 + p4 * r1 + p5 * r2
+
+
+@njit(cache=True, error_model="numpy")
+def _ended(s: np.ndarray, u: np.ndarray, M: np.ndarray, h: float, n: int) -> None:
+    """Accelerations by what the force leaves of the drive, positions and velocities a step on; M without wheels."""
+    c00, c01, c02, c11, c12, c22, i = cofactors(M)
+    wx, wy, wz = u[0], u[1], u[2]
+    for l in range(n):
+        b0 = wx - s[F * LANES + l] - s[W * LANES + l]
+        b1 = wy - s[(F + 1) * LANES + l] - s[(W + 1) * LANES + l]
+        b2 = wz - s[(F + 2) * LANES + l] - s[(W + 2) * LANES + l]
+        a0 = (c00 * b0 + c01 * b1 + c02 * b2) * i
+        a1 = (c01 * b0 + c11 * b1 + c12 * b2) * i
+        a2 = (c02 * b0 + c12 * b1 + c22 * b2) * i
+        s[ACCELERATION * LANES + l], s[(ACCELERATION + 1) * LANES + l], s[(ACCELERATION + 2) * LANES + l] = a0, a1, a2
+        s[X * LANES + l] += s[D * LANES + l]
+        s[(X + 1) * LANES + l] += s[(D + 1) * LANES + l]
+        s[(X + 2) * LANES + l] += s[(D + 2) * LANES + l]
+        s[V * LANES + l] += h * a0
+        s[(V + 1) * LANES + l] += h * a1
+        s[(V + 2) * LANES + l] += h * a2
+
+
+@njit(cache=True, error_model="numpy")
+def _without(wheels: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """M (6,) of the robot without its wheels, the first lane's of flat wheels."""
+    M = inertia[:6].copy()
+    for i in range(len(wheels) // (WHEEL * LANES)):
+        w = wheels[i * WHEEL * LANES :]
+        px, py, mass = w[0], w[LANES], w[MASS * LANES]
+        M[0] -= mass
+        M[2] += mass * py
+        M[3] -= mass
+        M[4] -= mass * px
+        M[5] -= mass * (px * px + py * py)
+    return M
+
+
+@njit(cache=True, error_model="numpy")
+def _advance(s: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
+    """`advance` with all arrays of the bases flat."""
+    M = _without(wheels, inertia)
+    for l in range(LANES):
+        s[SLID * LANES + l] = 0.0
+    for k in range(len(drive)):
+        u = drive[k]
+        _begun(s, u, inertia, h, n)
+        for l in range(n):
+            if s[PULL * LANES + l] < 0.0:
+                lifted(wheels, s, l)
+            s[PULL * LANES + l] = 0.0
+        _on_wheels(wheels, s, u[6], u[7], h, n)
+        if s[(BODY + 2) * LANES] > 0.0:
+            for l in range(n):
+                if s[STICKS * LANES + l] != s[BITS * LANES + l]:
+                    s[STICKS * LANES + l] = s[BITS * LANES + l]
+                    corrector(wheels, l, s[(BODY + 3) * LANES + l], s)
+            _corrected(s, u[PLATE], u[PLATE + 1], u[PLATE + 2], h, n)
+        _ended(s, u, M, h, n)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
+    """One sample on, the first n lanes of a group: states and deflections are changed.
+
+    Args:
+        state: (ROWS, LANES); wheels that slid are counted in row SLID.
+        wheels: (m, WHEEL, LANES).
+        drive: (k, 11) at k steps of h [s]: w, (-Fz, My, -Mx), (rx, ry), plate's force.
+        inertia: (15,) M's six elements (row by row, upper) and what an acceleration adds to (-Fz, My, -Mx), (3, 3).
+        h: [s].
+        n: A multiple of VECTOR.
+    """
+    _advance(state.reshape(-1), wheels.reshape(-1), drive, inertia, h, n)
+
+
+def simulated(
+    starts: np.ndarray, drive: np.ndarray, inertia: np.ndarray, bases: Bases, h: float, k: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (k, n, 3) [m, rad] and shares of wheels that slid (k, n) of k bases in trials one after the other.
+
+    Args:
+        starts: Sample at which each trial starts, and n.
+        drive: (n steps, 11).
+        inertia: (n, 15).
+        bases: At rest: so each trial starts.
+        h: Length of a step [s].
+        k: How many of them.
+    """
+    x, share = np.empty((k, len(inertia), 3)), np.empty((k, len(inertia)))
+    side_by_side(lambda a, b: _simulated(x, share, a, b, drive, inertia, bases, h), starts[:-1], starts[1:])
+    return x, share
+
+
+@njit(cache=True, error_model="numpy")
+def _simulated(  # noqa: PLR0913
+    x: np.ndarray,
+    share: np.ndarray,
+    a: int,
+    b: int,
+    drive: np.ndarray,
+    inertia: np.ndarray,
+    bases: Bases,
+    h: float,
+) -> None:
+    """Samples a to b, one trial, of `simulated`'s x and share."""
+    k, m, steps = len(x), bases.wheels.shape[1], len(drive) // len(inertia)
+    for g in range(len(bases.lanes)):
+        lanes = bases.lanes[g]
+        state, wheels = bases.state[g].copy().reshape(-1), bases.wheels[g].copy().reshape(-1)
+        for t in range(a, b):
+            _advance(state, wheels, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)
+            for l in range(min(lanes, k - LANES * g)):
+                share[LANES * g + l, t] = state[SLID * LANES + l] / (m * steps)
+                for i in range(3):
+                    x[LANES * g + l, t, i] = state[(X + i) * LANES + l]

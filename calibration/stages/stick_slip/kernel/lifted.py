@@ -1,0 +1,61 @@
+"""Load of a base of which wheels are off the floor, as if these could pull: then the others bear what they do bear.
+
+    N_i = n_i + G_i (p + c),   a_i = (1, x_i, y_i),   c = sum_(N_i < 0) N_i a_i        sum_(N_i > 0) N_i a_i = p
+
+p is (-Fz, My, -Mx). With J the wheels off the floor, A c = b of A = 1 - sum_J a_i G_i and b = sum_J a_i (n_i + G_i p);
+J is found by trying. Where fewer than three wheels are left, the base tips over, and p stays as it is.
+"""
+
+import numpy as np
+
+from calibration.numerics.compiled import njit
+from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, WHEEL
+
+_LEGS = 3
+
+
+@njit(cache=True, error_model="numpy")
+def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, error_model="numpy")
+def _solution(A: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
+    """Of A x = b by Cramer's rule, A (3, 3) by its columns."""
+    for k in range(3):
+        x, y, z = _cross(A[(k + 1) % 3], A[(k + 2) % 3])
+        out[k] = (b[0] * x + b[1] * y + b[2] * z) / (A[k, 0] * x + A[k, 1] * y + A[k, 2] * z)
+
+
+@njit(cache=True, error_model="numpy")
+def _taken_off(w: np.ndarray, own: float, A: np.ndarray, b: np.ndarray) -> None:
+    """Add a_i G_i of a wheel off the floor to A, and a_i times its own load to b."""
+    for j in range(3):
+        a = w[j - 1] if j > 0 else 1.0
+        b[j] += a * own
+        for k in range(3):
+            A[k, j] -= w[7 + k] * a
+
+
+@njit(cache=True, error_model="numpy")
+def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
+    """Add c to the load of a lane of a flat state, by its flat wheels."""
+    m, at, legs = len(wheels) // (WHEEL * LANES), LOAD * LANES + lane, 0
+    off, A, b, c = np.zeros(m, np.bool_), np.empty((3, 3)), np.empty(3), np.zeros(3)
+    p = s[at : at + 3 * LANES : LANES].copy()
+    for _ in range(m):
+        same, legs, A[:], b[:] = True, m, np.eye(3), 0.0
+        for i in range(m):
+            w = wheels[i * WHEEL * LANES + lane : (i + 1) * WHEEL * LANES : LANES]
+            own = w[6] + w[7] * p[0] + w[8] * p[1] + w[9] * p[2]
+            pulls = own + w[7] * c[0] + w[8] * c[1] + w[9] * c[2] < 0.0
+            same, off[i] = same and off[i] == pulls, pulls
+            if pulls:
+                legs -= 1
+                _taken_off(w, own, A, b)
+        if same or legs < _LEGS:
+            break
+        _solution(A, b, c)
+    if legs >= _LEGS:
+        for k in range(3):
+            s[at + k * LANES] += c[k]
