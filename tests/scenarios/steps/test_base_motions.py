@@ -82,6 +82,5 @@ def test_a_robot_that_plays_them_has_its_springs_identified_to_a_tenth(off, clai
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="the model of a wheel errs by more than either leaves uncertain: docs/limits.md", strict=True)
 def test_a_robot_that_plays_them_has_its_springs_identified_better(off):
     assert of_springs(off["base motions"]) < 0.5 * of_springs(off["swings"])
