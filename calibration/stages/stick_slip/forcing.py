@@ -34,7 +34,7 @@ CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-PLACED, WEIGHED = 5e-3, 2e-3  # [m] a plate under a base, the centre of mass of a nominal robot: sigmas
+_PLACED, _WEIGHED = 5e-3, 2e-3  # [m] a plate under a base, the centre of mass of a nominal robot: sigmas
 _INERTIA_STRIDE = 5  # samples from one composite inertia to the next
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
 
@@ -165,7 +165,7 @@ def plate_off(wrenches: Sequence[Wrenches]) -> np.ndarray:
                 for load in (one.plate, one.dynamics)
             )
             found.append((plate - dynamics)[1:] / plate[0])
-    share = PLACED**2 / (PLACED**2 + WEIGHED**2)
+    share = _PLACED**2 / (_PLACED**2 + _WEIGHED**2)
     return share * np.median(found, axis=0) if found else np.zeros(2)
 
 

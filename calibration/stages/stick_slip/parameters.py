@@ -4,8 +4,9 @@
     slip.body_c [N.s/m], slip.body_cr [N.m.s/rad], slip.{drive_load,back_load} [-]
 
 Wheels of one type share a value. Logarithms are normal: sigma = value * sigma_log, to first order. What the model
-leaves out of a real wheel is not in the data's scatter: MODEL is added to each logarithm. Drives seem 4 % softer, back
-casters and frictions up to 7 % less than they are, as readings of motors are taken for the angles of links.
+leaves out of a real wheel is not in the data's scatter: MODEL is added to each logarithm. On the default
+robot drives seem 4 % softer, back casters and most frictions up to 7 % less than they are; half of it and more is that
+readings of motors are taken for the angles of links.
 
 A value is `estimated` where its logarithm is known to 0.3 and twice as well as before, and wheels are what moves the
 base; a friction that no trial reaches is not. Damping is not either: with a plate the rate of correction takes its
