@@ -49,14 +49,8 @@ def literal(
     rows = WHEELS.rows(p)
     at = [np.array([[1.0, 0.0, -py], [0.0, 1.0, px]]) for px, py in WHEELS.position]
     M = MASS - sum(m * A.T @ A for m, A in zip(WHEELS.mass, at, strict=True))
-    x, v, e, u, more, out = (
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros((len(rows), 2)),
-        np.zeros((len(rows), 2)),
-        np.zeros(3),
-        [],
-    )
+    x, v, more, e, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((len(rows), 2)), np.zeros((len(rows), 2))
+    out = []
     for k, force in enumerate(w):
         load, more = (about(x, WEIGHT) if plate else WEIGHT) + more, np.zeros(3)
         assert np.all(rows[:, 6] + rows[:, 7:10] @ load > 0.0)
