@@ -26,6 +26,7 @@ from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, planar_forcing, wrenches_along
 from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, LANES, STEPS, Bases
+from calibration.stages.stick_slip.kernel.lifted import bear
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.stream import (
     UNDRIVEN,
@@ -36,7 +37,6 @@ from calibration.stages.stick_slip.stream import (
     slip_stream,
     step_members,
 )
-from calibration.stages.stick_slip.wheels import bear
 from calibration.stages.suspension.floor_wrench import root_in_base
 from calibration.stages.suspension.modal_response import advance_modes
 from calibration.stages.suspension.model import Source
@@ -52,7 +52,7 @@ class Place(NamedTuple):
 
     Attributes:
         action: (6, 6) of wrenches in the lab on those in frame 0.
-        standing: (m, 3) as `bear` takes it.
+        standing: (m, 10) as `bear` takes it.
         a: (6, k), b: (k, 6) and tau: (k,) of `Modes`.
         T_lab_0: (4, 4) frame 0.
         T_0_lab: (4, 4) its inverse.

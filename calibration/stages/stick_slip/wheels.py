@@ -18,9 +18,8 @@ from scipy.constants import g as STANDARD_GRAVITY
 from scipy.optimize import least_squares
 
 from calibration.errors import ShapeError
-from calibration.numerics.compiled import njit
 from calibration.recording.schema import Wheel
-from calibration.stages.stick_slip.kernel.corrector import solved
+from calibration.stages.stick_slip.kernel.lifted import bear
 
 NAMES = (
     "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
@@ -38,7 +37,6 @@ _KNOWN = np.array([0.3, 0.03, 0.05, 0.04])  # sigmas of the elements: heave hard
 _MODEL = 0.05  # of a logarithm: loads are shared by more than springs
 _TYPES = ("drive", "front", "back")
 _LOADS = [NAMES.index("drive_load"), NAMES.index("back_load")]
-_LEGS = 3  # wheels that a base stands on
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
 
 
@@ -165,8 +163,9 @@ class WheelSet:
 
     @cached_property
     def standing(self) -> np.ndarray:
-        """(m, 3) x, y and n of wheels that share the load alike."""
-        return np.column_stack([self.position, self.loads(1.0, 1.0)[0]])
+        """(m, 10) x, y, four zeros, n and G of wheels that share the load alike."""
+        n, G = self.loads(1.0, 1.0)
+        return np.ascontiguousarray(np.column_stack([self.position, np.zeros((len(n), 4)), n, G]))
 
     def stiffness(self, p: SlipParameters) -> np.ndarray:
         """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""
@@ -175,35 +174,6 @@ class WheelSet:
             A = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])
             K += A.T @ np.diag([kx, ky]) @ A
         return K
-
-
-@njit(cache=True, error_model="numpy")
-def bear(standing: np.ndarray, wrench: np.ndarray) -> None:
-    """`WheelSet.borne` of wrenches (n, 6), which are changed: N_i = n_i + c (1, x_i, y_i) of wheels in contact."""
-    m, a, on = len(standing), np.empty(6), np.empty(len(standing), np.bool_)
-    for w in wrench:
-        on[:] = True
-        for step in range(m + 1):  # noqa: B007  its last value is read
-            a[:] = 0.0
-            b0, b1, b2, same, legs = -w[2], w[4], -w[3], True, 0
-            for i in range(m):
-                if on[i]:
-                    x, y, n = standing[i, 0], standing[i, 1], standing[i, 2]
-                    a[0], a[1], a[2] = a[0] + 1.0, a[1] + x, a[2] + y
-                    a[3], a[4], a[5] = a[3] + x * x, a[4] + x * y, a[5] + y * y
-                    b0, b1, b2 = b0 - n, b1 - n * x, b2 - n * y
-            c0, c1, c2 = solved(a, b0, b1, b2)
-            for i in range(m):
-                touches = standing[i, 2] + c0 + c1 * standing[i, 0] + c2 * standing[i, 1] > 0.0
-                same, legs, on[i] = same and touches == on[i], legs + touches, touches
-            if same or legs < _LEGS:
-                break
-        if step > 0:
-            w[2:5] = 0.0
-            for i in range(m):
-                x, y = standing[i, 0], standing[i, 1]
-                share = c0 + c1 * x + c2 * y
-                w[2], w[3], w[4] = w[2] - share, w[3] - share * y, w[4] + share * x
 
 
 def prior_by_tilt(wheels: WheelSet, K: np.ndarray) -> Prior:

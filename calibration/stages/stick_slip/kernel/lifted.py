@@ -38,15 +38,14 @@ def _taken_off(w: np.ndarray, own: float, A: np.ndarray, b: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
-    """Add c to the load of a lane of a flat state, by its flat wheels."""
-    m, at, legs = len(wheels) // (WHEEL * LANES), LOAD * LANES + lane, 0
+def pulled(rows: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """c (3,) of a load p (3,), by rows (m, 10 or more) of wheels as `at_rest` takes them."""
+    m, legs = len(rows), 0
     off, A, b, c = np.zeros(m, np.bool_), np.empty((3, 3)), np.empty(3), np.zeros(3)
-    p = s[at : at + 3 * LANES : LANES].copy()
     for _ in range(m):
         same, legs, A[:], b[:] = True, m, np.eye(3), 0.0
         for i in range(m):
-            w = wheels[i * WHEEL * LANES + lane : (i + 1) * WHEEL * LANES : LANES]
+            w = rows[i]
             own = w[6] + w[7] * p[0] + w[8] * p[1] + w[9] * p[2]
             pulls = own + w[7] * c[0] + w[8] * c[1] + w[9] * c[2] < 0.0
             same, off[i] = same and off[i] == pulls, pulls
@@ -56,6 +55,22 @@ def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
         if same or legs < _LEGS:
             break
         _solution(A, b, c)
-    if legs >= _LEGS:
-        for k in range(3):
-            s[at + k * LANES] += c[k]
+    return c if legs >= _LEGS else np.zeros(3)
+
+
+@njit(cache=True, error_model="numpy")
+def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
+    """Add c to the load of a lane of a flat state, by its flat wheels."""
+    at = LOAD * LANES + lane
+    rows = wheels.reshape(-1, WHEEL, LANES)[:, :, lane].copy()
+    c = pulled(rows, s[at : at + 3 * LANES : LANES].copy())
+    for k in range(3):
+        s[at + k * LANES] += c[k]
+
+
+@njit(cache=True, error_model="numpy")
+def bear(standing: np.ndarray, wrench: np.ndarray) -> None:
+    """Add c to (-Fz, My, -Mx) of wrenches (n, 6), by rows (m, 10) of wheels."""
+    for w in wrench:
+        c = pulled(standing, np.array([-w[2], w[4], -w[3]]))
+        w[2], w[3], w[4] = w[2] - c[0], w[3] - c[2], w[4] + c[1]
