@@ -14,7 +14,6 @@ Where the base's markers are in a trial, predicted: its first second and a wrenc
 T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     x from the plate's wrench or from inverse dynamics along q_motor
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -28,6 +27,7 @@ from calibration.numerics.signals import CUTOFF, interpolate_columns
 from calibration.numerics.wrench import in_frame
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import REST, Trial
+from calibration.stages.stick_slip.kernel.lifted import borne
 from calibration.stages.stick_slip.stream import SlipState
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, floor_load
@@ -94,13 +94,13 @@ class LoadedBase:
         t: float,
         wrench: np.ndarray,
         before: "BaseState | None",
-        borne: Callable[[np.ndarray], np.ndarray] | None = None,
+        standing: np.ndarray | None = None,
     ) -> "BaseState":
-        """The same as the springs alone have it; `moved` is left as it was. `borne` as `WheelSet` has it."""
+        """The same as the springs alone have it; `moved` is left as it was. `standing` as `bear` takes it."""
         if wrench.shape != (6,):
             raise ShapeError("wrench", wrench.shape, (6,))
         w = self.action @ wrench
-        w = w if borne is None else borne(w[None])[0]
+        w = w if standing is None else borne(standing, w[None])[0]
         if before is None:
             none = np.zeros(len(self.suspension.modes.tau), dtype=complex)
             return BaseState(t, t, w, w, 1, none, none, np.zeros(6), np.eye(4)[None], _STILL)

@@ -127,14 +127,12 @@ class SlippingBase:
         `moving` are motor readings, velocities and accelerations [rad, m, s].
         """
         if before is None or before.slip is None or t <= before.start + REST:
-            state = at.sprung(t, wrench, before, self.model.wheels.borne)
+            state = at.sprung(t, wrench, before, self.model.standing)
             driving = None if moving is None else self._driven(at.gravity, moving)
             slip = None if before is None else before.slip
             return state._replace(slip=self._stream.stepped(Sample(t, at.action @ wrench, state.x[3:5], driving), slip))
         slip, modes, stream = before.slip, at.suspension.modes, self._stream
-        place = Place(
-            at.action, self.model.wheels.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity
-        )
+        place = Place(at.action, self.model.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity)
         earlier = Earlier(
             before.rest, before.y, before.u, before.x[2:5], before.lags, slip.rest, slip.before, slip.found, slip.band
         )

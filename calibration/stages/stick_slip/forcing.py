@@ -11,7 +11,6 @@ force. Where there are no joint readings the base has no inertia: then the plate
 correction.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,9 +23,11 @@ from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
 from calibration.robot.wrist_sensor import hand_push
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS
+from calibration.stages.stick_slip.kernel.lifted import borne
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load, root_in_base
+from calibration.stages.suspension.lifting_response import predicted_lifting
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source
 
@@ -34,7 +35,6 @@ CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-_PLACED, _WEIGHED = 5e-3, 2e-3  # [m] a plate under a base, the centre of mass of a nominal robot: sigmas
 _INERTIA_STRIDE = 5  # samples from one composite inertia to the next
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
 
@@ -82,12 +82,18 @@ class Tilting:
     Attributes:
         K: (6, 6) stiffness [N/m, N.m/rad].
         C: (6, 6) damping.
-        off: (2,) how far the plate seems from its declared place under the base [m], see `plate_off`.
+        off: (2,) how far the plate seems from its declared place under the base [m], see `plate_place`.
+        shares: (2,) of the load that drives and back casters bear, relative to front casters [-].
     """
 
     K: np.ndarray
     C: np.ndarray
     off: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    shares: np.ndarray = field(default_factory=lambda: np.ones(2))
+
+    def standing(self, wheels: WheelSet, source: Source) -> np.ndarray:
+        """Rows (m, 10) of wheels, see `WheelSet.standing`, as the source's wrench counts their places."""
+        return wheels.standing(self.shares, self.off if source == "plate" else np.zeros(2))
 
 
 @dataclass(frozen=True)
@@ -152,23 +158,6 @@ def vertical(wrench: np.ndarray) -> np.ndarray:
     return np.asarray(wrench[:, (2, 4, 3)] * (-1.0, 1.0, -1.0))
 
 
-def plate_off(wrenches: Sequence[Wrenches]) -> np.ndarray:
-    """How far (2,) [m] the plate seems from its declared place under the base, 0 without joint readings.
-
-    By what it and inverse dynamics have for (My, -Mx) at rest, each as far as it is known.
-    """
-    found = []
-    for one in wrenches:
-        if one.plate is not None and one.dynamics is not None:
-            plate, dynamics = (
-                vertical(load.signal.x[load.signal.t <= one.start + REST]).mean(axis=0)
-                for load in (one.plate, one.dynamics)
-            )
-            found.append((plate - dynamics)[1:] / plate[0])
-    share = _PLACED**2 / (_PLACED**2 + _WEIGHED**2)
-    return share * np.median(found, axis=0) if found else np.zeros(2)
-
-
 def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> PlanarForcing:
     """The forcing by the plate with inverse dynamics, or by inverse dynamics alone.
 
@@ -179,15 +168,14 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     if main is None:
         what = "force plate" if source == "plate" else "encoder readings"
         raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")
-    lower = forcing_of(_sprung(wrenches.wheels, main), wrenches.start)
-    first, last = lower.t[0], lower.t[-1]
+    grid, compliant = _compliant(wrenches, tilting, source, main)
+    first, last = grid[0], grid[-1]
     if dynamics is not None:
         first, last = max(first, dynamics.signal.t[0]), min(last, dynamics.signal.t[-1])
     n = int((last - first) * RATE + 1e-6)
     t, fine = first + np.arange(n) / RATE, first + np.arange(n * STEPS) * STEP
     rest = fine <= wrenches.start + REST
-    compliant = predicted(tilting.K, tilting.C, lower)
-    heave, linear = (CubicSpline(lower.t, compliant[:, axes]) for axes in (HEAVE, PLANE))
+    heave, linear = (CubicSpline(grid, compliant[:, axes]) for axes in (HEAVE, PLANE))
     tilt, load, rows, drive = heave(fine), _at(main.signal, fine), np.zeros((n, 15)), np.zeros((len(fine), COLUMNS))
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
@@ -210,9 +198,18 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[::STEPS], early, linear(t))
 
 
-def _sprung(wheels: WheelSet, load: Load) -> Load:
-    """The load as the springs of wheels on the floor have it, see `WheelSet.borne`."""
-    return replace(load, signal=replace(load.signal, x=wheels.borne(load.signal.x)))
+def _compliant(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) -> tuple[np.ndarray, np.ndarray]:
+    """Times (k,) [s, mocap clock] and displacements (k, 6) by the compliance of a base whose wheels may lift off.
+
+    A plate's wrench is what the wheels bear; that of inverse dynamics less what the base's inertia takes.
+    """
+    standing = tilting.standing(wrenches.wheels, source)
+    if source == "plate":
+        load = replace(load, signal=replace(load.signal, x=borne(standing, load.signal.x)))
+        forcing = forcing_of(load, wrenches.start)
+        return forcing.t, predicted(tilting.K, tilting.C, forcing)
+    forcing = forcing_of(load, wrenches.start)
+    return forcing.t, predicted_lifting(tilting.K, tilting.C, forcing, standing)
 
 
 def _at(signal: Signal, t: np.ndarray) -> np.ndarray:

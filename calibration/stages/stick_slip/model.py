@@ -1,6 +1,7 @@
 """The stick-slip base as a model of prediction: a wrench in, the base's motion and its band out."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -105,6 +106,11 @@ class StickSlip:
     wheels: WheelSet
     tilting: Tilting
     directions: tuple[Direction, ...]
+
+    @cached_property
+    def standing(self) -> np.ndarray:
+        """Rows (m, 10) of the wheels as a plate's wrench finds them, see `Tilting.standing`."""
+        return self.tilting.standing(self.wheels, "plate")
 
     def direction(self, source: Source) -> Direction:
         """What was fitted from a source.

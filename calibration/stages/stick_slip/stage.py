@@ -24,12 +24,12 @@ from calibration.stages.stick_slip.forcing import (
     Tilting,
     Wrenches,
     planar_forcing,
-    plate_off,
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import Trials, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
+from calibration.stages.stick_slip.plate_place import plate_place
 from calibration.stages.stick_slip.search import descended, displaced, tried
 from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, prior_by_tilt, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
@@ -67,9 +67,10 @@ def fit_stick_slip(
         return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials)
-    tilting = Tilting(suspension.K, suspension.C, plate_off([one.wrenches for one in read]))
-    by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
     prior = _prior(wheels, suspension)
+    off = plate_place(sources, [one.trial for one in read], [one.wrenches for one in read])
+    tilting = Tilting(suspension.K, suspension.C, off, prior.shares)
+    by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
     usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
     if not usable:
         message = "no stick-slip base: it takes two trials that show the base and its wrench"

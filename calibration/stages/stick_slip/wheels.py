@@ -9,7 +9,7 @@ to all wheels. A wheel that would pull is off the floor. Casters are front or ba
 are log-normal and wide, but for the shares of the load where the tilt shows them: nothing here is of one robot.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -19,7 +19,6 @@ from scipy.optimize import least_squares
 
 from calibration.errors import ShapeError
 from calibration.recording.schema import Wheel
-from calibration.stages.stick_slip.kernel.lifted import bear
 
 NAMES = (
     "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
@@ -37,6 +36,7 @@ _KNOWN = np.array([0.3, 0.03, 0.05, 0.04])  # sigmas of the elements: heave hard
 _MODEL = 0.05  # of a logarithm: loads are shared by more than springs
 _TYPES = ("drive", "front", "back")
 _LOADS = [NAMES.index("drive_load"), NAMES.index("back_load")]
+_ALIKE, _IN_PLACE = np.ones(2), np.zeros(2)
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
 
 
@@ -54,6 +54,11 @@ class Prior:
     def bounded(self, logarithms: np.ndarray) -> np.ndarray:
         """Logarithms (..., 13) within three sigmas."""
         return np.clip(logarithms, self.mean - 3.0 * self.sigma, self.mean + 3.0 * self.sigma)
+
+    @property
+    def shares(self) -> np.ndarray:
+        """(2,) of the load that drives and back casters bear, relative to front casters [-]."""
+        return np.asarray(np.exp(self.mean[_LOADS]))
 
     @cached_property
     def information(self) -> np.ndarray:
@@ -151,21 +156,16 @@ class WheelSet:
         own = _OWN * self.weight
         return own - G @ (A.T @ own), G
 
-    def borne(self, wrench: np.ndarray) -> np.ndarray:
-        """Wrenches (n, 6) on the floor [N, N.m, frame 0] as if wheels could pull, for those of wheels that lift off.
+    def standing(self, shares: np.ndarray = _ALIKE, off: np.ndarray = _IN_PLACE) -> np.ndarray:
+        """(m, 10) x, y, four zeros, n and G, of wheels that share the load as springs alone do.
 
-        With -Fz, My, -Mx so that sum_i max(N_i, 0) (1, x_i, y_i) is what they were: N_i of all that stay on the floor
-        and, the springs being linear, heave and tilt are those of the wheels in contact.
+        Args:
+            shares: (2,) of drives and back casters, relative to front casters [-].
+            off: (2,) how far the place seems from which moments count [m].
         """
-        found = np.array(wrench, dtype=float, order="C")
-        bear(self.standing, found)
-        return found
-
-    @cached_property
-    def standing(self) -> np.ndarray:
-        """(m, 10) x, y, four zeros, n and G of wheels that share the load alike."""
-        n, G = self.loads(1.0, 1.0)
-        return np.ascontiguousarray(np.column_stack([self.position, np.zeros((len(n), 4)), n, G]))
+        placed = replace(self, position=self.position + off)
+        n, G = placed.loads(*shares)
+        return np.ascontiguousarray(np.column_stack([placed.position, np.zeros((len(n), 4)), n, G]))
 
     def stiffness(self, p: SlipParameters) -> np.ndarray:
         """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""

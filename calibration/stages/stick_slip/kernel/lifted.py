@@ -68,6 +68,16 @@ def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
         s[at + k * LANES] += c[k]
 
 
+def borne(standing: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """Wrenches (n, 6) on the floor [N, N.m, frame 0] as if wheels, rows (m, 10), could pull.
+
+    The springs being linear, heave and tilt are those of the wheels in contact.
+    """
+    found = np.array(wrench, dtype=float, order="C")
+    bear(standing, found)
+    return found
+
+
 @njit(cache=True, error_model="numpy")
 def bear(standing: np.ndarray, wrench: np.ndarray) -> None:
     """Add c to (-Fz, My, -Mx) of wrenches (n, 6), by rows (m, 10) of wheels."""

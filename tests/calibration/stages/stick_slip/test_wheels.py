@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import mjcf
+from calibration.stages.stick_slip.kernel.lifted import borne
 from calibration.stages.stick_slip.wheels import (
     NAMES,
     PRIOR,
@@ -64,12 +65,23 @@ def test_wheels_that_would_pull_lift_off_and_the_others_bear_the_load():
     light, tipped = np.array([730.0, 20.0, 3.0]), np.array([730.0, 75.0, 20.0])
     wrenches = np.zeros((2, 6))
     wrenches[:, (2, 4, 3)] = np.array([light, tipped]) * [-1.0, 1.0, -1.0]
-    found = WHEELS.borne(wrenches)
+    found = borne(WHEELS.standing(), wrenches)
     np.testing.assert_array_equal(found[0], wrenches[0])
     assert (n + G @ tipped).min() < -20.0
     N = np.maximum(n + G @ (found[1, [2, 4, 3]] * [-1.0, 1.0, -1.0]), 0.0)
     np.testing.assert_allclose([N.sum(), N @ POSITION[:, 0], N @ POSITION[:, 1]], tipped, rtol=1e-9)
     assert (N == 0.0).any()
+
+
+def test_wheels_seen_from_another_place_bear_the_same():
+    off, tipped = np.array([4e-3, -7e-3]), np.zeros((1, 6))
+    tipped[:, (2, 4, 3)] = np.array([730.0, 75.0, 20.0]) * [-1.0, 1.0, -1.0]
+    seen = tipped.copy()
+    seen[:, (4, 3)] -= tipped[:, 2:3] * off * [1.0, -1.0]
+    shares = np.array([1.2, 0.9])
+    true, found = borne(WHEELS.standing(shares), tipped), borne(WHEELS.standing(shares, off), seen)
+    np.testing.assert_allclose(found[0, 2], true[0, 2], rtol=1e-12)
+    np.testing.assert_allclose(found[0, (4, 3)] + found[0, 2] * off * [1.0, -1.0], true[0, (4, 3)], rtol=1e-9)
 
 
 def tilt_stiffness(wheels=WHEELS):

@@ -1,0 +1,107 @@
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+import mjcf
+from calibration.numerics.signals import Signal
+from calibration.recording.clock import Clock
+from calibration.stages.stick_slip.forcing import Wrenches
+from calibration.stages.stick_slip.plate_place import plate_place, weighed
+from calibration.stages.stick_slip.wheels import wheel_set
+from calibration.stages.suspension.base_response import laboratory
+from calibration.stages.suspension.floor_wrench import Load
+from tests.doubles import rigid_robot
+from tests.doubles.moving_base import WHEELS
+
+DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
+ROBOT, PLATE = (Clock(i, 0.0, 0.0, np.zeros((2, 2)), 0.0, 1e-4) for i in ("robot", "plate"))
+STILL = rigid_robot.Truth(marker_sigma=1e-5, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))
+OFF = np.array([4e-3, -3e-3])
+G = 9.81
+
+
+def robot(masses=None):
+    """The whole robot, its carried links heavier by `masses` (n,) [-]."""
+    model = rigid_robot.model(STILL, pin.JointModelFreeFlyer())
+    for i in range(2, model.njoints):
+        model.inertias[i] = pin.Inertia(
+            model.inertias[i].mass * (1.0 + (0.0 if masses is None else masses[i - 2])),
+            model.inertias[i].lever, model.inertias[i].inertia,
+        )  # fmt: skip
+    return model
+
+
+def load(model, q):
+    """(-Fz, My, -Mx) (n, 3) about the base's origin at postures q (n, 8)."""
+    data, base = model.createData(), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    weight = G * sum(body.mass for body in model.inertias)
+    return np.array([weight * np.append(1.0, pin.centerOfMass(model, data, np.r_[base, own])[:2]) for own in q])
+
+
+def signal(t, vertical):
+    w = np.zeros((len(t), 6))
+    w[:, (2, 4, 3)] = vertical * [-1.0, 1.0, -1.0]
+    return Load(Signal(t, w, np.ones(len(t), dtype=bool)), np.zeros((6, 6)), 0.0, np.zeros(3), np.eye(4))
+
+
+def stood(postures, masses, off, start=0.0):
+    """A trial that dwells in postures of a robot with other masses, and its wrenches; the plate seems `off`."""
+    motor, _ = rigid_robot.through(postures, dwell=3.0)
+    trial = rigid_robot.record(STILL, motor, start, np.random.default_rng(0), plate=False)
+    t = trial.t_robot
+    plate, nominal = (load(robot(m), trial.q_motor) for m in (masses, None))
+    plate[:, 1:] += plate[:, :1] * off
+    wheels = wheel_set(mjcf.urdf(), DESCRIPTION.wheels, G)
+    loads = signal(t, plate), signal(t, nominal)
+    return trial, Wrenches("a", float(t[0]), *loads, np.zeros(0), np.zeros((0, 6, 6)), wheels)
+
+
+def test_what_bodies_change_of_the_load_is_its_derivative():
+    q, step = rigid_robot.CENTRE, 1e-4
+    lab = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE).lab
+    v = load(robot(), q[None])[0]
+    found, place = weighed(lab, q, v)
+    for i in (0, 3, 6):
+        more = load(robot(step * np.eye(8)[i]), q[None])[0]
+        np.testing.assert_allclose(found[:, 4 * (i + 1)], (more - v) / step, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(place @ OFF, [0.0, *(v[0] * OFF)])
+    model, i = robot(), 5
+    body = model.inertias[i]
+    model.inertias[i] = pin.Inertia(body.mass, body.lever + [0.0, step, 0.0], body.inertia)
+    np.testing.assert_allclose(found[:, 4 * (i - 1) + 2], (load(model, q[None])[0] - v) / step, atol=1e-6)
+
+
+def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
+    """Links 15 % off at most."""
+    rng = np.random.default_rng(3)
+    masses = np.array([0.0, 0.1, 0.15, 0.12, 0.1, 0.1, 0.1, 0.1])
+    sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
+    postures = rigid_robot.random_angles(rng, 12)
+    trial, wrench = stood(postures, masses, OFF)
+    many = plate_place(sources, [trial], [wrench])
+    trial, wrench = stood(np.repeat(postures[:1], 12, axis=0), masses, OFF)
+    one = plate_place(sources, [trial], [wrench])
+    assert np.linalg.norm(many - OFF) < 0.7e-3
+    assert np.linalg.norm(one - OFF) > 2e-3
+
+
+def test_a_plate_in_its_place_and_nominal_links_leave_nothing():
+    sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
+    trial, wrench = stood(rigid_robot.random_angles(np.random.default_rng(3), 4), None, np.zeros(2))
+    np.testing.assert_allclose(plate_place(sources, [trial], [wrench]), 0.0, atol=1e-6)
+    np.testing.assert_array_equal(plate_place(sources, [trial], [replace(wrench, dynamics=None)]), 0.0)
+
+
+def test_seconds_in_which_a_joint_moves_do_not_count():
+    """Loads that are wrong while the arm swings, and right before, leave nothing."""
+    sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
+    motor = rigid_robot.swing(np.full(8, 0.2), np.full(8, 0.5), 6.0)
+    trial = rigid_robot.record(STILL, motor, 0.0, np.random.default_rng(0), plate=False)
+    u, wheels = load(robot(), trial.q_motor), wheel_set(mjcf.urdf(), DESCRIPTION.wheels, G)
+    moves = np.abs(trial.q_motor - trial.q_motor[0]).max(axis=1) > 1e-3
+    t, none = trial.t_robot, np.zeros((0, 6, 6))
+    loads = signal(t, u + moves[:, None] * [5.0, 20.0, -20.0]), signal(t, u)
+    wrench = Wrenches("a", 0.0, *loads, np.zeros(0), none, wheels)
+    assert 0.3 < moves.mean() < 0.95
+    np.testing.assert_allclose(plate_place(sources, [trial], [wrench]), 0.0, atol=1e-5)
