@@ -24,7 +24,7 @@ from calibration.numerics.signals import RATE
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.stick_slip.forcing import PlanarForcing, Tilting, planar_forcing, wrenches_along
+from calibration.stages.stick_slip.forcing import PlanarForcing, Readings, Tilting, planar_forcing, wrenches_along
 from calibration.stages.stick_slip.likelihood import joined
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, blocks
 from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, WheelSet, wheel_set
@@ -109,7 +109,7 @@ class Excitation:
             q: (n, n_joints) [rad, m].
         """
         stiff = Tilting(np.diag(np.full(6, _STIFF)), np.diag(np.full(6, _STIFF / RATE)))
-        forcing = planar_forcing(wrenches_along(self.lab, t, q, None, np.eye(4)), stiff, "dynamics")
+        forcing = planar_forcing(wrenches_along(self.lab, Readings(t, q), None, np.eye(4)), stiff, "dynamics")
         found, slides = [], 0.0
         for offset in _FRICTIONS:
             p = PRIOR + offset * np.array([name.endswith("_mu") for name in NAMES])

@@ -128,10 +128,11 @@ class Compensator:
         if parts is None or laboratory is None or not parts.trains or not row_of(estimate.main).bundle:
             return self
         robot = BundledRobot.of(self.hand, parts, urdf, laboratory)
-        arm, slipping = BundledArm(robot.trains.carrying(payload), robot.bending, robot.at_rest), None
+        trains, slipping = robot.trains.carrying(payload), None
+        arm = BundledArm(trains, robot.bending, robot.at_rest)
         if robot.stick_slip is not None:
             source: Source = "plate" if robot.knows("plate") else "dynamics"
-            slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)), source)
+            slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)), source, trains)
         return replace(self, joints=None, arm=arm, slipping=slipping)
 
     def predict(  # noqa: PLR0913  what the instruments show

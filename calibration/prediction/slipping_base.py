@@ -24,10 +24,12 @@ from calibration.recording.trial import REST
 from calibration.robot.kinematics import shift
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
-from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, planar_forcing, wrenches_along
+from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, Readings, wrenches_along
 from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, LANES, STEPS, Bases
 from calibration.stages.stick_slip.kernel.lifted import bear
 from calibration.stages.stick_slip.model import StickSlip
+from calibration.stages.stick_slip.poses import Links, forced
 from calibration.stages.stick_slip.stream import (
     UNDRIVEN,
     Fitted,
@@ -91,11 +93,13 @@ class SlippingBase:
         model: Fitted from `source`.
         lab: The nominal robot with the payload in its hand.
         source: What moves it: a plate's wrench, or inverse dynamics of the readings.
+        trains: Drive trains of the arm, with the same payload, where they are known.
     """
 
     model: StickSlip
     lab: Laboratory
     source: Source
+    trains: DriveTrains | None = None
 
     def moved(
         self,
@@ -113,9 +117,11 @@ class SlippingBase:
             NotEnoughData: Less than a second, or nothing says what point the wrench is about.
         """
         load = None if wrench is None else at.load(t, wrench, CUTOFF)
-        forcing = planar_forcing(
-            wrenches_along(self.lab, t, q_motor, load, at.T_lab_0, push), self.model.tilting, self.source
-        )
+        readings = Readings(t, q_motor, push)
+        wrenches, links = wrenches_along(self.lab, readings, load, at.T_lab_0), None
+        if self.trains is not None:
+            links = Links(self.lab, self.trains, readings, at.T_lab_0)
+        forcing = forced(self.model, wrenches, self.source, links)
         x, variance = (interpolate_columns(t, forcing.t, found) for found in self.model.displacement(forcing))
         return at.in_lab(x), variance
 

@@ -120,4 +120,4 @@ class BundledRobot:
         """
         if self.stick_slip is None:
             raise NotEnoughData(f"{trial.id}: no base that slips was identified")
-        return slipping_base_poses(self.stick_slip, sources, trial, source)
+        return slipping_base_poses(self.stick_slip, sources, trial, source, self.trains)

@@ -99,7 +99,7 @@ def fit_bundle(
     base = None
     if suspension is not None:
         sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
-        base, more = fit_stick_slip(sources, trials, suspension)
+        base, more = fit_stick_slip(sources, trials, suspension, trains)
         found += more
     parts = BundleParts(trains.trains, _offsets(hand), bending, base, at_rest)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)

@@ -97,15 +97,19 @@ class DriveTrain:
 
     def backlash(self, drive: "DriveMotion") -> "Deflection":
         """delta in trials."""
-        torque = drive.torque + self.link_inertia * drive.a
-        low, high = self.ends(torque[drive.begins[:-1]])
-        likely = self.deltas(drive, torque, low + self.start[0] * (high - low))
+        torque, likely = drive.torque + self.link_inertia * drive.a, self.likely(drive)
         others = [likely]
         for off in (-2.0 * self.torque_sigma, 2.0 * self.torque_sigma):
             shift = self.values[COMPLIANCE] * off  # of a mesh in contact, and no doubt about its side
             for start in self.ends(torque[drive.begins[:-1]] + off):
                 others.append(self.deltas(drive, torque + off, start) - shift)
         return Deflection(likely, np.min(others, axis=0), np.max(others, axis=0))
+
+    def likely(self, drive: "DriveMotion") -> np.ndarray:
+        """Most likely delta (n,) [rad] in trials."""
+        torque = drive.torque + self.link_inertia * drive.a
+        low, high = self.ends(torque[drive.begins[:-1]])
+        return self.deltas(drive, torque, low + self.start[0] * (high - low))
 
     def ends(self, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest delta (m,) [rad] at which friction holds the link under torques (m,) [N.m]."""

@@ -117,6 +117,15 @@ class DriveTrains:
         """What pushes the hand (n, 6), see `hand_push`; None where nothing does."""
         return hand_push(self.urdf, self.description, t, q, wrist)
 
+    def likely(self, loads: LinkLoads) -> np.ndarray:
+        """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
+        q = loads.q.astype(float).copy()
+        for train in self.trains:
+            j = self.joints.index(train.joint)
+            delta = train.likely(drive_motion([loads], j, train.inertials if len(train.inertials) else None))
+            q[:, j] = loads.q[:, j] - train.harmonics(loads.angle[:, j]) - delta
+        return q
+
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""
         q = loads.q.astype(float).copy()

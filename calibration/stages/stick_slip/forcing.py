@@ -12,12 +12,14 @@ correction.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE, Signal, even, low_passed
+from calibration.recording.clock import Clock
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
@@ -108,6 +110,7 @@ class Wrenches:
         t: (k,) times of the inertia; empty without.
         M: (k, 6, 6) composite inertia.
         wheels: Of the robot.
+        links: By inverse dynamics of link angles, where they are known: they strike in their gaps as motors do not.
     """
 
     trial_id: str
@@ -117,6 +120,25 @@ class Wrenches:
     t: np.ndarray
     M: np.ndarray
     wheels: WheelSet
+    links: Load | None = None
+
+    def moved_by(self, source: Source) -> Load | None:
+        """What moves the base where `source` is what was measured."""
+        return self.plate if source == "plate" else self.links or self.dynamics
+
+
+class Readings(NamedTuple):
+    """Motor readings without gaps.
+
+    Attributes:
+        t: (n,) [s, mocap clock].
+        q: (n, k) [rad, m].
+        push: (n, 6) on the hand as `WristSensor.push` has it; None where nothing does.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    push: np.ndarray | None = None
 
 
 def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wrenches:
@@ -126,25 +148,21 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wr
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
     if sources.robot is None or not len(trial.t_robot):
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)), wheels_of(lab))
+    readings = readings_of(lab, sources.robot, trial)
+    return replace(wrenches_along(lab, readings, plate, T_lab_0), trial_id=trial.id, start=start)
+
+
+def readings_of(lab: Laboratory, robot: Clock, trial: Trial) -> Readings:
+    """The whole readings of a trial, by a robot with its payload."""
     known = np.isfinite(trial.q_motor).all(axis=1)
-    t, q = sources.robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
-    push = hand_push(lab.urdf, lab.description, t, q, trial.wrist_wrench[known])
-    return replace(wrenches_along(lab, t, q, plate, T_lab_0, push), trial_id=trial.id, start=start)
+    t, q = robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
+    return Readings(t, q, hand_push(lab.urdf, lab.description, t, q, trial.wrist_wrench[known]))
 
 
-def wrenches_along(  # noqa: PLR0913  what the instruments show
-    lab: Laboratory,
-    t: np.ndarray,
-    q_motor: np.ndarray,
-    plate: Load | None,
-    T_lab_0: np.ndarray,
-    push: np.ndarray | None = None,
-) -> Wrenches:
-    """The wrench of the plate, and that of readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock].
-
-    `push` (n, 6) on the hand as `WristSensor.push` has it.
-    """
-    dynamics, M = motion_load(lab, t, q_motor, T_lab_0, CUTOFF, push), composite_inertia(lab, t, q_motor, T_lab_0)
+def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_lab_0: np.ndarray) -> Wrenches:
+    """The wrench of the plate, and that of readings."""
+    t, q = readings.t, readings.q
+    dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, readings.push), composite_inertia(lab, t, q, T_lab_0)
     return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab))
 
 
@@ -164,7 +182,8 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     Raises:
         NotEnoughData: The wrench asked for was not recorded.
     """
-    main, dynamics = wrenches.plate if source == "plate" else wrenches.dynamics, wrenches.dynamics
+    main = wrenches.moved_by(source)
+    dynamics = wrenches.dynamics if source == "plate" else main
     if main is None:
         what = "force plate" if source == "plate" else "encoder readings"
         raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")

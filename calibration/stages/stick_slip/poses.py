@@ -4,17 +4,32 @@ T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     covariance of x: diag V(t), in frame 0
 use_i = |K_i e_i + N_i (-ry, rx)| / (mu_i N_i),  the share of its friction that wheel i needs: 1 where it slides
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from calibration.numerics.lie import from_vector
 from calibration.recording.trial import Trial
-from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_forcing, wrenches_of
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.stick_slip.forcing import (
+    CUTOFF,
+    STEP,
+    STEPS,
+    PlanarForcing,
+    Readings,
+    Wrenches,
+    planar_forcing,
+    readings_of,
+    wrenches_of,
+)
 from calibration.stages.stick_slip.kernel.bases import LOAD
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
+from calibration.stages.suspension.floor_wrench import Load, motion_load
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import rest_of
 
@@ -51,20 +66,64 @@ class BasePrediction:
     motion: SlippingMotion
 
 
-def slipping_base_poses(model: StickSlip, sources: WrenchSources, trial: Trial, source: Source) -> BasePrediction:
-    """The base in a trial.
+def slipping_base_poses(
+    model: StickSlip, sources: WrenchSources, trial: Trial, source: Source, trains: DriveTrains | None = None
+) -> BasePrediction:
+    """The base in a trial; by inverse dynamics of the links behind the motors where drive trains are known.
 
     Raises:
         NotEnoughData: The wrench, or the base's markers of the first second, were not recorded.
         NoSuchElement: The model was not fitted from that source.
     """
     rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-    forcing = planar_forcing(wrenches_of(sources, trial, rest.T_lab_0), model.tilting, source)
+    wrenches, links = wrenches_of(sources, trial, rest.T_lab_0), None
+    if trains is not None and sources.robot is not None and len(trial.t_robot):
+        lab = sources.lab.of_trial(trial.id)
+        links = Links(lab, trains.of_trial(trial.id), readings_of(lab, sources.robot, trial), rest.T_lab_0)
+    forcing = forced(model, wrenches, source, links)
     moment = forcing.force[:, 2:]
     found = (*model.displacement(forcing), moment, friction_use(model, forcing))
     x, variance, moment, use = (_at(trial.t_mocap, forcing.t, columns) for columns in found)
     motion = SlippingMotion(x, variance, moment[:, 0], use, model.wheels.names)
     return BasePrediction(rest.poses(x), motion)
+
+
+class Links(NamedTuple):
+    """The links behind motor readings.
+
+    Attributes:
+        lab: The robot with the payload in its hand.
+        trains: Its drive trains with the same.
+        readings: Of its motors.
+        T_lab_0: (4, 4) frame 0.
+    """
+
+    lab: Laboratory
+    trains: DriveTrains
+    readings: Readings
+    T_lab_0: np.ndarray
+
+    def load(self, t: np.ndarray, T_lab_base: np.ndarray) -> Load:
+        """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known."""
+        at, q, push = self.readings
+        moving = self.trains.base_acceleration(t, T_lab_base, at)
+        loads = self.trains.dynamics.loads("", at, q, moving, push)
+        return motion_load(self.lab, at, self.trains.likely(loads), self.T_lab_0, CUTOFF, push)
+
+
+def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | None) -> PlanarForcing:
+    """What drives the base; where inverse dynamics do, of links that move with the base as their motors move it.
+
+    Raises:
+        NotEnoughData: The wrench was not recorded.
+        NoSuchElement: The model was not fitted from that source.
+    """
+    forcing = planar_forcing(wrenches, model.tilting, source)
+    if source == "plate" or links is None or not links.trains.trains:
+        return forcing
+    x, _ = model.displacement(forcing)
+    load = links.load(forcing.t, links.T_lab_0 @ from_vector(x))
+    return planar_forcing(replace(wrenches, links=load), model.tilting, source)
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:

@@ -12,9 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.errors import NotEnoughData
+from calibration.mocap.measured_trial import MeasuredTrial
+from calibration.numerics.lie import inverse
 from calibration.numerics.side_by_side import side_by_side
+from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.band import PlainBand, plain_band, reached
 from calibration.stages.stick_slip.fit import fit_direction
 from calibration.stages.stick_slip.forcing import (
@@ -24,15 +29,18 @@ from calibration.stages.stick_slip.forcing import (
     Tilting,
     Wrenches,
     planar_forcing,
+    readings_of,
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import Trials, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.plate_place import plate_place
+from calibration.stages.stick_slip.poses import Links
 from calibration.stages.stick_slip.search import descended, displaced, tried
 from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, prior_by_tilt, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
+from calibration.stages.suspension.floor_wrench import Load
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 from calibration.verdict import Verdict
@@ -59,14 +67,17 @@ class Read:
 
 
 def fit_stick_slip(
-    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension
+    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, trains: DriveTrains | None = None
 ) -> tuple[StickSlip | None, tuple[Verdict, ...]]:
-    """The base by calibration trials in which it is not driven, None where it is not identified, and the findings."""
+    """The base by calibration trials in which it is not driven, None where it is not identified, and the findings.
+
+    By inverse dynamics of link angles, where drive trains are known.
+    """
     description = sources.lab.description
     if len(description.wheels) < _LEAST_WHEELS:
         return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
-    read = _read(sources, trials)
+    read = _read(sources, trials, trains)
     prior = _prior(wheels, suspension)
     off = plate_place(sources, [one.trial for one in read], [one.wrenches for one in read])
     tilting = Tilting(suspension.K, suspension.C, off, prior.shares)
@@ -90,16 +101,27 @@ def fit_stick_slip(
     return model, findings
 
 
-def _read(sources: WrenchSources, trials: Sequence[Trial]) -> list[Read]:
+def _read(sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains | None) -> list[Read]:
     def read(trial: Trial) -> Read | None:
         try:
             rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-            return Read(trial, rest, wrenches_of(sources, trial, rest.T_lab_0))
+            wrenches = wrenches_of(sources, trial, rest.T_lab_0)
+            if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
+                wrenches = replace(wrenches, links=_linked(sources.lab, trains, sources.robot, trial, rest))
+            return Read(trial, rest, wrenches)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             return None
 
     return [one for one in side_by_side(read, trials) if one is not None]
+
+
+def _linked(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, rest: Rest) -> Load:
+    """Inverse dynamics of links that move with the base as its markers show it."""
+    own = lab.of_trial(trial.id)
+    links = Links(own, trains.of_trial(trial.id), readings_of(own, robot, trial), rest.T_lab_0)
+    T_lab_B = MeasuredTrial.of(lab.description, trial).base.T
+    return links.load(trial.t_mocap, T_lab_B @ inverse(rest.T_0_B))
 
 
 def _rows(
