@@ -24,10 +24,11 @@ from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
 from calibration.robot.wrist_sensor import hand_push
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
+from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
 from calibration.stages.stick_slip.kernel.lifted import borne
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
-from calibration.stages.suspension.base_response import WrenchSources, forcing_of
+from calibration.stages.suspension.base_response import Forcing, WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load, root_in_base
 from calibration.stages.suspension.lifting_response import predicted_lifting
 from calibration.stages.suspension.modal_response import predicted
@@ -111,6 +112,8 @@ class Wrenches:
         M: (k, 6, 6) composite inertia.
         wheels: Of the robot.
         links: By inverse dynamics of link angles, where they are known: they strike in their gaps as motors do not.
+        slips: A base of the most likely parameters, for heave and tilt while it slips; None: as if it stuck.
+        seen: Whether the plate shows how the base heaves and tilts, whatever is to move it: in a calibration trial.
     """
 
     trial_id: str
@@ -121,6 +124,8 @@ class Wrenches:
     M: np.ndarray
     wheels: WheelSet
     links: Load | None = None
+    slips: Bases | None = None
+    seen: bool = False
 
     def moved_by(self, source: Source) -> Load | None:
         """What moves the base where `source` is what was measured."""
@@ -187,14 +192,13 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     if main is None:
         what = "force plate" if source == "plate" else "encoder readings"
         raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")
-    grid, compliant = _compliant(wrenches, tilting, source, main)
-    first, last = grid[0], grid[-1]
+    heave, linear = _swayed(wrenches, tilting, source, main)
+    first, last = max(linear.x[0], heave.x[0]), min(linear.x[-1], heave.x[-1])
     if dynamics is not None:
         first, last = max(first, dynamics.signal.t[0]), min(last, dynamics.signal.t[-1])
     n = int((last - first) * RATE + 1e-6)
     t, fine = first + np.arange(n) / RATE, first + np.arange(n * STEPS) * STEP
     rest = fine <= wrenches.start + REST
-    heave, linear = (CubicSpline(grid, compliant[:, axes]) for axes in (HEAVE, PLANE))
     tilt, load, rows, drive = heave(fine), _at(main.signal, fine), np.zeros((n, 15)), np.zeros((len(fine), COLUMNS))
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
@@ -202,10 +206,9 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
         shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], heave(fine, 2))
         drive[:, :3] = (_at(dynamics.signal, fine) - shift)[:, PLANE]
         drive[:, :3] -= drive[rest, :3].mean(axis=0)
-        rows[:, :6] = np.stack([M[:, PLANE[i], PLANE[j]] for i, j in UPPER], axis=1)
+        rows[:, :6] = _inertia(M)[:, :6]
         if main is dynamics:
-            load = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0)
-            rows[:, 6:] = (M[:, (2, 4, 3)][:, :, PLANE] * np.array([1.0, -1.0, 1.0])[:, None]).reshape(n, 9)
+            load, rows = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0), _inertia(M)
     drive[:, 3:6] = vertical(load)
     drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:]
     if source == "plate":
@@ -229,6 +232,40 @@ def _compliant(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load)
         return forcing.t, predicted(tilting.K, tilting.C, forcing)
     forcing = forcing_of(load, wrenches.start)
     return forcing.t, predicted_lifting(tilting.K, tilting.C, forcing, standing)
+
+
+def _swayed(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) -> tuple[CubicSpline, CubicSpline]:
+    """z, rx, ry and x, y, yaw by the compliance.
+
+    Where inverse dynamics move the base, the first by the plate of a calibration trial, or of a base that slips.
+    """
+    grid, compliant = _compliant(wrenches, tilting, source, load)
+    heave, linear = (CubicSpline(grid, compliant[:, axes]) for axes in (HEAVE, PLANE))
+    if source == "dynamics" and wrenches.seen and wrenches.plate is not None:
+        grid, compliant = _compliant(wrenches, tilting, "plate", wrenches.plate)
+        return CubicSpline(grid, compliant[:, HEAVE]), linear
+    if source == "dynamics" and wrenches.slips is not None:
+        return _heaving(wrenches, tilting, wrenches.slips, forcing_of(load, wrenches.start)), linear
+    return heave, linear
+
+
+def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcing) -> CubicSpline:
+    """z, rx, ry of a base while it slips, see `kernel.heaving`."""
+    h, order, t = np.ix_(HEAVE, HEAVE), [*PLANE, *HEAVE], forcing.t
+    standing, M = tilting.standing(wrenches.wheels, "dynamics"), _resampled(wrenches.t, wrenches.M, t)
+    springs = Springs(tilting.K[h], tilting.C[h], (tilting.K + forcing.tangent)[h], forcing.rest[[*HEAVE]], standing)
+    w = CubicSpline(t, forcing.w[:, order])(t[0] + np.arange(STEPS * len(t)) * STEP)
+    state, wheels, own = slips.state[0].copy(), slips.wheels[0].copy(), np.ascontiguousarray(M[:, order][:, :, order])
+    found = heaving(state, wheels, np.ascontiguousarray(w), own, _inertia(M), springs, STEP)
+    return CubicSpline(t, found[::STEPS])
+
+
+def _inertia(M: np.ndarray) -> np.ndarray:
+    """(n, 15) of M (n, 6, 6), as the kernel takes it: of a base that its own accelerations load."""
+    rows = np.empty((len(M), 15))
+    rows[:, :6] = np.stack([M[:, PLANE[i], PLANE[j]] for i, j in UPPER], axis=1)
+    rows[:, 6:] = (M[:, (2, 4, 3)][:, :, PLANE] * np.array([1.0, -1.0, 1.0])[:, None]).reshape(len(M), 9)
+    return rows
 
 
 def _at(signal: Signal, t: np.ndarray) -> np.ndarray:

@@ -123,7 +123,8 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
         return forcing
     x, _ = model.displacement(forcing)
     load = links.load(forcing.t, links.T_lab_0 @ from_vector(x))
-    return planar_forcing(replace(wrenches, links=load), model.tilting, source)
+    slips = bases_of(model.wheels, model.direction(source).logarithms[None], corrected=False)
+    return planar_forcing(replace(wrenches, links=load, slips=slips), model.tilting, source)
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:

@@ -105,7 +105,7 @@ def _read(sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains |
     def read(trial: Trial) -> Read | None:
         try:
             rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-            wrenches = wrenches_of(sources, trial, rest.T_lab_0)
+            wrenches = replace(wrenches_of(sources, trial, rest.T_lab_0), seen=True)
             if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
                 wrenches = replace(wrenches, links=_linked(sources.lab, trains, sources.robot, trial, rest))
             return Read(trial, rest, wrenches)

@@ -3,7 +3,7 @@
     M d2x/dt2 + C dx/dt + K x = w + c(L)        L = w_rest + K x + C dx/dt,   c = sum_(N_i < 0) N_i a_i
 
 N_i = n_i + G_i p are the wheels' loads where none lifts off, by p = (-Fz, My, -Mx) of L; a_i = (1, x_i, y_i), in the
-same components. Each sample is a step of the modes with the c found at its end, by repetition.
+same components. A step has the c found at its end, by repetition.
 """
 
 import numpy as np
