@@ -112,19 +112,22 @@ class Links(NamedTuple):
 
 
 def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | None) -> PlanarForcing:
-    """What drives the base; where inverse dynamics do, of links that move with the base as their motors move it.
+    """What drives the base; where inverse dynamics do, of links on a base that moves as their motors move it.
 
     Raises:
         NotEnoughData: The wrench was not recorded.
         NoSuchElement: The model was not fitted from that source.
     """
-    forcing = planar_forcing(wrenches, model.tilting, source)
-    if source == "plate" or links is None or not links.trains.trains:
-        return forcing
-    x, _ = model.displacement(forcing)
-    load = links.load(forcing.t, links.T_lab_0 @ from_vector(x))
-    slips = bases_of(model.wheels, model.direction(source).logarithms[None], corrected=False)
-    return planar_forcing(replace(wrenches, links=load, slips=slips), model.tilting, source)
+    found = model.direction(source)
+    if source == "plate":
+        return planar_forcing(wrenches, model.tilting, source)
+    if links is not None and links.trains.trains:
+        forcing = planar_forcing(wrenches, model.tilting, source)
+        x, _ = model.displacement(forcing)
+        wrenches = replace(wrenches, links=links.load(forcing.t, links.T_lab_0 @ from_vector(x)))
+    if found.slips.any():
+        wrenches = replace(wrenches, slips=bases_of(model.wheels, found.logarithms[None], corrected=False))
+    return planar_forcing(wrenches, model.tilting, source)
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:

@@ -3,8 +3,8 @@
     (M_hh - S M_ph) d2h/dt2 + C_hh dh/dt + K_hh h = w_h - S (w_p - F) + c(L)            S = M_hp M_pp^-1
     w of `integration`:  w_p - M_ph d2h/dt2
 
-h: z, rx, ry, p: x, y, yaw; F what the wheels put on the floor, of the step before; c(L) of wheels that lift off, see
-`suspension.lifting_response`. Heave by the trapezoidal rule.
+h: z, rx, ry, p: x, y, yaw, M_pp of the robot without wheels. F is what it puts on its wheels, from the two steps before
+on, c(L) that of wheels that lift off, see `suspension.lifting_response`. Heave by the trapezoidal rule.
 """
 
 from typing import NamedTuple
@@ -13,9 +13,10 @@ import numpy as np
 
 from calibration.numerics.compiled import njit
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, STEPS, VECTOR, F, W
-from calibration.stages.stick_slip.kernel.integration import advance
+from calibration.stages.stick_slip.kernel.integration import advance, without_wheels
 
 _REPEATS, _SETTLED = 20, 1e-3  # [N, N.m]
+_UPPER = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # of a symmetric matrix, in its six elements
 
 
 class Springs(NamedTuple):
@@ -74,16 +75,21 @@ def heaving(
         step: [s].
     """
     out, h, c, drive = np.zeros((len(w), 3)), np.zeros((3, 3)), np.zeros(3), np.zeros((1, COLUMNS))
-    floor, S, A = np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
-    hp, hh = np.zeros((3, 3)), np.zeros((3, 3))
+    before, floor, S, A = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
+    hp, hh, plane = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     for k in range(len(w)):
         if k % STEPS == 0:
             m = M[k // STEPS]
             hp[:], hh[:] = m[3:, :3], m[3:, 3:]
-            S = hp @ np.linalg.inv(np.ascontiguousarray(m[:3, :3]))
+            own = without_wheels(wheels.reshape(-1), rows[k // STEPS])
+            for i in range(3):
+                for j in range(3):
+                    plane[i, j] = own[_UPPER[i][j]]
+            S = hp @ np.linalg.inv(plane)
             A = hh - S @ np.ascontiguousarray(hp.T)
         for i in range(3):
-            floor[i] = state[F + i, 0] + state[W + i, 0]
+            now = state[F + i, 0] + state[W + i, 0]
+            floor[i], before[i] = 2.0 * now - before[i], now
         h, c = _stepped(of, A, w[k, 3:] - S @ (w[k, :3] - floor), h, c, step)
         moved, load = hp.T @ h[2], of.rest + w[k, 3:] - hh @ h[2]
         for i in range(3):

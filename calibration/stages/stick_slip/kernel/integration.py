@@ -156,7 +156,7 @@ def _ended(s: np.ndarray, u: np.ndarray, M: np.ndarray, h: float, n: int) -> Non
 
 
 @njit(cache=True, error_model="numpy")
-def _without(wheels: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+def without_wheels(wheels: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     """M (6,) of the robot without its wheels, the first lane's of flat wheels."""
     M = inertia[:6].copy()
     for i in range(len(wheels) // (WHEEL * LANES)):
@@ -173,7 +173,7 @@ def _without(wheels: np.ndarray, inertia: np.ndarray) -> np.ndarray:
 @njit(cache=True, error_model="numpy")
 def _advance(s: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
     """`advance` with all arrays of the bases flat."""
-    M = _without(wheels, inertia)
+    M = without_wheels(wheels, inertia)
     for l in range(LANES):
         s[SLID * LANES + l] = 0.0
     for k in range(len(drive)):

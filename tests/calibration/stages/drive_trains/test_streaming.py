@@ -130,6 +130,7 @@ def test_drive_trains_come_back_from_json() -> None:
     again = replace(of, trains=read)
     loads = of.dynamics.loads("", T, Q)
     assert (again.of_loads(loads).q == of.of_loads(loads).q).all()
+    assert (of.likely(loads) == of.of_loads(loads).q).all()
 
 
 def test_a_base_that_tilts_and_turns_loads_the_joints_by_its_proper_acceleration() -> None:

@@ -1,0 +1,81 @@
+"""What drives the base in use: links and heave where inverse dynamics move it, nothing else by a plate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mjcf
+from calibration.recording.clock import Clock
+from calibration.stages.drive_trains import DriveTrain, DriveTrains
+from calibration.stages.drive_trains.torques import dynamics
+from calibration.stages.stick_slip import wrenches_of
+from calibration.stages.stick_slip.band import Band
+from calibration.stages.stick_slip.forcing import Tilting, planar_forcing, readings_of
+from calibration.stages.stick_slip.model import Direction, StickSlip
+from calibration.stages.stick_slip.poses import Links, forced
+from calibration.stages.stick_slip.wheels import wheel_set
+from calibration.stages.suspension.base_response import laboratory
+from calibration.stages.suspension.cross_validation import HeldOut
+from tests.calibration.stages.stick_slip.slipping import TRUTH
+from tests.doubles import rigid_robot
+from tests.doubles.moving_base import T_LAB_BASE, WHEELS
+
+DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
+ROBOT, PLATE = (Clock(i, 0.0, 0.0, np.zeros((2, 2)), 0.0, 1e-4) for i in ("robot", "plate"))
+STILL = rigid_robot.Truth(marker_sigma=1e-5, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))
+SOURCES = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
+K = np.diag([1e5, 1e5, 9e5, 2e4, 2e4, 1e4])
+
+
+@pytest.fixture(scope="module")
+def trial():
+    amplitudes = np.zeros(8)
+    amplitudes[[1, 2]] = 0.3
+    motor = rigid_robot.swing(amplitudes, np.full(8, 0.6), 5.0)
+    return rigid_robot.record(STILL, motor, 0.0, np.random.default_rng(0))
+
+
+def model():
+    sums = np.ones((2, 3))
+    tried = HeldOut(1e-6 * sums, 1e-4 * sums, 1e-12 * sums, np.ones(2))
+    band, C = Band(*np.full((4, 3), 1e-4)), 1e-4 * np.eye(13)
+    of = (Direction(s, TRUTH.logarithms, C, TRUTH.logarithms[None], band, tried) for s in ("plate", "dynamics"))
+    return StickSlip(wheel_set(mjcf.urdf(), WHEELS, 9.81), Tilting(K, 0.01 * K), tuple(of))
+
+
+def links(trial, half_gap):
+    values = np.array([half_gap, 1e-7, 0.3, 0.1, 6e-3, 0.0, 0.0])
+    trains = (DriveTrain("arm_1_joint", "dead_zone", values, dynamic=False),)
+    robot = dynamics(mjcf.urdf(), DESCRIPTION, np.zeros(8))
+    of = DriveTrains(robot, trains, mjcf.urdf(), DESCRIPTION)
+    return Links(SOURCES.lab, of, readings_of(SOURCES.lab, ROBOT, trial), T_LAB_BASE)
+
+
+def test_a_plate_moves_the_base_whatever_the_links_do(trial):
+    wrenches, of = wrenches_of(SOURCES, trial, T_LAB_BASE), model()
+    one, other = forced(of, wrenches, "plate", links(trial, 3e-3)), planar_forcing(wrenches, of.tilting, "plate")
+    np.testing.assert_array_equal(one.drive, other.drive)
+
+
+def test_links_that_strike_in_their_gaps_move_the_base(trial):
+    wrenches, of = wrenches_of(SOURCES, trial, T_LAB_BASE), model()
+    by_motors, tight, loose = (
+        forced(of, wrenches, "dynamics", behind).force[:, 2] for behind in (None, links(trial, 0.0), links(trial, 3e-3))
+    )
+    assert np.abs(tight - by_motors).max() < 0.01 * np.abs(by_motors).max()
+    assert np.abs(loose - by_motors).max() > 0.1 * np.abs(by_motors).max()
+
+
+def test_the_base_tilts_as_it_slips(trial):
+    """Under a fifth of the friction the floor takes less of what the arm does, and the base tilts otherwise."""
+    wrenches, of = wrenches_of(SOURCES, trial, T_LAB_BASE), model()
+    weak = TRUTH.logarithms.copy()
+    weak[4:7] += np.log(0.2)
+    slippery = replace(of, directions=tuple(replace(d, logarithms=weak, ensemble=weak[None]) for d in of.directions))
+    firm, loose = (forced(one, wrenches, "dynamics", None).heave for one in (of, slippery))
+    assert np.all(np.abs(loose - firm).max(axis=0)[1:] > 0.2 * np.abs(firm).max(axis=0)[1:])
+    seen = planar_forcing(replace(wrenches, seen=True), of.tilting, "dynamics")
+    np.testing.assert_allclose(
+        seen.heave, planar_forcing(wrenches, of.tilting, "plate").heave[: len(seen.t)], atol=1e-9
+    )
