@@ -249,6 +249,17 @@ def _swayed(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) ->
     return heave, linear
 
 
+def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases) -> np.ndarray | None:
+    """Mean squares (3,) of z, rx, ry by inverse dynamics less those by the plate [m2, rad2]; None without either."""
+    load = wrenches.moved_by("dynamics")
+    if load is None or wrenches.plate is None:
+        return None
+    found = _heaving(wrenches, tilting, slips, forcing_of(load, wrenches.start))
+    grid, compliant = _compliant(wrenches, tilting, "plate", wrenches.plate)
+    inside = (grid >= found.x[0]) & (grid <= found.x[-1])
+    return np.asarray(((found(grid[inside]) - compliant[inside][:, HEAVE]) ** 2).mean(axis=0))
+
+
 def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcing) -> CubicSpline:
     """z, rx, ry of a base while it slips, see `kernel.heaving`."""
     h, order, t = np.ix_(HEAVE, HEAVE), [*PLANE, *HEAVE], forcing.t

@@ -28,11 +28,12 @@ from calibration.stages.stick_slip.forcing import (
     PlanarForcing,
     Tilting,
     Wrenches,
+    heave_apart,
     planar_forcing,
     readings_of,
     wrenches_of,
 )
-from calibration.stages.stick_slip.likelihood import Trials, joined
+from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.plate_place import plate_place
@@ -93,6 +94,8 @@ def fit_stick_slip(
     if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
     directions = [_linear(fit, suspension) for fit in fits]
+    if len(directions) == len(SOURCES):
+        directions[1] = _heaved(directions[1], directions[0].heave_variance, wheels, tilting, read)
     directions = [replace(d, plain=_plain(d, wheels, rows)) for d, (_, rows, _) in zip(directions, usable, strict=True)]
     model = StickSlip(wheels, tilting, tuple(directions))
     misplaced = _misplaced(wheels.names, shift, chi2) if directions[0].is_of_wheels else ()
@@ -160,6 +163,21 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
     if linear[2]:
         linear |= tried.moves[list(PLANE)] & (plane < slips.variance(moved) / _BETTER)
     return replace(direction, linear=linear, heave_variance=heave)
+
+
+def _heaved(
+    direction: Direction, plate: np.ndarray, wheels: WheelSet, tilting: Tilting, read: Sequence[Read]
+) -> Direction:
+    """By inverse dynamics: heave and tilt err as the plate's do, variances (3,), and as they differ from those.
+
+    Markers hardly show either beside their noise.
+    """
+    if not direction.slips.any():
+        return direction
+    slips = bases_of(wheels, direction.logarithms[None], corrected=False)
+    found = side_by_side(lambda one: heave_apart(one.wrenches, tilting, slips), read)
+    apart = [square for square in found if square is not None]
+    return replace(direction, heave_variance=plate + np.mean(apart, axis=0)) if apart else direction
 
 
 def _plain(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]]) -> PlainBand:

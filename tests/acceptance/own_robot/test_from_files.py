@@ -38,10 +38,7 @@ def native(tmp_path_factory) -> Path:
     return folder
 
 
-GAP = pytest.mark.xfail(reason="arm_1 stops elsewhere in its gap, one posture: docs/limits.md", strict=True)
-
-
-@pytest.mark.parametrize("kinds", [("csv",), pytest.param(("c3d", "bag"), marks=GAP)])
+@pytest.mark.parametrize("kinds", [("csv",), ("c3d", "bag")])
 def test_files_give_the_errors_of_the_dataset(native, tmp_path, kinds):
     for kind in kinds:
         import_export.export_files(kind, native / "run/dataset", tmp_path / kind)
