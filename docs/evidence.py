@@ -149,14 +149,8 @@ def prose() -> Iterator[tuple[Path, str, str]]:
 
 def other_robots(claims: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Patterns and phrases of the limits found on robots that no method was developed on."""
-    *others, worst = sorted(claims["ladder/sampled/full/plate/motor/dynamic"]["figures"])
-    band = 100.0 * min(claims["band/sampled/full/plate/dynamic"]["figures"])
-    far = f"of ten: {worst:.2f} mm, {band:.0f} % of it inside; the other nine up to {others[-1]:.2f} mm"
-    yield r"of ten: [\d.]+ mm, \d+ % of it inside; the other nine up to [\d.]+ mm", far
     nees = [x for of in ("fixed", "sampled") for x in claims[f"nees/{of}/full"]["figures"]]
     yield r"up to [\d.]+ times on \d+ robots", f"up to {max(nees):.1f} times on {len(nees)} robots"
-    pitch = min(claims["base/sampled/pitch_r2"]["figures"])
-    yield r"R2 of the worst of ten [\d.]+", f"R2 of the worst of ten {pitch:.2f}"
     points = [of["figures"][0] for name, of in claims.items() if re.fullmatch(r"geometry/real/inside/.* points?", name)]
     yield r"\d+ to \d+ % inside", f"{100 * min(points):.0f} to {100 * max(points):.0f} % inside"
     few = 100.0 * claims["geometry/few band/12 postures of 6 components"]["figures"][0]

@@ -11,7 +11,7 @@ from calibration.formats.mapping.rests import rests, rests_of_markers
 from calibration.formats.survey.bodies import FoundBody
 from calibration.formats.survey.view import FileView
 
-_POSTURES = 3  # rests of a static trial
+_POSTURES = 3  # a static trial rests in
 _MOVED = 0.05  # [rad, m] a joint has moved
 _SHARE = 0.05  # of the largest motion, below which another joint was at rest
 _DRIVEN, _TURNED = 0.1, 0.5  # [m], [rad] a base moved on purpose
@@ -57,15 +57,28 @@ def kind_of(recorded: Recorded, bodies: Sequence[FoundBody]) -> str:
             return "spin"
         if moved[0] > _DRIVEN:
             return "drive"
-    read = recorded.joints
-    n = 0 if read is None else len(rests(read.t, read.q_motor))
-    if max(n, len(rests_of_markers(recorded, [b.markers for b in bodies]))) >= _POSTURES:
+    read, markers = recorded.joints, recorded.markers
+    n = 0 if read is None else _postures(read.t, read.q_motor, rests(read.t, read.q_motor))
+    if markers is not None:
+        found = rests_of_markers(recorded, [b.markers for b in bodies])
+        n = max(n, _postures(markers.t, markers.position.reshape(len(markers.t), -1), found))
+    if n >= _POSTURES:
         return "static"
     if read is not None:
         span = np.ptp(read.q_motor, axis=0)
         if span.max() > _MOVED and (span > max(_SHARE * span.max(), 0.5 * _MOVED)).sum() == 1:
             return "sweep"
     return "swing"
+
+
+def _postures(t: np.ndarray, x: np.ndarray, windows: np.ndarray) -> int:
+    """How many rests, windows (r, 2) [s], of x (n, k) at t (n,) differ: a swing that halts does so where it began."""
+    found: list[np.ndarray] = []
+    for start, stop in windows:
+        mean = np.median(x[(t >= start) & (t <= stop)], axis=0)
+        if all((np.abs(mean - other) > _MOVED).any() for other in found):
+            found.append(mean)
+    return len(found)
 
 
 def _base_motion(markers: Markers, base: FoundBody) -> tuple[float, float]:

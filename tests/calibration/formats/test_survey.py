@@ -15,7 +15,7 @@ from calibration.formats.survey.draft import CHOOSE, draft
 from calibration.formats.survey.plate_signs import reversed_force
 from calibration.formats.survey.robot import read_urdf
 from calibration.formats.survey.session import session_of
-from calibration.formats.survey.trials import suffixes
+from calibration.formats.survey.trials import kind_of, suffixes
 from calibration.formats.survey.view import FileView
 from calibration.formats.survey.wrist_sign import convention_of
 from calibration.robot.chain import chain_of_frames
@@ -136,6 +136,20 @@ def test_files_of_one_trial_share_what_is_before_their_ends(tmp_path):
     ]
     assert set(suffixes(views).values()) == set(kinds)
     assert suffixes(views[:2]) == {"day_1_mocap.csv": "_mocap.csv", "day_1_robot.csv": "_robot.csv"}
+
+
+@pytest.mark.parametrize(("angles", "kind"), [((0.4, 0.4, 0.4, 0.4), "swing"), ((0.4, 0.9, 1.4, 0.1), "static")])
+def test_a_swing_that_halts_where_it_began_is_no_tour_of_postures(angles, kind):
+    t = np.arange(0.0, 20.0, 0.01)
+    q = np.zeros((len(t), 2))
+    for k, angle in enumerate(angles):
+        inside = (t >= 5.0 * k) & (t < 5.0 * (k + 1))
+        s, before = t[inside] - 5.0 * k, angles[max(k - 1, 0)]
+        moving = np.sin(np.pi * s / 3.0) ** 2 * 0.3 + before + (angle - before) * np.clip(s / 3.0, 0.0, 1.0)
+        q[inside] = np.where(s < 3.0, moving, angle)[:, None]
+    none = np.full((len(t), 2), np.nan)
+    joints = Joints(t, ("a", "b"), q, none, none, none, none)
+    assert kind_of(Recorded("a.csv", joints=joints), []) == kind
 
 
 def test_a_draft_imports_as_it_is_and_asks_what_no_file_says(tmp_path):
