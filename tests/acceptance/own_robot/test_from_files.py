@@ -29,11 +29,11 @@ def errors(folder: Path) -> dict[tuple[str, ...], float]:
     return {tuple(row[k] for k in keys): row["position_rmse_norm_mm"] for row in rows}
 
 
-@pytest.fixture(scope="module")
-def native(tmp_path_factory) -> Path:
-    """The short variant of the default campaign, processed from its own dataset."""
-    folder = tmp_path_factory.mktemp("native")
-    steps.simulate(steps.load("humanoids2024", ["seed=3"]).quick(), folder / "run")
+@pytest.fixture(scope="module", params=["short", "whole"])
+def native(request, tmp_path_factory) -> Path:
+    """The default campaign, and its short variant, processed from their own datasets."""
+    folder, scenario = tmp_path_factory.mktemp("native"), steps.load("humanoids2024", ["seed=3"])
+    steps.simulate(scenario.quick() if request.param == "short" else scenario, folder / "run")
     process(folder / "run/dataset", folder / "processed")
     return folder
 
