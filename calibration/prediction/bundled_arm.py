@@ -5,8 +5,8 @@
     covariance of the hand's twist by what the arm adds:
         J_joint diag(V + (sigma_c tau)^2) J_joint' + J_column diag((sigma_b M)^2) J_column'
 
-V that of `LinkAngles`, with the readings' random error as the hand's markers showed it where that is more than what
-link encoders showed; of a joint at rest at least what they showed in dwells. sigma_c, sigma_b are the standard
+V that of `LinkAngles` and the readings' random error, as the hand's markers showed it beside that; of a joint at rest
+at least what link encoders showed in dwells. sigma_c, sigma_b are the standard
 deviations of the meshes' and the column's compliance.
 
 The base's tilt and accelerations load the drive trains, where its pose is known. Readings of which no motion is known
@@ -23,12 +23,11 @@ from calibration.numerics.compiled import njit
 from calibration.numerics.lie import adjoint, inverse
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending, moved
-from calibration.stages.drive_trains.drive_trains import DriveTrains, Stream, StreamState, stream_of
+from calibration.stages.drive_trains.drive_trains import RESTS, DriveTrains, Stream, StreamState, stream_of
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.suspension.floor_wrench import root_in_base
 
 _AT_REST = np.zeros((2, 3))
-_RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
 
 
 class ArmPositions(NamedTuple):
@@ -99,7 +98,7 @@ class BundledArm:
             found = robot.evaluated(q_motor, velocity, a, base, push)
             loads = LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
         angles = self.trains.of_loads(loads)
-        return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < _RESTS)
+        return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < RESTS)
 
     def at_rest(self, q_motor: np.ndarray, T_lab_base: np.ndarray | None = None) -> ArmPositions:
         """Of readings (n, k) at rest, each for itself; the base (4, 4) where it is known.
@@ -138,7 +137,7 @@ class BundledArm:
             drives, angles = self._stream.begin(t, moving, base)
         else:
             drives, angles = self._stream.step(before.drives, t, moving, base)
-        rests = np.abs(moving[1:2]) < _RESTS
+        rests = np.abs(moving[1:2]) < RESTS
         return ArmState(drives, ArmPositions(angles.q, angles.variance, drives.moment, drives.torque, rests))
 
     def proper(self, T_lab_base: np.ndarray | None, accelerations: np.ndarray | None = None) -> np.ndarray | None:
@@ -163,12 +162,10 @@ class BundledArm:
         """(n, m) of the chain's joints: random error of the reading where there is no drive train."""
         known = {q.name: q.sigma for train in self.trains.trains for q in train.parameters if np.isfinite(q.sigma)}
         sigma = np.array([known.get(f"gear.{joint}.compliance", 0.0) for joint in hand.chain.joints])
-        residual = {train.joint: train.residual for train in self.trains.trains}
-        driven = np.isin(hand.chain.joints, list(residual))
-        unseen = reading_sigma**2 - np.array([residual.get(joint, 0.0) for joint in hand.chain.joints]) ** 2
+        driven = np.isin(hand.chain.joints, [train.joint for train in self.trains.trains])
         own, torque, rests = (x[:, hand.chain.columns] for x in (positions.variance, positions.torque, positions.rests))
         own = np.maximum(own, np.where(rests, self.rest_sigma[hand.chain.columns] ** 2, 0.0))
-        return np.where(driven, own + np.maximum(unseen, 0.0) + (sigma * torque) ** 2, reading_sigma**2)
+        return np.asarray(np.where(driven, own + (sigma * torque) ** 2, 0.0) + reading_sigma**2)
 
     def column_covariance(self, hand: HandModel, positions: ArmPositions, T_base_hand: np.ndarray) -> np.ndarray:
         """(n, 6, 6) of the local twist of the hand at T_base_hand (n, 4, 4), by the column's compliance."""

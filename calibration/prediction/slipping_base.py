@@ -136,7 +136,7 @@ class SlippingBase:
             state = at.sprung(t, wrench, before, self.model.standing)
             driving = None if moving is None else self._driven(at.gravity, moving)
             slip = None if before is None else before.slip
-            return state._replace(slip=self._stream.stepped(Sample(t, at.action @ wrench, state.x[3:5], driving), slip))
+            return state._replace(slip=self._stream.stepped(Sample(t, at.action @ wrench, state.x[2:5], driving), slip))
         slip, modes, stream = before.slip, at.suspension.modes, self._stream
         place = Place(at.action, self.model.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity)
         earlier = Earlier(
@@ -164,7 +164,7 @@ class SlippingBase:
         """(6,) of the displacement in frame 0 [m2, rad2]."""
         found, own = np.empty(6), self._stream.direction
         found[list(PLANE)] = np.zeros(3) if state.slip is None else state.slip.variance(own)
-        found[list(HEAVE)] = own.heave_variance
+        found[list(HEAVE)] = own.heave.variance(np.zeros(3) if state.slip is None else state.slip.found[4])
         return found
 
     def _driven(self, gravity: np.ndarray, moving: np.ndarray) -> np.ndarray:
@@ -259,7 +259,7 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
         wrench, y and u, x, lags, moved, acceleration of `BaseState`; row, state, wheels of bases, found of `SlipState`.
     """
     w, x, own, change, turn = np.zeros((1, 6)), np.empty(6), np.empty((1, 6)), np.empty(6), np.zeros((1, 4, 4))
-    row, found, driving = np.empty(COLUMNS), np.empty((4, 3)), UNDRIVEN.copy()
+    row, found, driving = np.empty(COLUMNS), np.empty((5, 3)), UNDRIVEN.copy()
     for i in range(6):
         for c in range(6):
             w[0, i] += place.action[i, c] * wrench[c]
@@ -272,7 +272,7 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     if moving.shape[1]:
         driving = driven(tree, (dual, back), place.gravity, heaving, moving, work, room)
     after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes)
-    readings = w[0], x[3:5], driving, before.rest, before.row, before.found
+    readings = w[0], x[2:5], driving, before.rest, before.row, before.found
     step_members(after, readings, fitted, before.band, dt / STEPS, row, found)
     for i in range(6):
         own[0, i] = x[i]

@@ -42,7 +42,7 @@ def head_to_head(scenario: Scenario, out: Path) -> tuple[Magnitude, ...]:
     work = out / "work"
     twin.record(scenario.twin, scenario.seed, work, threads=1)
     dataset = calibration.load(work / "dataset")
-    estimate = calibration.calibrate(dataset, stages=("joints", "bundle"))
+    estimate = calibration.calibrate(dataset, stages=("suspension", "joints", "bundle"))
     found = figures(dataset, estimate, work / "truth")
     shutil.rmtree(work)
     return found

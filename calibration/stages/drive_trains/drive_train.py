@@ -71,7 +71,8 @@ class DriveTrain:
         link: (5,) offset of the link encoder from the motor's, and its eccentricity [rad]; NaN without one.
         start: Share of [D(tau - f_c), D(tau + f_c)] at which trials start, mean and standard deviation [-].
         torque_sigma: Standard deviation of the torque at which the side changes [N.m].
-        residual: Rms that trials left out kept of what the model explains, in motion [rad].
+        residual: Rms of what the model left of trials left out, in motion, where the side of the mesh is certain [rad].
+        doubt: The same where it is not, over the standard deviation of an even distribution between both ends [-].
         inertials: (p,) masses and first moments, less the nominal ones, that this joint's load identifies, in the order
             of `torques.inertials` [kg, kg.m]; empty: nominal.
         parameters: What is reported, with standard deviations.
@@ -87,6 +88,7 @@ class DriveTrain:
     start: tuple[float, float] = (0.5, 0.3)
     torque_sigma: float = 0.05
     residual: float = 0.0
+    doubt: float = 1.0
     inertials: np.ndarray = field(default_factory=lambda: np.zeros(0))
     parameters: tuple[Quantity, ...] = ()
 
@@ -110,6 +112,10 @@ class DriveTrain:
         torque = drive.torque + self.link_inertia * drive.a
         low, high = self.ends(torque[drive.begins[:-1]])
         return self.deltas(drive, torque, low + self.start[0] * (high - low))
+
+    def variance(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Variance (n,) [rad2] of a link in motion that is between low and high (n,) [rad]."""
+        return np.asarray(self.doubt**2 * (high - low) ** 2 / 12.0 + self.residual**2)
 
     def ends(self, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest delta (m,) [rad] at which friction holds the link under torques (m,) [N.m]."""

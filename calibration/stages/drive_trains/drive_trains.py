@@ -28,6 +28,7 @@ from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Driv
 from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, inertials
 from calibration.stages.suspension.floor_wrench import root_in_base
 
+RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
 _RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
 
 
@@ -136,7 +137,7 @@ class DriveTrains:
             delta = train.backlash(drive_motion([loads], j, inertials))
             bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
             q[:, j], low[:, j], high[:, j] = bare - delta.value, bare - delta.high, bare - delta.low
-            variance[:, j] = (delta.high - delta.low) ** 2 / 12.0 + train.residual**2
+            variance[:, j] = train.variance(delta.low, delta.high)
         return LinkAngles(q, low, high, variance)
 
 
@@ -230,7 +231,7 @@ def stream_of(trains: DriveTrains) -> Stream:
         offs * np.array([t.values[COMPLIANCE] for t in of])[:, None],
         np.array([t.motor for t in of]).reshape(-1, 4),
         np.array([not t.dynamic and t.form == "dead_zone" for t in of], dtype=bool),
-        np.array([t.residual**2 for t in of], dtype=float),
+        np.array([[t.doubt**2 / 12.0, t.residual**2] for t in of], dtype=float).reshape(-1, 2),
         np.array(robot.offset, dtype=float),
     )
     return Stream(trains, prepared, robot.root(None), scratch(robot.tree), room(1, k, True))

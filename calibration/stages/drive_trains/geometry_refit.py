@@ -3,9 +3,9 @@
     r = log6( (Q(n)^-1 T_measured)^-1 T_B_H(q_link, theta) )            Q  motion of what the column carries
 
 Static postures of all calibration trials, and some a second of those in which the arm moves, in one problem of the
-existing solver: base and hand frames, placements and zeros; joints' own random errors, as the evidence has them. Where
-the side of a mesh is not known, its interval widens the posture's covariance along that joint, and at rest so does what
-link encoders show there: a joint that no load holds on a side stops on either one, and its drive train may be wrong.
+existing solver: base and hand frames, placements and zeros; joints' own random errors, as the evidence has them. The
+variance of a link's angle widens the posture's covariance along that joint, and at rest so does what link encoders show
+there: a joint that no load holds on a side stops on either one, and its drive train may be wrong.
 
     s_j^2 = mean over dwells of (q_link - q_read)^2         of joint j [rad2]
 """
@@ -30,7 +30,7 @@ from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, harmonic_terms
-from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
+from calibration.stages.drive_trains.drive_trains import RESTS, DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.departures import TakenForKnown, shown_by, with_departures, with_gears
@@ -219,14 +219,14 @@ def _postures(  # noqa: PLR0913  the parts of one line
     bending: ColumnBending,
     at_rest: np.ndarray,
 ) -> Iterator[Postures]:
-    """Static postures, then those passed; at_rest (n_joints,) widens the static ones [rad]."""
+    """Static postures, then those passed; at_rest (n_joints,) widens those of joints at rest [rad]."""
     for k, one in enumerate(corrected):
         if len(one.trial.dwell_start):
             found = static_postures(description, [one.trial], robot, hand.chain.poses)
             yield _widened(one, found, robot, hand, bending, at_rest)
         elif np.ptp(one.loads.q, axis=0).max() > _MOVES:
             found = passing_postures(description, [one.trial], robot, _SPACING)
-            yield _widened(one, replace(found, motion=np.full(len(found), k)), robot, hand, bending, None)
+            yield _widened(one, replace(found, motion=np.full(len(found), k)), robot, hand, bending, at_rest)
 
 
 def _widened(  # noqa: PLR0913  the parts of one line
@@ -235,14 +235,14 @@ def _widened(  # noqa: PLR0913  the parts of one line
     robot: Clock,
     hand: HandModel,
     bending: ColumnBending,
-    at_rest: np.ndarray | None,
+    at_rest: np.ndarray,
 ) -> Postures:
-    """Postures with bending taken off and covariances widened along joints whose side is not known."""
-    t = _times(one, postures, at_rest is not None)
+    """Postures with bending taken off and covariances widened by what joints' angles are uncertain by."""
+    t = _times(one, postures)
     s = robot.from_mocap(t)
     k = np.clip(np.searchsorted(one.loads.t, s), 0, len(one.loads.t) - 1)
-    variance = (one.angles.high - one.angles.low)[k] ** 2 / 12.0
-    variance = variance if at_rest is None else np.maximum(variance, at_rest**2)
+    variance = one.angles.variance[k]
+    variance = np.where(np.abs(one.loads.v[k]) < RESTS, np.maximum(variance, at_rest**2), variance)
     Q = moved(hand, bending, postures.q, _at(one, robot, t))
     J = hand.joint_jacobians(postures.q)
     along = J * variance[:, None, hand.chain.columns]
@@ -253,9 +253,9 @@ def _widened(  # noqa: PLR0913  the parts of one line
     )
 
 
-def _times(one: CorrectedTrial, postures: Postures, static: bool) -> np.ndarray:
+def _times(one: CorrectedTrial, postures: Postures) -> np.ndarray:
     """Mocap times (n,) of postures, by their labels."""
-    if static:
+    if len(one.trial.dwell_start):
         middle = dwell_windows(one.trial).mean(axis=1)
         return np.array([middle[int(str(name).rsplit(" ", 1)[1])] for name in postures.label])
     after = [float(str(name).rsplit(" at ", 1)[1].split(" ")[0]) for name in postures.label]

@@ -20,8 +20,8 @@ from itertools import product
 import numpy as np
 
 from calibration.stages.drive_trains.drive_train import DriveTrain
-from calibration.stages.drive_trains.joint_data import REST, JointData
-from calibration.stages.drive_trains.link_motion import COULOMB
+from calibration.stages.drive_trains.joint_data import JointData
+from calibration.stages.drive_trains.link_motion import COULOMB, HALF_GAP
 from calibration.stages.drive_trains.quantities import covariance_of, reported
 from calibration.stages.drive_trains.steady_contact import SteadyContact, steady_contact
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -41,6 +41,8 @@ from calibration.stages.drive_trains.train_fit import (
 _MOST, _LEAST = 6, 0.005  # modes, and the least torque [N.m rms] one is worth: fewer make a load too large or small
 _THINNED = 10  # samples between those the modes are of
 _FRICTION, _TORQUE = 0.15, 0.045  # share of the friction, and [N.m], to which a load is not known
+_SURE, _FEW = 0.1, 20  # of the half gap that an error of the torque moves a link by; windows
+_OTHER_SIDE = 12.0**0.5  # doubt of a link that is at the other end each time
 _SPREAD = 0.15  # least standard deviation of where trials start [-]
 _GAPS = (0.0, 0.2, 0.35, 0.45)  # of the discrepancy's spread
 _SOFTNESS = (0.15, 0.5)  # of the prior
@@ -62,13 +64,13 @@ class Candidate:
     Attributes:
         fit: Of all trials.
         score: Of trials left out; less is better.
-        left_out: Rms of what is left of trials left out, in motion [rad].
+        left_out: (k,) windows of trials left out less their prediction [rad].
         covariance: (p + 5, p + 5) of theta and gamma.
     """
 
     fit: TrainFit
     score: float
-    left_out: float
+    left_out: np.ndarray
     covariance: np.ndarray
 
 
@@ -96,11 +98,13 @@ def identify(
     prior = prior_of(data, "dead_zone", backlash, deflection)
     chosen = best_train(Problem(joint, data, prior), coarse, backlash, deflection)
     fit = chosen.fit
+    residual, doubt = residual_and_doubt(chosen)
     train = replace(
         fit.problem.train(fit.theta),
         link=np.append(motor_offset - fit.gamma[0], -fit.gamma[1:]),
         start=_start(fit),
-        residual=chosen.left_out,
+        residual=residual,
+        doubt=doubt,
         inertials=modes @ fit.problem.modes(fit.theta),
         torque_sigma=torque_sigma(float(fit.problem.train(fit.theta).values[COULOMB])),
     )
@@ -110,6 +114,23 @@ def identify(
 def torque_sigma(coulomb: float) -> float:
     """Standard deviation [N.m] of the torque at which a link with this friction [N.m] changes its side."""
     return max(_FRICTION * coulomb, min(_TORQUE, 2.0 * _FRICTION * coulomb))
+
+
+def residual_and_doubt(chosen: Candidate) -> tuple[float, float]:
+    """Residual and doubt of a drive train, by windows whose side an error of the torque does not change, and others."""
+    fit, moves = chosen.fit, chosen.fit.problem.data.moves
+    train = fit.problem.train(fit.theta)
+    off = 2.0 * torque_sigma(float(train.values[COULOMB]))
+    ends = np.array([fit.problem.deltas(fit.theta, fit.gamma, x) for x in (-off, 0.0, off)])
+    wide, square = np.ptp(ends, axis=0), chosen.left_out**2
+    sure = moves & (wide <= _SURE * train.values[HALF_GAP])
+    if sure.sum() < _FEW:
+        return float(np.sqrt(square[moves].mean())), 1.0
+    least, open_ = float(square[sure].mean()), moves & ~sure
+    if not open_.any():
+        return float(np.sqrt(least)), 1.0
+    doubt = np.sqrt(max(square[open_].mean() - least, 0.0) / (wide[open_] ** 2 / 12.0).mean())
+    return float(np.sqrt(least)), float(np.clip(doubt, 1.0, _OTHER_SIDE))
 
 
 def _start(fit: TrainFit) -> tuple[float, float]:
@@ -238,11 +259,10 @@ def _predicting(fit: TrainFit, without: np.ndarray, covariance: np.ndarray) -> C
         trial = data.trial[rows][0]
         left[rows] = replace(problem, data=data.only(trial)).left(x[:n], x[n:])[rows[data.trial == trial]]
     size = sizes(problem, left, FLOORS[-1])
-    moves = data.known & (data.regime != REST)
-    moves = moves if moves.any() else data.known
+    moves = data.moves
     count = np.bincount(data.group[moves], minlength=len(size))
     score = float((count * np.log(size)).sum()) / problem.correlated
-    return Candidate(fit, score, float(np.sqrt(np.mean(left[moves] ** 2))), covariance)
+    return Candidate(fit, score, left, covariance)
 
 
 def _starts(problem: Problem) -> list[np.ndarray]:

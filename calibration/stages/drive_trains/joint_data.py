@@ -122,6 +122,12 @@ class JointData:
         return replace(self, y=np.where(self.trial == trial, np.nan, self.y))
 
     @property
+    def moves(self) -> np.ndarray:
+        """(k,) known windows in motion; all known ones where there are none."""
+        moves = self.known & (self.regime != REST)
+        return moves if moves.any() else self.known
+
+    @property
     def sliding(self) -> "JointData":
         """The data where the joint slides steadily alone; all of it where it never does."""
         slides = (self.regime == 0) & np.isfinite(self.y)

@@ -198,7 +198,7 @@ class Drives(NamedTuple):
         shifts: (m, c) that it winds a mesh up by [rad].
         motor: (m, 4) eccentricities [rad].
         plays: (m,) which are play operators.
-        residual: (m,) variance that trials left out kept [rad2].
+        doubt: (m, 2) variance over the square of the interval [-], and beside it [rad2].
         offset: (k,) zeros of all readings [rad, m].
     """
 
@@ -211,7 +211,7 @@ class Drives(NamedTuple):
     shifts: np.ndarray
     motor: np.ndarray
     plays: np.ndarray
-    residual: np.ndarray
+    doubt: np.ndarray
     offset: np.ndarray
 
 
@@ -278,7 +278,7 @@ def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarr
         bare = q[c] - e[0] * np.cos(theta) - e[1] * np.sin(theta) - e[2] * np.cos(2 * theta) - e[3] * np.sin(2 * theta)
         out[0, 0, c] = bare - (states[i, 0, 0] - drives.shifts[i, 0])
         out[1, 0, c], out[2, 0, c] = bare - top, bare - bottom
-        out[3, 0, c] = (top - bottom) ** 2 / 12.0 + drives.residual[i]
+        out[3, 0, c] = drives.doubt[i, 0] * (top - bottom) ** 2 + drives.doubt[i, 1]
 
 
 @njit(cache=True, error_model="numpy")

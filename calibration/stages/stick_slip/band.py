@@ -18,9 +18,13 @@ Where the band is wider than the slip that is predicted, that prediction is wort
     x <- x_el + w (x - x_el),   w = max(0, 1 - (V - s^2) / S)
 
 Then no slip is predicted, and the band is no narrower. An axis that the model does not move stays, or is linear, the
-better the less the base is shaken: V = s^2 + r^2 max_(t' < t) x_el^2.
+better the less the base is shaken: V = s^2 + r^2 max_(t' < t) x_el^2. Heave and tilt are linear, their band by what the
+plate's compliance left of the markers' e_t, means of blocks whose noise is white, over all trials but the worst:
+
+    r^2 = sum_t e_t e_(t+1) / sum_t max_(t' < t) h^2           not less than on robots of development
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,10 +41,11 @@ _DRAWS = 64  # from which the members are chosen
 _NORMAL = ndtri((np.arange(MEMBERS - 1) + 0.5) / (MEMBERS - 1))  # as normal as so few are
 _ROUGH = 4.0  # by which the cost varies between points next to each other: whether a wheel slides is a threshold
 LEAST = np.array([5e-6, 5e-6, 2e-5])  # [m, rad]: nothing is known better
+LEAST_HEAVE = np.array([[5e-6, 5e-6, 5e-6], [5e-2, 8e-3, 8e-3]])  # s [m, rad] and r [-] of z, rx, ry
 _DEGREES = 6.0  # nu
-_WIDER = 1.2  # variance of the band over V: what a trial in twenty shows beyond the spread of most
-PRIOR = np.log([[9e-6, 1.14, 0.61, 1.8e-2], [6e-6, 1.35, 0.19, 3e-3], [37e-6, 1.28, 0.21, 3e-3]])  # x, y, yaw
-FURTHER = np.log([1.2, 1.5, 1.6, 8.0])  # where no plate corrects the prediction
+_WIDER = 1.1  # variance of the band over V: what a trial in twenty shows beyond the spread of most
+PRIOR = np.log([[9e-6, 0.9, 0.35, 1.8e-2], [6e-6, 1.35, 0.19, 3e-3], [37e-6, 1.0, 0.21, 3e-3]])  # x, y, yaw
+FURTHER = np.log([1.2, 1.8, 1.5, 3.0])  # where no plate corrects the prediction
 WIDTH = np.array([1.0, 0.3, 0.4, 1.0])  # left-out `around_z` alone would make l as large as what it shows of frictions
 LIKE = 15.0  # [N.m] by which a load at the start is like another
 _PLAIN, _PLAIN_WIDTH = 0.3, np.array([1.5, 1.5])  # r, and what the logarithms of s and r are uncertain by
@@ -80,7 +85,7 @@ def other_start(load: np.ndarray, usual: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class PlainBand:
-    """The band of x, y, yaw where the stick-slip model does not move them.
+    """The band of three axes that the stick-slip model does not move.
 
     Attributes:
         floor: s (3,) [m, rad].
@@ -91,7 +96,7 @@ class PlainBand:
     growth: np.ndarray
 
     def variance(self, reached: np.ndarray) -> np.ndarray:
-        """V (n, 3) of the largest squares of x_el (n, 3)."""
+        """V (n, 3) of `reached` of x_el (n, 3)."""
         return self.floor**2 + self.growth**2 * reached
 
 
@@ -109,6 +114,21 @@ def plain_band(square: np.ndarray, reach: np.ndarray, noise: np.ndarray) -> Plai
         found.append(_fitted(square[:, a], np.stack([ones, reach[:, a]]), start, _PLAIN_WIDTH, float(noise[a] ** 2)))
     scale = np.sqrt(_WIDER)
     return PlainBand(*(scale * np.array(found)).T)
+
+
+def heave_band(left: Sequence[np.ndarray], reach: Sequence[np.ndarray]) -> PlainBand:
+    """The band of z, rx, ry by what successive blocks left (b, 3), NaN where not seen, and `reached` in them (b, 3)."""
+    common, most = np.zeros((len(left), 3)), np.zeros((len(left), 3))
+    for k, (e, h) in enumerate(zip(left, reach, strict=True)):
+        e = e - np.nanmean(e, axis=0)
+        steps = np.diff(e, axis=0)
+        noise = 0.5 * np.nansum(steps**2, axis=0) / np.maximum(np.isfinite(steps).sum(axis=0), 1)
+        common[k] = np.nansum(e[1:] * e[:-1], axis=0) + noise  # of which the mean took as much
+        most[k] = np.where(np.isfinite(e), h, 0.0).sum(axis=0)
+    worst, axes = common.argmax(axis=0), np.arange(3)
+    common, most = (x.sum(axis=0) - x[worst, axes] for x in (common, most))
+    growth = np.sqrt(np.maximum(common, 0.0) / np.maximum(most, np.finfo(float).tiny))
+    return PlainBand(LEAST_HEAVE[0].copy(), np.maximum(growth, LEAST_HEAVE[1]))
 
 
 def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -194,16 +214,18 @@ def banded(
     before: np.ndarray,
     band: np.ndarray,
     elastic: np.ndarray,
+    heave: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Band and believed motion of one sample: rows S, x, variance, largest square of x_el.
+    """Band and believed motion of one sample: rows S, x, variance, largest squares of x_el and of heave and tilt.
 
     Args:
         ensemble: As of `advance_members`, (3,) each.
-        before: (4, 3) as returned a sample ago.
+        before: (5, 3) as returned a sample ago.
         band: (4, 3) s, r, p g, l.
         elastic: (3,) what springs alone do.
-        out: (4, 3), filled.
+        heave: (3,) z, rx, ry.
+        out: (5, 3), filled.
     """
     moved, spread, preloaded = ensemble
     for a in range(3):
@@ -213,3 +235,4 @@ def banded(
         kept = 1.0 - min(excess / largest, 1.0) if largest > 0.0 else 0.0
         out[0, a], out[1, a], out[2, a] = largest, elastic[a] + kept * slip, band[0, a] ** 2 + excess
         out[3, a] = max(before[3, a], elastic[a] * elastic[a])
+        out[4, a] = max(before[4, a], heave[a] * heave[a])

@@ -6,9 +6,8 @@
 all in frame 0, about its origin; p: x, y, yaw, h: z, rx, ry; M(q) the composite inertia of the nominal robot with the
 payload of the trial. Heave and tilt are those of the 6x6 compliance under the same source. Forces in the floor's plane
 count from their mean in the first second. A sample takes STEPS steps, the first at its time: its position is that of
-the last one, 5 ms later. One that ends at its time follows the plate 5 ms late, for a correction acts a step after its
-force. Where there are no joint readings the base has no inertia: then the plate alone moves it, at the rate of the
-correction.
+the last one, 5 ms later; one that ended at its time would follow the plate 5 ms late, a correction acts a step late.
+Where there are no joint readings the base has no inertia: then the plate alone moves it, at the rate of the correction.
 """
 
 from dataclasses import dataclass, field, replace
@@ -249,15 +248,16 @@ def _swayed(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) ->
     return heave, linear
 
 
-def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases) -> np.ndarray | None:
-    """Mean squares (3,) of z, rx, ry by inverse dynamics less those by the plate [m2, rad2]; None without either."""
+def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases | None) -> np.ndarray | None:
+    """Mean squares (2, 3) of z, rx, ry by dynamics less the plate's, and of what these reach; None without either."""
     load = wrenches.moved_by("dynamics")
     if load is None or wrenches.plate is None:
         return None
-    found = _heaving(wrenches, tilting, slips, forcing_of(load, wrenches.start))
-    grid, compliant = _compliant(wrenches, tilting, "plate", wrenches.plate)
-    inside = (grid >= found.x[0]) & (grid <= found.x[-1])
-    return np.asarray(((found(grid[inside]) - compliant[inside][:, HEAVE]) ** 2).mean(axis=0))
+    found, _ = _swayed(replace(wrenches, seen=False, slips=slips), tilting, "dynamics", load)
+    t, compliant = _compliant(wrenches, tilting, "plate", wrenches.plate)
+    inside = (t >= found.x[0]) & (t <= found.x[-1])
+    h = compliant[inside][:, HEAVE]
+    return np.stack([((found(t[inside]) - h) ** 2).mean(axis=0), np.maximum.accumulate(h**2).mean(axis=0)])
 
 
 def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcing) -> CubicSpline:

@@ -9,7 +9,7 @@ predicted motion alike, stand for an anti-aliasing filter.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import GAP, RATE
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
-from calibration.stages.stick_slip.forcing import PlanarForcing
+from calibration.stages.stick_slip.forcing import HEAVE, PlanarForcing
 from calibration.stages.suspension.rest_frame import Rest
 
 BLOCK = 5  # samples averaged together
@@ -32,11 +32,13 @@ class PlanarMotion:
         x: (b, 3) x, y, yaw [m, rad] since the first second, frame 0.
         valid: (b,) False where markers are missing.
         noise: (3,) standard deviation of a block, from the first second.
+        tilted: (b, 3) z, rx, ry beyond the forcing's; NaN where markers are missing.
     """
 
     x: np.ndarray
     valid: np.ndarray
     noise: np.ndarray
+    tilted: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: PlanarForcing) -> PlanarMotion:
@@ -53,15 +55,16 @@ def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: P
     right = np.clip(np.searchsorted(t, forcing.t), 1, len(t) - 1)
     seen = (np.diff(t)[right - 1] <= GAP) & (forcing.t >= t[0]) & (forcing.t <= t[-1])
     c_z = float(rest.T_0_B[2, 3] + (rest.T_0_B[:3, :3] @ np.mean([m.xyz for m in body.markers], axis=0))[2])
-    excess = x[:, 3:5] - forcing.heave[:, 1:]
-    plane = np.column_stack([x[:, 0] + c_z * excess[:, 1], x[:, 1] - c_z * excess[:, 0], x[:, 5]])
+    excess = x[:, HEAVE] - forcing.heave
+    plane = np.column_stack([x[:, 0] + c_z * excess[:, 2], x[:, 1] - c_z * excess[:, 1], x[:, 5]])
     early = forcing.rest & seen
     if early.sum() < 0.5 * REST * RATE:
         raise NotEnoughData(f"{trial.id}: base markers are missing in most of the first second")
     plane = plane - plane[early].mean(axis=0)
     noise = blocks(plane[early]).std(axis=0, ddof=1)
     b = n // BLOCK
-    return PlanarMotion(blocks(plane), seen[: b * BLOCK].reshape(b, BLOCK).all(axis=1), noise)
+    valid = seen[: b * BLOCK].reshape(b, BLOCK).all(axis=1)
+    return PlanarMotion(blocks(plane), valid, noise, np.where(valid[:, None], blocks(excess), np.nan))
 
 
 def blocks(x: np.ndarray) -> np.ndarray:

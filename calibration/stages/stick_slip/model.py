@@ -48,7 +48,7 @@ class Direction:
         linear: (3,) axes that the compliance predicts better.
         plain: Band of the axes that are linear or stay.
         by_plate: Whether the plate's force corrects the prediction, where it is the source.
-        heave_variance: (3,) of z, rx, ry, what the compliance left of trials it had not seen [m2, rad2].
+        heave: Band of z, rx, ry.
     """
 
     source: Source
@@ -59,8 +59,7 @@ class Direction:
     held_out: HeldOut
     linear: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=bool))
     plain: PlainBand = field(default_factory=lambda: PlainBand(np.full(3, 1e-3), np.ones(3)))
-    heave_variance: np.ndarray = field(default_factory=lambda: np.zeros(3))
-
+    heave: PlainBand = field(default_factory=lambda: PlainBand(np.zeros(3), np.zeros(3)))
     by_plate: bool = field(default_factory=lambda: True)
 
     @property
@@ -162,7 +161,8 @@ class StickSlip:
         plane = self.predict(forcing)
         x, variance = np.empty((len(plane.x), 6)), np.empty((len(plane.x), 6))
         x[:, PLANE], variance[:, PLANE] = plane.x, plane.variance
-        x[:, HEAVE], variance[:, HEAVE] = forcing.heave, self.direction(forcing.source).heave_variance
+        x[:, HEAVE] = forcing.heave
+        variance[:, HEAVE] = self.direction(forcing.source).heave.variance(reached(forcing.heave))
         return x, variance
 
 

@@ -20,7 +20,7 @@ from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.stick_slip.band import PlainBand, plain_band, reached
+from calibration.stages.stick_slip.band import PlainBand, heave_band, plain_band, reached
 from calibration.stages.stick_slip.fit import fit_direction
 from calibration.stages.stick_slip.forcing import (
     HEAVE,
@@ -94,9 +94,9 @@ def fit_stick_slip(
     if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
     directions = [_linear(fit, suspension) for fit in fits]
+    directions = [_banded(d, wheels, rows) for d, (_, rows, _) in zip(directions, usable, strict=True)]
     if len(directions) == len(SOURCES):
-        directions[1] = _heaved(directions[1], directions[0].heave_variance, wheels, tilting, read)
-    directions = [replace(d, plain=_plain(d, wheels, rows)) for d, (_, rows, _) in zip(directions, usable, strict=True)]
+        directions[1] = _heaved(directions[1], wheels, tilting, read)
     model = StickSlip(wheels, tilting, tuple(directions))
     misplaced = _misplaced(wheels.names, shift, chi2) if directions[0].is_of_wheels else ()
     names = [one.trial.id for one in read]
@@ -151,9 +151,9 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
     slips, held_out = direction.held_out, dict(suspension.held_out)
     tried = held_out.get(direction.source, suspension.held_out[0][1])
     variance = tried.variance(np.ones(6, dtype=bool))
-    plane, heave = variance[list(PLANE)], variance[list(HEAVE)]
+    plane = variance[list(PLANE)]
     if direction.source not in held_out:
-        return replace(direction, heave_variance=heave)
+        return direction
     calm, moved = slips.only(~slips.wild), direction.moved
     linear = tried.moves[list(PLANE)] & (plane < slips.variance(moved) / _BETTER)
     if calm.r2[2] >= EXPLAINED:
@@ -162,33 +162,35 @@ def _linear(direction: Direction, suspension: Suspension) -> Direction:
         linear &= (plane < _BETTER * slips.variance(moved)) & (still < _BETTER * calm.variance(moved))
     if linear[2]:
         linear |= tried.moves[list(PLANE)] & (plane < slips.variance(moved) / _BETTER)
-    return replace(direction, linear=linear, heave_variance=heave)
+    return replace(direction, linear=linear)
 
 
-def _heaved(
-    direction: Direction, plate: np.ndarray, wheels: WheelSet, tilting: Tilting, read: Sequence[Read]
-) -> Direction:
-    """By inverse dynamics: heave and tilt err as the plate's do, variances (3,), and as they differ from those.
+def _heaved(direction: Direction, wheels: WheelSet, tilting: Tilting, read: Sequence[Read]) -> Direction:
+    """By inverse dynamics: heave and tilt err as the plate's do, and as they differ from those.
 
     Markers hardly show either beside their noise.
     """
-    if not direction.slips.any():
-        return direction
-    slips = bases_of(wheels, direction.logarithms[None], corrected=False)
+    slips = bases_of(wheels, direction.logarithms[None], corrected=False) if direction.slips.any() else None
     found = side_by_side(lambda one: heave_apart(one.wrenches, tilting, slips), read)
-    apart = [square for square in found if square is not None]
-    return replace(direction, heave_variance=plate + np.mean(apart, axis=0)) if apart else direction
+    apart, plate = np.array([squares for squares in found if squares is not None]), direction.heave
+    if not len(apart):
+        return direction
+    other = plain_band(apart[:, 0], apart[:, 1], np.zeros(3))
+    heave = PlainBand(np.hypot(plate.floor, other.floor), np.hypot(plate.growth, other.growth))
+    return replace(direction, heave=heave)
 
 
-def _plain(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]]) -> PlainBand:
-    """The band of axes that are linear or stay, by what that leaves of the trials."""
+def _banded(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]]) -> Direction:
+    """With bands of heave, tilt and axes that are linear or stay, by what that leaves of the trials."""
     compliance, square, reach = np.linalg.inv(wheels.stiffness(direction.parameters)), [], []
+    rows = [(forcing, motion) for forcing, motion in rows if motion.valid.any()]
     for forcing, motion in rows:
-        if motion.valid.any():
-            left = motion.x - blocks(np.where(direction.linear, forcing.linear, 0.0))
-            square.append((left[motion.valid] ** 2).mean(axis=0))
-            reach.append(blocks(reached(forcing.force @ compliance))[motion.valid].mean(axis=0))
-    return plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
+        left = motion.x - blocks(np.where(direction.linear, forcing.linear, 0.0))
+        square.append((left[motion.valid] ** 2).mean(axis=0))
+        reach.append(blocks(reached(forcing.force @ compliance))[motion.valid].mean(axis=0))
+    plain = plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
+    heave = heave_band([motion.tilted for _, motion in rows], [blocks(reached(f.heave)) for f, _ in rows])
+    return replace(direction, plain=plain, heave=heave)
 
 
 def _prior(wheels: WheelSet, suspension: Suspension) -> Prior:
@@ -206,17 +208,20 @@ def _shifts(
     """
     wild = fit.held_out.wild
     calm = joined(campaign.wheels, [row for row, far in zip(rows, wild, strict=True) if not far], campaign.prior)
-    points = [fit.logarithms]
-    if wild.any():
-        points.append(descended(calm, tried(calm, points)[0]).logarithms)
-    shifts, chi2 = (np.array(column) for column in zip(*(displaced(calm, p) for p in points), strict=True))
-    least, own = chi2.argmin(axis=0), np.arange(len(campaign.wheels.names))
-    return shifts[least, own], chi2[least, own]
+    shift, chi2 = displaced(calm, fit.logarithms)
+    if wild.any() and _elsewhere(shift, chi2).any():
+        other, own = displaced(calm, descended(calm, tried(calm, [fit.logarithms])[0]).logarithms)
+        shift, chi2 = np.where((own < chi2)[:, None], other, shift), np.minimum(own, chi2)
+    return shift, chi2
+
+
+def _elsewhere(shift: np.ndarray, chi2: np.ndarray) -> np.ndarray:
+    return np.asarray((np.abs(shift).max(axis=1) > _ELSEWHERE) & (chi2 > _SHOWN))
 
 
 def _misplaced(names: Sequence[str], shift: np.ndarray, chi2: np.ndarray) -> Iterator[Verdict]:
     """The wheel that the trials put elsewhere, by shifts (m, 2) [m] and their chi-squares (m,); others like it."""
-    far = np.where((np.abs(shift).max(axis=1) > _ELSEWHERE) & (chi2 > _SHOWN), chi2, 0.0)
+    far = np.where(_elsewhere(shift, chi2), chi2, 0.0)
     if far.any():
         likely = [k for k in np.argsort(-far) if far[k] > _ALIKE * far.max()]
         places = (

@@ -34,14 +34,14 @@ class Sample(NamedTuple):
     Attributes:
         t: [s].
         wrench: (6,) action on the floor in frame 0, by the plate [N, N.m].
-        tilt: (2,) rx, ry since the first second [rad], as the compliance has them.
+        heave: (3,) z, rx, ry since the first second [m, rad], as the compliance has them.
         driving: (9,) Fx, Fy, Mz of inverse dynamics, tilt's inertia taken off, and M in the plane, row by row, upper;
             None without.
     """
 
     t: float
     wrench: np.ndarray
-    tilt: np.ndarray
+    heave: np.ndarray
     driving: np.ndarray | None = None
 
 
@@ -75,7 +75,7 @@ class SlipState(NamedTuple):
         n: Samples in that mean.
         before: (11,) the last sample as the kernel takes it.
         bases: The members, then the preloaded optimum.
-        found: (4, 3) see `banded`.
+        found: (5, 3) see `banded`.
         band: (4, 3) s, r, p g, l of a trial that begins so.
         x: (3,) x, y, yaw [m, rad, frame 0].
     """
@@ -118,7 +118,7 @@ class SlipStream:
         driving = UNDRIVEN if sample.driving is None else sample.driving
         if before is None or sample.t <= before.start + REST:
             row = np.empty(COLUMNS)
-            sample_row(sample.wrench, sample.tilt, driving, _NO_REST, self.fitted.off, row)
+            sample_row(sample.wrench, sample.heave, driving, _NO_REST, self.fitted.off, row)
             planar, row = np.concatenate([row[PLATE:], row[:3]]), row * _LOADS
             if before is None:
                 return self._first(sample.t, row, planar)
@@ -127,12 +127,12 @@ class SlipStream:
         was = before.bases
         bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes)
         row, found = np.empty(COLUMNS), np.empty_like(before.found)
-        readings = sample.wrench, sample.tilt, driving, before.rest, before.before, before.found
+        readings = sample.wrench, sample.heave, driving, before.rest, before.before, before.found
         step_members(bases, readings, self.fitted, before.band, (sample.t - before.t) / STEPS, row, found)
         return before._replace(t=sample.t, before=row, bases=bases, found=found, x=found[1] * self.fitted.moves)
 
     def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
-        of, none = self.direction.band.begun(row[3:6]), np.zeros((4, 3))
+        of, none = self.direction.band.begun(row[3:6]), np.zeros((5, 3))
         none[2] = of.floor**2
         band = np.array([of.floor, of.spread, of.start, of.slip])
         e = np.zeros((*self.wheels.shape[:2], 2))
@@ -192,13 +192,13 @@ def advance_members(
 
 @njit(cache=True, error_model="numpy")
 def sample_row(
-    wrench: np.ndarray, tilt: np.ndarray, driving: np.ndarray, rest: np.ndarray, off: np.ndarray, row: np.ndarray
+    wrench: np.ndarray, heave: np.ndarray, driving: np.ndarray, rest: np.ndarray, off: np.ndarray, row: np.ndarray
 ) -> None:
     """A sample as `advance` takes it (11,), less what rests (6,): the plate's (Fx, Fy, Mz), inverse dynamics'."""
     for a in range(3):
         row[a] = driving[a] - rest[3 + a]
     row[3], row[4], row[5] = -wrench[2], wrench[4] + wrench[2] * off[0], -wrench[3] + wrench[2] * off[1]
-    row[6], row[7] = tilt[0], tilt[1]
+    row[6], row[7] = heave[1], heave[2]
     row[8], row[9], row[10] = wrench[0] - rest[0], wrench[1] - rest[1], wrench[5] - rest[2]
 
 
@@ -216,16 +216,16 @@ def step_members(
 
     Args:
         bases: States and deflections are changed.
-        readings: Wrench, tilt, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
+        readings: Wrench, heave, driving (9,) and rest of `sample_row`; `row` and `found` of the sample before.
         fitted: Members, bases and K_0^-1.
         band: (4, 3) of `banded`.
         h: [s].
         row: (11,) of this sample, filled.
-        found: (4, 3) of `banded`, filled.
+        found: (5, 3) of `banded`, filled.
     """
-    wrench, tilt, driving, rest, earlier, before = readings
+    wrench, heave, driving, rest, earlier, before = readings
     drive, inertia, elastic = np.empty((STEPS, COLUMNS)), np.zeros(15), np.zeros(3)
-    sample_row(wrench, tilt, driving, rest, fitted.off, row)
+    sample_row(wrench, heave, driving, rest, fitted.off, row)
     for s in range(STEPS):
         for c in range(COLUMNS):
             drive[s, c] = earlier[c] + (s + 1.0) / STEPS * (row[c] - earlier[c])
@@ -234,4 +234,4 @@ def step_members(
     for i in range(3):
         for c in range(3):
             elastic[i] += fitted.compliance[i, c] * row[PLATE + c]
-    banded(advance_members(bases, drive, inertia, h, fitted.members, fitted.k), before, band, elastic, found)
+    banded(advance_members(bases, drive, inertia, h, fitted.members, fitted.k), before, band, elastic, heave, found)

@@ -3,11 +3,13 @@ import pytest
 
 from calibration.stages.stick_slip.band import (
     LEAST,
+    LEAST_HEAVE,
     PRIOR,
     Band,
     LeftOut,
     ensemble_of,
     fitted_band,
+    heave_band,
     other_start,
     plain_band,
     reached,
@@ -87,3 +89,32 @@ def test_an_axis_that_is_not_moved_is_known_the_less_the_more_the_base_is_shaken
     V = band.variance(reached(np.array([[1e-6], [3e-3], [-1e-6]]) * np.ones(3)))
     assert np.all(V[0] < 1e-9) and np.all(np.abs(np.sqrt(V[1]) / 1.5e-3 - 1.0) < 0.6)
     np.testing.assert_array_equal(V[2], V[1])
+
+
+def tilted(rng, growth, noise, n=13, b=400):
+    """Trials in which heave and tilt err by a share of what they reach, slowly, and markers by white noise."""
+    t = np.arange(b)[:, None]
+    reach = [np.maximum.accumulate((s * np.sin(t / 40.0) * np.ones(3)) ** 2) for s in rng.uniform(5e-4, 3e-3, n)]
+    slow = [np.sin(t / rng.uniform(3.0, 30.0, 3) + rng.uniform(0.0, 6.3, 3)) * np.sqrt(2.0 * h) for h in reach]
+    return [growth * e + noise * rng.normal(size=e.shape) for e in slow], reach
+
+
+@pytest.mark.parametrize(("growth", "noise"), [(0.02, 1e-7), (0.02, 1e-4), (0.2, 1e-4)])
+def test_tilt_errs_by_the_share_that_markers_show_beneath_their_noise(growth, noise):
+    found = heave_band(*tilted(np.random.default_rng(3), growth, noise))
+    np.testing.assert_allclose(found.growth[1:], growth, rtol=0.25)
+
+
+def test_what_noise_hides_of_a_tilt_is_not_known_to_be_nothing():
+    hidden = heave_band(*tilted(np.random.default_rng(4), 1e-5, 1e-4)).growth
+    assert np.all(hidden[1:] >= LEAST_HEAVE[1, 1:]) and np.all(hidden[1:] < 2.0 * LEAST_HEAVE[1, 1:])
+    np.testing.assert_array_equal(heave_band(*tilted(np.random.default_rng(4), 1e-5, 1e-7)).growth, LEAST_HEAVE[1])
+
+
+def test_one_trial_in_which_wheels_lift_off_does_not_widen_the_band_of_tilt():
+    left, reach = tilted(np.random.default_rng(5), 0.02, 1e-5)
+    before = heave_band(left, reach).growth
+    left[4] = 20.0 * left[4]
+    assert np.all(heave_band(left, reach).growth < 1.2 * before)
+    left[5] = np.where(np.arange(400)[:, None] % 7, left[5], np.nan)
+    assert np.all(np.isfinite(heave_band(left, reach).growth))

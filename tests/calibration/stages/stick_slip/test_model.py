@@ -88,12 +88,26 @@ def test_samples_one_by_one_are_what_a_recording_is(model, new):
         now = forcing.drive[STEPS * k]
         wrench = np.array([*now[8:10], -WEIGHT[0], -WEIGHT[2], WEIGHT[1], now[10]])
         driving = np.concatenate([now[:3], MASS[np.triu_indices(3)]])
-        sample = Sample(float(t), wrench, np.zeros(2), driving)
+        sample = Sample(float(t), wrench, np.zeros(3), driving)
         state = stream.stepped(sample, state)
         x.append(state.x)
     moved = np.abs(batch.x).max(axis=0)
     assert np.all(np.abs(np.array(x) - batch.x).max(axis=0) < 0.02 * moved)
     np.testing.assert_allclose(state.variance(model.directions[0]), batch.variance[-1], rtol=0.5)
+
+
+def test_heave_and_tilt_are_as_uncertain_sample_by_sample_as_in_a_recording(model, new):
+    forcing, direction = (
+        new[0],
+        replace(model.directions[0], heave=PlainBand(np.full(3, 5e-6), np.array([0.1, 0.02, 0.03]))),
+    )
+    heave = 1e-3 * np.sin(np.cumsum(~forcing.rest) / 30.0)[:, None] * [0.1, 1.0, 2.0]
+    known = replace(model, directions=(direction,))
+    stream, state, expected = slip_stream(known), None, known.displacement(replace(forcing, heave=heave))[1][:, 2:5]
+    for t, h in zip(forcing.t, heave, strict=True):
+        state = stream.stepped(Sample(float(t), np.array([0.0, 0.0, -700.0, 0.0, 0.0, 0.0]), h), state)
+    np.testing.assert_allclose(direction.heave.variance(state.found[4]), expected[-1], rtol=1e-12)
+    assert expected[-1, 1] == pytest.approx(25e-12 + 4e-4 * 1e-6, rel=1e-2)
 
 
 def test_a_plate_alone_moves_a_base_of_no_inertia(model, new):
@@ -102,7 +116,7 @@ def test_a_plate_alone_moves_a_base_of_no_inertia(model, new):
     for k, t in enumerate(forcing.t):
         last = forcing.drive[STEPS * k + STEPS - 1]
         wrench = np.array([*last[8:10], -WEIGHT[0], -WEIGHT[2], WEIGHT[1], last[10]])
-        state = stream.stepped(Sample(float(t), wrench, np.zeros(2)), state)
+        state = stream.stepped(Sample(float(t), wrench, np.zeros(3)), state)
         x.append(state.x)
     error = np.abs(np.array(x) - true).mean(axis=0)
     assert np.all(error < 0.5 * np.abs(true).mean(axis=0))
