@@ -137,10 +137,13 @@ def other_sides(
 def left_out(
     postures: Postures, found: RobustFit, usual: float = 0.0, explained: np.ndarray | None = None
 ) -> Iterator[Verdict]:
-    """The postures that were not used, by name; up to a share `usual` of good ones contradict a fine model as well."""
+    """The postures that were not used, by name; up to a share `usual` of good ones contradict a fine model as well.
+
+    A joint on the other side explains one only where it explains all: beside wrong postures it may be wrong, too.
+    """
     odd, n = ~found.kept, len(postures)
     sides = odd & explained if explained is not None else np.zeros(n, dtype=bool)
-    if sides.sum() > _OTHER_SIDE * n or odd.sum() > MANY_ODD * n:
+    if (odd & ~sides).any() or sides.sum() > _OTHER_SIDE * n:
         sides = np.zeros(n, dtype=bool)
     name = postures.label if len(postures.label) else np.arange(n).astype(str)
     if sides.any():

@@ -216,6 +216,18 @@ def test_a_link_alone_on_the_other_side_of_its_gap_is_no_contradiction(chain, of
     assert [v.verdict for v in verdicts if words in v.message] == [kind]
 
 
+def test_beside_a_wrong_posture_the_other_side_of_a_gap_explains_none(chain):
+    truth = rigid_robot.defects(1)
+    q = rigid_robot.random_angles(np.random.default_rng(0), 30)
+    found = rigid_robot.postures(truth, q, 2e-5)
+    read, T = q + truth.offset, found.T_base_hand.copy()
+    read[7, 6] += 0.03
+    T[12, 0, 3] += 0.3
+    verdicts = calibrate_geometry(chain, rigid_robot.described(), replace(found, q=read, T_base_hand=T))[1]
+    (named,) = [v.message for v in verdicts if "left out" in v.message]
+    assert "contradict" in named and named.endswith("7, 12")
+
+
 def test_three_postures_are_refused(chain):
     postures = with_play(rigid_robot.defects(1), rigid_robot.near_postures(np.random.default_rng(1), 3))
     assert "3 distinct postures" in refusals(chain, postures)
