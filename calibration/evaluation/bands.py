@@ -4,7 +4,8 @@
     |e| <= radius of 95 %           inside; of |e|^2 as a gamma variable, see `hand_uncertainty`
 
 S is the covariance of the hand's local twist in the base: parameters, readings, drive trains, column; V (6,) variances
-of the base's displacement in frame 0, or of its markers' pose where it is measured. Noise of a reference is added.
+of the base's displacement in frame 0, or of its markers' pose where it is measured; a base on wheels that is taken to
+stay has no band without a suspension. Noise of a reference is added.
 """
 
 from collections.abc import Mapping
@@ -50,11 +51,15 @@ class Bands:
         base = poses_of(self.description.base_body, trial).covariance * self.description.sigmas.marker**2
         rows = (
             replace(row, covariance=_in_lab(row, S[row.model], base, predicted))
-            if row.model in S and row.encoder == "motor"
+            if row.model in S and row.encoder == "motor" and not self._unknown(row, predicted)
             else row
             for row in predicted.rows
         )
         return replace(predicted, rows=tuple(rows))
+
+    def _unknown(self, row: Prediction, predicted: PredictedTrial) -> bool:
+        """Whether the row leaves a base on wheels where it was and nothing says how far it moves."""
+        return row.base == "fixed" and predicted.base is None and bool(self.description.wheels)
 
     @property
     def _rows(self) -> Mapping[str, LadderRow]:

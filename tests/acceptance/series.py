@@ -79,16 +79,22 @@ def kept_series(name: str, make: Callable[[str], Path], overrides: tuple[str, ..
 
 
 def series(
-    folder: Path, seeds: Iterable[int], overrides: tuple[str, ...] = (), scenario: str = "humanoids2024"
+    folder: Path,
+    seeds: Iterable[int],
+    overrides: tuple[str, ...] = (),
+    scenario: str = "humanoids2024",
+    quick: bool = False,
 ) -> Series:
     """Run a scenario on each seed; what was run before in that folder is read."""
     seeds = tuple(seeds)
-    return Series(seeds, tuple(_scores(folder, seeds, overrides, scenario)))
+    return Series(seeds, tuple(_scores(folder, seeds, overrides, scenario, quick)))
 
 
-def _scores(folder: Path, seeds: tuple[int, ...], overrides: tuple[str, ...], scenario: str) -> Iterator[dict]:
+def _scores(
+    folder: Path, seeds: tuple[int, ...], overrides: tuple[str, ...], scenario: str, quick: bool
+) -> Iterator[dict]:
     for seed in seeds:
         out = folder / f"{scenario}_{seed}"
         if not (out / "score.json").is_file():
-            run(load(scenario, (f"seed={seed}", *overrides)), out=out)
+            run(load(scenario, (f"seed={seed}", *overrides)), out=out, quick=quick)
         yield json.loads((out / "score.json").read_text(encoding="utf-8"))

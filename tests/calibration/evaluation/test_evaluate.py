@@ -9,6 +9,7 @@ import pytest
 from calibration import calibrate, evaluate, load, load_estimate, predictions, save_estimate
 from calibration.errors import NotCalibrated, NotEnoughData
 from calibration.evaluation.pose_errors import PoseErrors, dwell_means, pose_errors, row_metrics
+from calibration.recording.schema import Wheel
 from calibration.recording.trial import read_trial, write_trial
 from tests.doubles import rigid_robot
 from tests.doubles.edited_dataset import rewritten
@@ -69,6 +70,17 @@ def test_rows_of_a_ladder_are_complete_and_named_as_in_the_contract(evaluation, 
         "orientation_max_deg", "per_axis_mm", "inside_95", "band_95_mm",
     }  # fmt: skip
     assert set(found["rows"][0]["per_axis_mm"]) == {"x", "y", "z"}
+
+
+def test_a_base_on_wheels_that_is_taken_to_stay_has_no_band_without_a_suspension(estimate, dataset):
+    alone = replace(estimate, suspension=None, bundle=None, main="model_2")
+    bolted, on_wheels = (
+        evaluate(alone, replace(dataset, description=dataset.description.model_copy(update={"wheels": wheels})))
+        for wheels in ((), (Wheel(name="left", type="drive", centre=(0.0, 0.2, 0.1), contact=(0.0, 0.2, 0.0)),))
+    )
+    assert on_wheels.row("model_2", "dynamic", "fixed").inside_95 is None
+    assert on_wheels.row("model_2", "dynamic", "measured").inside_95 is not None
+    assert bolted.row("model_2", "dynamic", "fixed").inside_95 is not None
 
 
 def test_saved_errors_give_the_rows_again(evaluation, tmp_path):
