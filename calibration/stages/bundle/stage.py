@@ -7,7 +7,7 @@
 Each part is estimated with the others at their estimates.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,7 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.from_markers import completed
 from calibration.stages.drive_trains.geometry_refit import RefittedGeometry
 from calibration.stages.drive_trains.stage import fit_drive_trains
+from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
@@ -85,10 +86,10 @@ def fit_bundle(
     """
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
-    trains, findings = fit_drive_trains(lab.urdf, description, trials, robot, hand)
+    trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand)
     bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
     geometry = replace(geometry, name="full")
-    refitted, more = _completed(lab, trials, robot, geometry, trains, findings)
+    refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings)
     found += more
     if refitted is not None:
         geometry, bending, trains, at_rest = refitted.model, refitted.bending, refitted.trains, refitted.at_rest
@@ -111,6 +112,7 @@ def _completed(
     robot: Clock,
     geometry: Model,
     trains: DriveTrains,
+    loads: Mapping[str, LinkLoads],
     findings: Sequence[Verdict],
 ) -> tuple[RefittedGeometry | None, tuple[Verdict, ...]]:
     """`completed`; nothing where link readings were rejected, no joint has a drive train or no reading errs."""
@@ -119,7 +121,7 @@ def _completed(
         return None, ()
     hand = hand_of(geometry, lab.chain, lab.nominal_frames)
     try:
-        return completed(lab.chain, lab.description, trials, robot, hand, trains)
+        return completed(lab.chain, lab.description, trials, robot, hand, trains, loads)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "missing", str(error)),)
 

@@ -11,7 +11,7 @@ y_j takes the place of motor minus link reading: the same fit, windows weighted 
 there. The zero and the eccentricity that it finds are the motor encoder's beside the geometry.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.geometry_refit import RefittedGeometry, refit_geometry
+from calibration.stages.drive_trains.geometry_refit import NOTHING, RefittedGeometry, refit_geometry
 from calibration.stages.drive_trains.identification import identify, load_modes
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
 from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial, unidentified
@@ -54,7 +54,13 @@ class SeenJoint:
 
 
 def completed(
-    chain: Chain, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, trains: DriveTrains
+    chain: Chain,
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock,
+    hand: HandModel,
+    trains: DriveTrains,
+    loads: Mapping[str, LinkLoads] = NOTHING,
 ) -> tuple[RefittedGeometry, tuple[Verdict, ...]]:
     """Geometry on link angles, with the drive trains of joints without a link encoder, and which those are.
 
@@ -63,7 +69,7 @@ def completed(
     Raises:
         NotEnoughData: No joint has a drive train: neither link encoders nor the hand's markers show one.
     """
-    found = refit_geometry(chain, description, trials, robot, hand, trains)
+    found = refit_geometry(chain, description, trials, robot, hand, trains, loads)
     have = [train.joint for train in trains.trains]
     if all(joint in have or chain.is_prismatic(joint) for joint in chain.joints):
         return found, ()

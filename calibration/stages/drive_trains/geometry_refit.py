@@ -10,7 +10,7 @@ there: a joint that no load holds on a side stops on either one, and its drive t
     s_j^2 = mean over dwells of (q_link - q_read)^2         of joint j [rad2]
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +39,7 @@ from calibration.stages.geometry.model_of_fit import hand_of, model_of
 from calibration.stages.geometry.parameters import geometry_parameters, hand_model, reading_floor, reading_sigma
 from calibration.stages.geometry.stage import fit_robustly
 
+NOTHING: Mapping[str, LinkLoads] = {}
 _SPACING = 0.5  # [s] between postures of a motion
 _READING = 0.05  # of the datasheet's backlash: random error of a corrected reading to begin with
 _HAND = np.array([2e-4, 4e-4])  # random errors of the hand's position [m] and rotation [rad] to begin with
@@ -84,14 +85,31 @@ class RefittedGeometry:
 
 
 def refit_geometry(
-    chain: Chain, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel, trains: DriveTrains
+    chain: Chain,
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock,
+    hand: HandModel,
+    trains: DriveTrains,
+    loads: Mapping[str, LinkLoads] = NOTHING,
 ) -> RefittedGeometry:
-    """The geometry on link angles of the calibration trials; `hand` is the one the drive trains were fitted with.
+    """The geometry on link angles of the calibration trials.
+
+    Args:
+        chain: The arm.
+        description: Of the dataset.
+        trials: Calibration trials.
+        robot: The robot's clock.
+        hand: Geometry that the drive trains were fitted with.
+        trains: The drive trains.
+        loads: By the same geometry, of trials whose loads are known.
 
     Raises:
         NotEnoughData: The trials show no posture and no motion.
     """
-    corrected = side_by_side(lambda trial: corrected_trial(trains, trial, robot, hand), trials)
+    corrected = side_by_side(
+        lambda t: _by_loads(trains, t, loads.get(t.id) or loads_of_trial(trains, t, robot, hand)), trials
+    )
     bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
     at_rest = trains.by_joint(rest_errors(trains, corrected, robot))
     parts = list(_postures(description, corrected, robot, hand, bending, at_rest))
@@ -159,7 +177,10 @@ def corrected_trial(
     trains: DriveTrains, trial: Trial, robot: Clock, hand: HandModel, T_lab_B: np.ndarray | None = None
 ) -> CorrectedTrial:
     """A trial with link angles in place of its motor readings; the base as of `loads_of_trial`."""
-    loads = loads_of_trial(trains, trial, robot, hand, T_lab_B)
+    return _by_loads(trains, trial, loads_of_trial(trains, trial, robot, hand, T_lab_B))
+
+
+def _by_loads(trains: DriveTrains, trial: Trial, loads: LinkLoads) -> CorrectedTrial:
     angles = trains.of_loads(loads)
     q = np.full(trial.q_motor.shape, np.nan)
     q[np.isfinite(trial.q_motor).all(axis=1)] = angles.q

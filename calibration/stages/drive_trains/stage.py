@@ -39,8 +39,8 @@ _SHORTEST = 1.5  # [s] of a trial
 
 def fit_drive_trains(
     urdf: str, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel
-) -> tuple[DriveTrains, tuple[Verdict, ...]]:
-    """The drive trains, and the verdicts on them; of joints without link encoders, none.
+) -> tuple[DriveTrains, tuple[Verdict, ...], dict[str, LinkLoads]]:
+    """The drive trains, the verdicts on them and the loads in the trials used; of joints without link encoders, none.
 
     Args:
         urdf: Nominal robot.
@@ -53,10 +53,10 @@ def fit_drive_trains(
     try:
         zero = link_zeros(trials, robot)
     except NotEnoughData as error:
-        return bare, (Verdict(STAGE, "missing", str(error)),)
+        return bare, (Verdict(STAGE, "missing", str(error)),), {}
     refused = tuple(wrong_links(bare.joints, trials, zero))
     if refused:
-        return bare, tuple(Verdict(STAGE, v.verdict, v.message) for v in refused)
+        return bare, tuple(Verdict(STAGE, v.verdict, v.message) for v in refused), {}
     used = [trial for trial in trials if is_long(trial)]
     loads = side_by_side(lambda trial: loads_of_trial(bare, trial, robot, hand), used)
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
@@ -64,7 +64,7 @@ def fit_drive_trains(
     trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))
     slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
     found = DriveTrains(bare.dynamics, trains, urdf, description)
-    return found, (*slips, *_verdicts(found, hand))
+    return found, (*slips, *_verdicts(found, hand)), {one.trial_id: one for one in loads}
 
 
 def loads_of_trial(
