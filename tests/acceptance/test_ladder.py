@@ -30,6 +30,7 @@ INSIDE = {
     Key("full", "measured"): (0.92, 0.98),
     Key("full", "plate", trials="static"): (0.92, 0.98),
     Key("full", "measured", trials="static"): (0.92, 0.98),
+    Key("full", "dynamics", trials="static"): (0.92, 0.98),
     Key("model_3"): (0.92, 0.98),
     Key("model_2"): (0.92, 0.98),
     Key("model_2", "measured"): (0.92, 1.0),  # too wide, docs/limits.md: set by static postures, worse than swings
