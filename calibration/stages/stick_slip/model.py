@@ -59,7 +59,7 @@ class Direction:
     held_out: HeldOut
     linear: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=bool))
     plain: PlainBand = field(default_factory=lambda: PlainBand(np.full(3, 1e-3), np.ones(3)))
-    heave: PlainBand = field(default_factory=lambda: PlainBand(np.zeros(3), np.zeros(3)))
+    heave: PlainBand = field(default_factory=lambda: PlainBand(np.full(3, 1e-4), np.full(3, 0.1)))
     by_plate: bool = field(default_factory=lambda: True)
 
     @property
