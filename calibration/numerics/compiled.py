@@ -42,7 +42,7 @@ class Kernel:
                 with _kept_in(_KEPT / digest(self._function)):
                     own = compile_(**options)(self._function)
                 known = self._function.__globals__
-                for name in (self._function.__name__, *self._function.__code__.co_names):
+                for name in (*self._function.__code__.co_names, self._function.__name__):  # itself once it is whole
                     if isinstance(other := known.get(name), Kernel):
                         known[name] = own if other is self else other.compiled()
                 self._compiled = own  # the last: other threads call it at once

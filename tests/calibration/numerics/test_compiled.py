@@ -48,11 +48,11 @@ def test_a_digest_is_of_callees_and_constants(tmp_path, monkeypatch):
 def test_no_thread_sees_a_loop_before_those_it_calls_are_compiled():
     class Slow(compiled.Kernel):
         def compiled(self):
-            seen.append(outer._compiled)
+            seen.append((outer._compiled, known["outer"]))
             return super().compiled()
 
     seen, known = [], {}
     exec("def inner(x):\n    return 2 * x\ndef outer(x):\n    return inner(x) + 1\n", known)
     outer = compiled.Kernel(known["outer"], {})
     known |= {"inner": Slow(known["inner"], {}), "outer": outer}
-    assert outer(3) == 7 and seen[0] is None
+    assert outer(3) == 7 and seen[0] == (None, outer) and known["outer"] is not outer
