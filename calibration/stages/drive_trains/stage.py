@@ -136,10 +136,10 @@ def _slipped(joint: str, slip: Slip) -> Verdict:
 def _verdicts(found: DriveTrains, hand: HandModel) -> Iterator[Verdict]:
     if found.trains:
         summary = "; ".join(
-            f"{t.joint} {t.form.replace('_', ' ')}, backlash {1e3 * t.gap:.2f} mrad, left out {1e3 * t.residual:.2f}"
+            f"{t.joint} {t.form.replace('_', ' ')}, backlash {1e3 * t.gap:.2f} mrad, error {1e3 * t.residual:.2f}"
             for t in found.trains
         )
-        yield Verdict(STAGE, "ok", f"{summary} mrad rms")
+        yield Verdict(STAGE, "ok", f"{summary} mrad rms in trials left out, where the side of the mesh is certain")
     without = [
         j for j in hand.chain.joints if j not in [t.joint for t in found.trains] and not hand.chain.is_prismatic(j)
     ]
