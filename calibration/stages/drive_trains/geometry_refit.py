@@ -111,8 +111,8 @@ def refit_geometry(
         lambda t: _by_loads(trains, t, loads.get(t.id) or loads_of_trial(trains, t, robot, hand)), trials
     )
     bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
-    at_rest = trains.by_joint(rest_errors(trains, corrected, robot))
-    parts = list(_postures(description, corrected, robot, hand, bending, at_rest))
+    seen = [_read(trains, one) for one in corrected]
+    parts = list(_postures(description, seen, robot, hand, bending))
     if not parts:
         raise NotEnoughData("no calibration trial has a posture or a motion of the arm to fit the geometry to")
     postures = parts[0]
@@ -202,6 +202,15 @@ def by_link_encoders(trains: DriveTrains, corrected: CorrectedTrial) -> Correcte
     return replace(corrected, trial=replace(corrected.trial, q_motor=q))
 
 
+def _read(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:
+    """The trial by its link encoders, as uncertain as what is left where the side of the mesh is certain."""
+    one = by_link_encoders(trains, corrected)
+    known = trains.by_joint(np.array([np.isfinite(train.link).all() for train in trains.trains])) > 0.0
+    least = trains.by_joint(np.array([train.residual**2 for train in trains.trains]))
+    read = known & np.isfinite(one.trial.q_link[np.isfinite(one.trial.q_motor).all(axis=1)])
+    return replace(one, angles=one.angles._replace(variance=np.where(read, least, one.angles.variance)))
+
+
 def rest_errors(trains: DriveTrains, corrected: Sequence[CorrectedTrial], robot: Clock) -> np.ndarray:
     """(m,) rms over all dwells of each drive train's angle less its link encoder's [rad]; 0 without one."""
     found = [np.zeros((0, len(trains.trains)))]
@@ -238,32 +247,25 @@ def _postures(  # noqa: PLR0913  the parts of one line
     robot: Clock,
     hand: HandModel,
     bending: ColumnBending,
-    at_rest: np.ndarray,
 ) -> Iterator[Postures]:
-    """Static postures, then those passed; at_rest (n_joints,) widens those of joints at rest [rad]."""
+    """Static postures, then those passed."""
     for k, one in enumerate(corrected):
         if len(one.trial.dwell_start):
             found = static_postures(description, [one.trial], robot, hand.chain.poses)
-            yield _widened(one, found, robot, hand, bending, at_rest)
+            yield _widened(one, found, robot, hand, bending)
         elif np.ptp(one.loads.q, axis=0).max() > _MOVES:
             found = passing_postures(description, [one.trial], robot, _SPACING)
-            yield _widened(one, replace(found, motion=np.full(len(found), k)), robot, hand, bending, at_rest)
+            yield _widened(one, replace(found, motion=np.full(len(found), k)), robot, hand, bending)
 
 
-def _widened(  # noqa: PLR0913  the parts of one line
-    one: CorrectedTrial,
-    postures: Postures,
-    robot: Clock,
-    hand: HandModel,
-    bending: ColumnBending,
-    at_rest: np.ndarray,
+def _widened(
+    one: CorrectedTrial, postures: Postures, robot: Clock, hand: HandModel, bending: ColumnBending
 ) -> Postures:
     """Postures with bending taken off and covariances widened by what joints' angles are uncertain by."""
     t = _times(one, postures)
     s = robot.from_mocap(t)
     k = np.clip(np.searchsorted(one.loads.t, s), 0, len(one.loads.t) - 1)
     variance = one.angles.variance[k]
-    variance = np.where(np.abs(one.loads.v[k]) < RESTS, np.maximum(variance, at_rest**2), variance)
     Q = moved(hand, bending, postures.q, _at(one, robot, t))
     J = hand.joint_jacobians(postures.q)
     along = J * variance[:, None, hand.chain.columns]
