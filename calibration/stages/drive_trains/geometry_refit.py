@@ -129,6 +129,7 @@ def refit_geometry(
         _sigma(trains, chain, "gear.{}.compliance"),
         0.5 * _sigma(trains, chain, "backlash.{}.gap"),
         _known(bending.sigma),
+        _read_by_links(trains)[chain.columns],
     )
     geared = with_gears(robot_hand, parameters, found.fit, used, known)
     departed = with_departures(robot_hand, parameters, geared, used)
@@ -205,10 +206,15 @@ def by_link_encoders(trains: DriveTrains, corrected: CorrectedTrial) -> Correcte
 def _read(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:
     """The trial by its link encoders, as uncertain as what is left where the side of the mesh is certain."""
     one = by_link_encoders(trains, corrected)
-    known = trains.by_joint(np.array([np.isfinite(train.link).all() for train in trains.trains])) > 0.0
     least = trains.by_joint(np.array([train.residual**2 for train in trains.trains]))
-    read = known & np.isfinite(one.trial.q_link[np.isfinite(one.trial.q_motor).all(axis=1)])
+    rows = np.isfinite(one.trial.q_motor).all(axis=1)
+    read = _read_by_links(trains) & np.isfinite(one.trial.q_link[rows])
     return replace(one, angles=one.angles._replace(variance=np.where(read, least, one.angles.variance)))
+
+
+def _read_by_links(trains: DriveTrains) -> np.ndarray:
+    """Of which joints (n_joints,) the link encoders' errors were identified."""
+    return trains.by_joint(np.array([float(np.isfinite(train.link).all()) for train in trains.trains])) > 0.0
 
 
 def rest_errors(trains: DriveTrains, corrected: Sequence[CorrectedTrial], robot: Clock) -> np.ndarray:

@@ -156,8 +156,13 @@ def best_train(problem: Problem, coarse: JointData, backlash: float, deflection:
     whole = replace(richer, data=coarse)
     roughly = [fit_train(whole, theta, _ROUGH[1:]) for theta in _hinted(problem, richer, coarse, plain.fit.theta)]
     found = [judged(fit_train(richer, fit.theta, _FINE)) for fit in roughly]
-    richest = min(found, key=lambda candidate: candidate.score, default=plain)
-    return richest if richest.score < plain.score - _BETTER else plain
+    if not found:
+        return plain
+    richest = min(found, key=lambda candidate: candidate.score)
+    without = replace(richer, form="dead_zone", prior=problem.prior)
+    n = len(richest.fit.theta) - problem.data.modes.shape[1]
+    same = judged(fit_train(without, np.delete(richest.fit.theta, [n - 2, n - 1]), _FINE))
+    return richest if richest.score < min(plain.score, same.score) - _BETTER else plain
 
 
 def _hinted(problem: Problem, richer: Problem, coarse: JointData, theta: np.ndarray) -> list[np.ndarray]:

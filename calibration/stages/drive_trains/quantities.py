@@ -57,6 +57,8 @@ def covariance_of(fit: TrainFit) -> np.ndarray:
 def reported(train: DriveTrain, fit: TrainFit, covariance: np.ndarray, motor_offset: float) -> DriveTrain:
     """The drive train with its parameters; `motor_offset` [rad] is the zero of its motor readings."""
     sigma, names, n = np.sqrt(np.diag(covariance)), fit.problem.names, len(fit.theta)
+    gap = names.index("half_gap")
+    sigma[gap] = np.hypot(sigma[gap], fit.theta[names.index("compliance")] * train.torque_sigma)
     own = {
         "half_gap": ("backlash.{}.gap", "rad", 2.0),
         "compliance": ("gear.{}.compliance", "rad/(N.m)", 1.0),

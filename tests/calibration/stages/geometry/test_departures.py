@@ -48,7 +48,7 @@ def test_what_was_taken_for_known_moves_the_geometry_as_its_interval_says(what):
     delta = off * (tau if what == "compliance" else np.sign(tau))
     bent = replace(rigid_robot.postures(truth, q + delta), q=seen.q, covariance=seen.covariance)
     before, after = (fit(hand, parameters, some, tiny, tiny) for some in (seen, bent))
-    none = TakenForKnown(np.zeros(8), np.zeros(8), np.zeros(2))
+    none = TakenForKnown(np.zeros(8), np.zeros(8), np.zeros(2), np.zeros(8, dtype=bool))
     wider = with_gears(hand, parameters, before, seen, replace(none, **{what: off}))
     added = np.sqrt(np.diag(wider.covariance - before.covariance).clip(0.0))
     np.testing.assert_allclose(added, np.abs(after.theta - before.theta), atol=0.03 * added.max())
