@@ -3,11 +3,12 @@
     r = log6( (Q(n)^-1 T_measured)^-1 T_B_H(q_link, theta) )            Q  motion of what the column carries
 
 Static postures of all calibration trials, and some a second of those in which the arm moves, in one problem of the
-existing solver: base and hand frames, placements and zeros; joints' own random errors, as the evidence has them. The
-variance of a link's angle widens the posture's covariance along that joint, and at rest so does what link encoders show
-there: a joint that no load holds on a side stops on either one, and its drive train may be wrong.
+existing solver: base and hand frames, placements and zeros; joints' own random errors, as the evidence has them.
+q_link is what a joint's link encoder reads less the errors found with its drive train, as uncertain as what is left
+where the side of the mesh is certain; of other joints it is what the drive train predicts, with its interval. Such
+variance widens a posture's covariance along the joint. How far predictions of drive trains are off at rest:
 
-    s_j^2 = mean over dwells of (q_link - q_read)^2         of joint j [rad2]
+    s_j^2 = mean over dwells of (q_predicted - q_link)^2         of joint j [rad2]
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,7 +31,7 @@ from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, harmonic_terms
-from calibration.stages.drive_trains.drive_trains import RESTS, DriveTrains, LinkAngles
+from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.departures import TakenForKnown, shown_by, with_departures, with_gears
@@ -111,7 +112,7 @@ def refit_geometry(
         lambda t: _by_loads(trains, t, loads.get(t.id) or loads_of_trial(trains, t, robot, hand)), trials
     )
     bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
-    seen = [_read(trains, one) for one in corrected]
+    seen = [seen_by_links(trains, one) for one in corrected]
     parts = list(_postures(description, seen, robot, hand, bending))
     if not parts:
         raise NotEnoughData("no calibration trial has a posture or a motion of the arm to fit the geometry to")
@@ -129,7 +130,7 @@ def refit_geometry(
         _sigma(trains, chain, "gear.{}.compliance"),
         0.5 * _sigma(trains, chain, "backlash.{}.gap"),
         _known(bending.sigma),
-        _read_by_links(trains)[chain.columns],
+        _have_link_encoders(trains)[chain.columns],
     )
     geared = with_gears(robot_hand, parameters, found.fit, used, known)
     departed = with_departures(robot_hand, parameters, geared, used)
@@ -203,16 +204,16 @@ def by_link_encoders(trains: DriveTrains, corrected: CorrectedTrial) -> Correcte
     return replace(corrected, trial=replace(corrected.trial, q_motor=q))
 
 
-def _read(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:
+def seen_by_links(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:
     """The trial by its link encoders, as uncertain as what is left where the side of the mesh is certain."""
     one = by_link_encoders(trains, corrected)
     least = trains.by_joint(np.array([train.residual**2 for train in trains.trains]))
     rows = np.isfinite(one.trial.q_motor).all(axis=1)
-    read = _read_by_links(trains) & np.isfinite(one.trial.q_link[rows])
+    read = _have_link_encoders(trains) & np.isfinite(one.trial.q_link[rows])
     return replace(one, angles=one.angles._replace(variance=np.where(read, least, one.angles.variance)))
 
 
-def _read_by_links(trains: DriveTrains) -> np.ndarray:
+def _have_link_encoders(trains: DriveTrains) -> np.ndarray:
     """Of which joints (n_joints,) the link encoders' errors were identified."""
     return trains.by_joint(np.array([float(np.isfinite(train.link).all()) for train in trains.trains])) > 0.0
 

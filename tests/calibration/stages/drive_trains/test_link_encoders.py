@@ -8,8 +8,8 @@ import mjcf
 from calibration.inference.parameters import Model, Parameter
 from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, Quantity, harmonic_terms
-from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, referred
+from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
+from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, referred, seen_by_links
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
 
@@ -38,6 +38,27 @@ def test_offset_and_eccentricity_are_removed_where_a_link_encoder_reads():
     np.testing.assert_allclose(found[10:, COLUMN], (theta + zero)[10:, COLUMN], atol=1e-5)  # phase off by the offset
     np.testing.assert_array_equal(found[:10], behind[:10])
     np.testing.assert_array_equal(np.delete(found, COLUMN, axis=1), np.delete(behind, COLUMN, axis=1))
+
+
+def test_the_geometry_is_of_angles_that_link_encoders_read_where_they_do():
+    described, rng, n = rigid_robot.described(), np.random.default_rng(1), 20
+    train = DriveTrain(JOINT, "dead_zone", np.zeros(7), link=np.zeros(5), residual=3e-5)
+    other = DriveTrain("arm_5_joint", "dead_zone", np.zeros(7), link=np.full(5, np.nan), residual=4e-5)
+    trains = DriveTrains(dynamics(mjcf.urdf(), described, np.zeros(8)), (train, other), mjcf.urdf(), described)
+    q, predicted = rigid_robot.random_angles(rng, n), rng.normal(size=(n, 8))
+    predicted[3] = np.nan  # a reading was lost
+    read = q.copy()
+    read[10:] = np.nan
+    interval = np.full((n - 1, 8), 1e-6)
+    of = CorrectedTrial(Readings(predicted, read), None, LinkAngles(None, None, None, interval))
+    found = seen_by_links(trains, of)
+    seen = np.delete(np.arange(10), 3)
+    np.testing.assert_allclose(found.trial.q_motor[seen, COLUMN], q[seen, COLUMN])
+    np.testing.assert_array_equal(found.trial.q_motor[10:], predicted[10:])
+    np.testing.assert_array_equal(np.delete(found.trial.q_motor, COLUMN, axis=1), np.delete(predicted, COLUMN, axis=1))
+    np.testing.assert_allclose(found.angles.variance[:9, COLUMN], 9e-10)
+    np.testing.assert_array_equal(np.delete(found.angles.variance[:9], COLUMN, axis=1), 1e-6)
+    np.testing.assert_array_equal(found.angles.variance[9:], 1e-6)
 
 
 def test_what_a_zero_is_off_by_turns_the_phase_of_a_link_encoder_s_eccentricity():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibration.stages.drive_trains import identification
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.identification import Candidate, judged, loaded, residual_and_doubt, torque_sigma
 from calibration.stages.drive_trains.joint_data import JointData
@@ -82,6 +83,26 @@ def test_no_gap_is_estimated_as_none() -> None:
     gap = next(p for p in train.parameters if p.name == "backlash.joint.gap")
     assert gap.status == "estimated" and gap.value - 1.96 * gap.sigma <= 0.0 < 5e-4
     assert gap.value < 2e-4
+
+
+def test_a_gap_is_no_better_known_than_the_torque_that_winds_the_mesh() -> None:
+    fit = fit_train(problem(data()), START, FLOORS[:2])
+    exact, wound = (
+        reported(replace(fit.problem.train(fit.theta), torque_sigma=sigma), fit, covariance_of(fit), 0.0).parameters[0]
+        for sigma in (0.0, 0.05)
+    )
+    assert exact.name == "backlash.joint.gap" and exact.sigma < 7e-5
+    assert wound.sigma == pytest.approx(np.hypot(exact.sigma, 2.0 * 0.05 * fit.theta[1]), rel=1e-9)
+
+
+def test_friction_in_the_mesh_must_predict_better_than_a_dead_zone_of_the_same_windows(monkeypatch) -> None:
+    of, poor = problem(data()), 100.0
+    plain = identification.best_train(of, of.data, 8e-3, 1e-2)
+    worse = replace(plain, score=plain.score + poor)  # steady contact alone, where jolts misled it
+    monkeypatch.setattr(identification, "_dead_zone", lambda *_: worse)
+    with_mesh = np.concatenate([plain.fit.theta[:5], [5e3, 0.1]])
+    monkeypatch.setattr(identification, "_hinted", lambda *_: [with_mesh])
+    assert identification.best_train(of, of.data, 8e-3, 1e-2) is worse
 
 
 def test_a_gap_that_is_never_crossed_is_not_identifiable_and_says_what_would() -> None:

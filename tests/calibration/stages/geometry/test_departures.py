@@ -52,3 +52,8 @@ def test_what_was_taken_for_known_moves_the_geometry_as_its_interval_says(what):
     wider = with_gears(hand, parameters, before, seen, replace(none, **{what: off}))
     added = np.sqrt(np.diag(wider.covariance - before.covariance).clip(0.0))
     np.testing.assert_allclose(added, np.abs(after.theta - before.theta), atol=0.03 * added.max())
+    read = with_gears(hand, parameters, before, seen, replace(none, read=off > 0.0, **{what: off}))
+    zero = abs(float((off * (tau if what == "compliance" else np.sign(tau))).mean(axis=0).sum()))
+    only = np.array(parameters.names) == "encoder.arm_4_joint.motor.offset"
+    added = np.sqrt(np.diag(read.covariance - before.covariance).clip(0.0))
+    np.testing.assert_allclose(added, zero * only, atol=0.03 * zero)
