@@ -14,7 +14,8 @@ Exchanges of labels that keep a body's shape: identified by markers that jump, c
 
     d(P) = rms |p_k[a] - p_k-1[P(a)]|, labels a          angle(R_P) > w dt,  x_P(a) ~ R_P x_a + c
 
-A hidden marker is taken where the body's pose puts it, so that frames in which others are hidden are compared alike.
+Markers that both frames show say it where they are three; else a hidden one is taken where the body's pose puts it,
+which exchanged labels turn.
 Between two frames dt apart the identity moves markers by more than half the cluster's shortest edge, and an order P by
 less than a third of it: the labels were exchanged by P, unless the body itself turned as P turns the drawing, which no
 robot's does faster than w. From there on they stay so until the next jump. Right are the labels that most frames have;
@@ -191,7 +192,8 @@ def without_jumps(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
     whole = _completed(xyz, p[rows])
     before, after = whole[:-1], whole[1:]
     jumped = np.flatnonzero(_apart(after, before) > _JUMP * shortest_edge(xyz))
-    exchanged = _exchanges(xyz, np.diff(t[rows])[jumped], before[jumped], after[jumped])
+    seen = p[rows[jumped]], p[rows[jumped + 1]]
+    exchanged = _exchanges(xyz, np.diff(t[rows])[jumped], (before[jumped], after[jumped]), seen)
     if (exchanged == np.arange(len(xyz))).all():
         return p
     starts = np.concatenate([[0], rows[jumped + 1], [len(p)]])
@@ -223,11 +225,14 @@ def shortest_edge(xyz: np.ndarray) -> float:
     return min(float(np.linalg.norm(a - b)) for a, b in combinations(xyz, 2))
 
 
-def _exchanges(xyz: np.ndarray, dt: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """For each jump (k,) from `before` to `after` (k, m, 3) the order P (k, m) that explains it, or the identity."""
+def _exchanges(
+    xyz: np.ndarray, dt: np.ndarray, whole: tuple[np.ndarray, np.ndarray], seen: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """For each jump (k,) the order P (k, m) that explains it, else the identity: markers (k, m, 3) before it, after."""
     orders = np.array(list(permutations(range(len(xyz)))))
     turns = np.linalg.norm(rotation_vector(body_poses(xyz, xyz[orders]).T[:, :3, :3]), axis=1)
-    d = np.array([_apart(after, before[:, order]) for order in orders])
+    d, by_pose = (np.array([_apart(after, before[:, P]) for P in orders]) for before, after in (seen, whole))
+    d = np.where(np.isfinite(d), d, by_pose)
     d[1:][turns[1:, None] <= _FASTEST * dt] = np.inf
     best = np.argmin(d, axis=0)
     clear = d[best, np.arange(len(dt))] * _CLEAR_JUMP < d[0]

@@ -33,6 +33,7 @@ from calibration.stages.clocks.pose_refinement import Provisional, provisional, 
 from calibration.verdict import Verdict
 
 _LATE, _FAR = 2e-3, 5.0  # [s] and standard deviations by which a clock declared shared may be off unsaid
+_WEAK = 10.0  # usual standard deviations of a trial's lag: beyond, its motion is too small to contradict a clock
 _log = logging.getLogger(__name__)
 
 
@@ -86,7 +87,7 @@ def _estimated_robot_clock(
         raise NotEnoughData(f"{error}; {_shown(description, trials)}") from error
     try:
         model = provisional(chain, description, trials, robot)
-        robot, verdicts = _concluded("robot", refined(model, description, trials, robot), description.tolerances)
+        robot, verdicts = concluded("robot", refined(model, description, trials, robot), description.tolerances)
     except NotEnoughData as error:
         warning = Verdict("clocks", "warning", f"robot clock from angular velocity alone: {error}")
         return robot, None, (*verdicts, warning)
@@ -128,22 +129,31 @@ def _clock(
         lags = _lags(motions, starts, drift)
         starts = {t.trial_id: t.lag.value for t in lags}
         drift = fit_clock(instrument, lags)[0].drift
-    return _concluded(instrument, lags, known)
+    return concluded(instrument, lags, known)
 
 
-def _concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tuple[Clock, tuple[Verdict, ...]]:
-    """The clock of these lags, and the verdicts on it."""
+def concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tuple[Clock, tuple[Verdict, ...]]:
+    """The clock of these lags, and the verdicts on it: a trial is named whose motion shows that its clock is another.
+
+    Raises:
+        NotEnoughData: No trial gave a lag.
+    """
     late, common = allowance(instrument, lags, known)
     clock, outliers = fit_clock(instrument, lags, common)
     clock = replace(clock, offset=clock.offset - late)
+    sigma = {t.trial_id: t.lag.sigma for t in lags}
+    usual = float(np.median([sigma[name] for name in sigma if name not in outliers]))
+    named = [name for name in outliers if sigma[name] < _WEAK * usual]
     message = (
         f"{instrument}: offset {clock.offset:.6f} s, drift {1e6 * clock.drift:.1f} ppm, "
         f"{1e3 * clock.sigma:.3f} ms at its middle, {len(lags) - len(outliers)} trials"
     )
+    if len(named) < len(outliers):
+        message += f"; {len(outliers) - len(named)} move too little to tell"
     found = [Verdict("clocks", "ok", message)]
-    if outliers:
+    if named:
         message = f"{instrument}: left out, since their clock disagrees with that of the other trials"
-        found.append(Verdict("clocks", "warning", f"{message}: {', '.join(outliers)}"))
+        found.append(Verdict("clocks", "warning", f"{message}: {', '.join(named)}"))
     return clock, tuple(found)
 
 

@@ -12,6 +12,9 @@ from tests.doubles import rigid_robot
 
 SQUARE = np.array([[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]])
 TRIANGLE = np.array([[0.05, 0.0, 0.0], [-0.05, 0.0, 0.0], [0.002, 0.12, 0.0]])  # isosceles to 2 mm
+PYRAMID = np.array(
+    [[-0.08, 0.11, 0.03], [-0.08, -0.11, 0.03], [0.06, 0.0, 0.1], [-0.1, 0.0, -0.1]]
+)  # one plane of symmetry
 T = np.arange(400) / 100.0
 
 
@@ -58,6 +61,14 @@ def test_exchanges_one_after_the_other_and_with_a_hidden_marker_are_set_right():
     wrong = exchanged(exchanged(p, slice(100, 130), [1, 2, 3, 0]), slice(115, 200), [2, 3, 0, 1])
     np.testing.assert_array_equal(without_jumps(SQUARE, T, wrong), p)
     np.testing.assert_array_equal(without_jumps(SQUARE, T, exchanged(hidden, slice(100, 130), [1, 2, 3, 0])), hidden)
+
+
+@pytest.mark.parametrize("hidden", range(4))
+def test_an_exchange_that_the_markers_left_in_sight_do_not_show_by_their_shape_is_set_right(hidden):
+    right = seen(PYRAMID)
+    right[80:160, hidden] = np.nan
+    wrong = exchanged(right, slice(100, 130), [1, 0, 2, 3])
+    np.testing.assert_array_equal(without_jumps(PYRAMID, T, wrong), right)
 
 
 def test_where_half_of_the_frames_have_either_order_nobody_knows():

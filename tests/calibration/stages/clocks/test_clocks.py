@@ -11,7 +11,7 @@ from calibration.numerics.time_delay import Lag, Pair, coarse_lag, fit_lag
 from calibration.recording.clock import Clock
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.clocks.clock_fit import TrialLag, fit_clock
-from calibration.stages.clocks.stage import synchronise
+from calibration.stages.clocks.stage import concluded, synchronise
 from tests.doubles import geared_robot, rigid_robot
 
 
@@ -144,6 +144,19 @@ def test_the_clock_is_that_of_the_weighted_line_and_goes_both_ways():
     np.testing.assert_allclose(clock.from_mocap(clock.to_mocap(s)), s, atol=1e-12)
     at_epoch = np.array([1.0, clock.epoch])
     assert np.sqrt(at_epoch @ clock.covariance @ at_epoch) == pytest.approx(clock.sigma)
+
+
+def test_a_motion_that_hardly_moves_the_plate_contradicts_no_clock():
+    known = rigid_robot.described().tolerances
+    rng = np.random.default_rng(3)
+    lags = [TrialLag(f"swing_{i}", 20.0 * i, Lag(2.0 + 3e-4 * rng.normal(), 3e-4)) for i in range(6)]
+    weak = TrialLag("sweep", 130.0, Lag(1.0, 2e-2))  # a second off, by its own measure fifty standard deviations
+    jumped = TrialLag("jumped", 150.0, Lag(1.0, 4e-4))
+    _, verdicts = concluded("plate", [*lags, weak], known)
+    assert [v.verdict for v in verdicts] == ["ok"] and "6 trials; 1 move too little to tell" in verdicts[0].message
+    _, verdicts = concluded("plate", [*lags, weak, jumped], known)
+    assert [v.verdict for v in verdicts] == ["ok", "warning"]
+    assert "jumped" in verdicts[1].message and "sweep" not in verdicts[1].message
 
 
 def test_one_trial_gives_an_offset_and_no_drift():
