@@ -16,7 +16,7 @@ from calibration.stages.drive_trains.torques import inertial_tolerances
 from scenarios import load
 
 pytestmark = pytest.mark.slow
-ROBOTS, FIRST = 43, 2000  # of seven joints: 301
+ROBOTS, FIRST = 300, 2000  # of seven joints: 2,100
 SPREAD = (0.5, 1.5)  # of the default robot's gap, stiffness and friction
 ERROR = 1e-4  # [rad] of a difference of readings; errors hang together as long as the fit says
 ECCENTRICITY = np.array([2.5e-3, 2.5e-3, 0.6e-3, 0.6e-3])  # [rad]
