@@ -7,6 +7,7 @@ sign       at rest the robot presses down: Fz < 0 (ACTION on the plate), and eac
 place      its centre of pressure lies between the wheels' contact points
 rotation   psi = atan2(sum m_d x m_p, sum m_d . m_p) from the horizontal moments of dynamics to those of the plate,
            about the plate's centre; the median over trials, since a base that slips in one turns its moments
+links      the moments change by what the nominal links' motion makes of them, by their masses' tolerances
 moved      the base rests where it rested before: more than slip has happened when it does not
 """
 
@@ -25,8 +26,9 @@ from calibration.robot.laboratory import Laboratory
 from calibration.verdict import Direction, Verdict
 
 STAGE = "suspension"
-# What the `moves` of a warning say of a plate: error of its scale [-], its angle about the vertical [rad].
-SCALE, TURN = "plate.scale", "plate.turn"
+# What the `moves` of a warning say of a plate: error of its scale [-], its angle about the vertical [rad]; of the links
+# that move: error of their masses [-].
+SCALE, TURN, MASSES = "plate.scale", "plate.turn", "links.masses"
 _LOAD = 3.0  # believable ratio of the plates' load to the robot's weight, or its inverse, in any units
 _SLOW = 2.5  # [Hz] below the base's resonance, where plate and dynamics agree
 _OUTSIDE = 0.03  # [m] the centre of pressure may be outside the wheels
@@ -41,6 +43,7 @@ _STAYS, _FEW = 0.2, 100  # share of samples at the largest or least reading; sam
 _FAINT = (1.0, 0.5)  # rms force [N] and moment [N.m] that say nothing of a sign
 _SHIFTED, _TWISTED = 15e-3, 0.1  # rest pose after against before: slip alone reaches 6 mm, 30 mrad [m, rad]
 _OF_BASE = ("suspension.", "slip.")  # parameters fitted to the plate's wrench
+_OF_LOADS = ("gear.", "friction.", "hysteresis.", "flexibility.")  # to torques of the nominal links
 _NAMES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
@@ -116,7 +119,10 @@ def _against_dynamics(
         yield Verdict(STAGE, "refused", message)
         return
     yield from _weighed(lab, rest, dynamics, weight)
-    yield from _driven(lab, rest, _slow(plate, dynamics))
+    slow = _slow(plate, dynamics)
+    yield from _driven(lab, rest, slow)
+    if abs(-rest[2] / weight - 1.0) <= _SURE * weight_spread(lab):
+        yield from _moving(lab, slow)
 
 
 def _weighed(lab: Laboratory, rest: np.ndarray, dynamics: Sequence[Wrenched], weight: float) -> Iterator[Verdict]:
@@ -157,6 +163,23 @@ def _driven(lab: Laboratory, rest: np.ndarray, pairs: Sequence[tuple[np.ndarray,
         yield Verdict(STAGE, "warning", message, (((TURN, psi),),))
 
 
+def _moving(lab: Laboratory, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Iterator[Verdict]:
+    """Links that move and weigh otherwise than they nominally do, by moments of the plate at the right weight."""
+    p, d = (np.concatenate([x[:, 3:5] - x[:, 3:5].mean(axis=0) for x in of]) for of in zip(*pairs, strict=True))
+    if np.linalg.norm(d.std(axis=0)) < 4.0 * _FAINT[1]:
+        return
+    links = np.array([inertia.mass for inertia in lab.floating.inertias])[2:]
+    spread = lab.description.tolerances.link_mass * float(np.linalg.norm(links) / links.sum())
+    ratio = float((p * d).sum() / (d**2).sum())
+    if abs(ratio - 1.0) > _SURE * spread:
+        message = (
+            f"plate: its weight is right, but its moments change by {ratio:.2f} times what moving the nominal links "
+            "makes of them: the arm weighs that much more or less than the URDF says (another make?), or the plate's "
+            "moments have a gain; gears, friction and predictions from dynamics are off by as much: correct the masses"
+        )
+        yield Verdict(STAGE, "warning", message, (((MASSES, ratio - 1.0),),))
+
+
 def weight_spread(lab: Laboratory) -> float:
     """Standard deviation of the robot's weight over it [-], by the datasheet's tolerances of its masses."""
     masses = np.array([inertia.mass for inertia in lab.floating.inertias])
@@ -179,10 +202,12 @@ def _misplaced(outside: float) -> str:
 
 
 def by_scale(model: Model, moved: Sequence[Direction]) -> tuple[Direction, ...]:
-    """Directions in which a plate's scale is that of every stiffness and damping of the base."""
-    scales = [size for direction in moved for name, size in direction if name == SCALE]
+    """Directions in which a plate's scale is that of the base's springs and dampers, that of masses the gears'."""
     forces = [p for p in model.parameters if p.name.startswith(_OF_BASE) and p.unit.startswith("N")]
-    return (*moved, *(tuple((p.name, size * p.value) for p in forces) for size in scales))
+    loads = [p for p in model.parameters if p.name.startswith(_OF_LOADS)]
+    scaled = {SCALE: forces, MASSES: loads}
+    sizes = [(scaled[name], size) for direction in moved for name, size in direction if name in scaled]
+    return (*moved, *(tuple((p.name, size * p.value) for p in found) for found, size in sizes))
 
 
 def moved_by(after: np.ndarray) -> str:

@@ -60,6 +60,20 @@ def test_forces_of_the_base_include_what_a_plate_s_weight_is_off(estimate, datas
     np.testing.assert_allclose([p.sigma for p in after.parameters], [4e3, 0.4, 0.0])
 
 
+def test_gears_include_what_the_links_masses_are_off(estimate, dataset):
+    gears = (
+        ("gear.arm_1_joint.compliance", 2e-4),
+        ("friction.arm_1_joint.coulomb", 0.5),
+        ("backlash.arm_1_joint.gap", 1e-3),
+    )
+    parameters = tuple(Parameter(n, "", 0.0, value, 0.0, "estimated") for n, value in gears)
+    heavier = Verdict("suspension", "warning", "plate", ((("links.masses", 0.2),),))
+    models = (Model("model_1", parameters, covariance=np.zeros((3, 3))),)
+    data = StageInput(Laboratory(dataset.urdf, dataset.description))
+    (after,) = _concluded(Context(data, replace(estimate, models=models, verdicts=(heavier,)))).models
+    np.testing.assert_allclose([p.sigma for p in after.parameters], [4e-5, 0.1, 0.0])
+
+
 def test_the_estimate_says_what_it_is(estimate):
     assert estimate.calibrated and estimate.main == "model_2"
     assert {"registration", "model_2"} <= {m.name for m in estimate.models}

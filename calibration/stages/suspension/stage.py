@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.checks.plates import SCALE, STAGE, moved_by, wrong_plate
+from calibration.checks.plates import MASSES, SCALE, STAGE, moved_by, wrong_plate
 from calibration.inference.parameters import Combination, Model
 from calibration.numerics.signals import RATE
 from calibration.recording.clock import Clock
@@ -75,12 +75,12 @@ def with_springs_moved(
 ) -> Verdict:
     """A finding of a plate off by an angle, with what it moved the springs by: fitted to its wrench turned back.
 
-    A scale is that of every force: `checks.plates.by_scale`.
+    A scale is that of every force, of forces or of torques: `checks.plates.by_scale`.
     """
     if not found.moves:
         return found
     (((what, size),),) = found.moves
-    if what == SCALE:
+    if what in (SCALE, MASSES):
         return found
     back = tuple(replace(r, forcing=r.forcing.turned(-size)) for r in responses.plate)
     other = {p.name: p.value for p in _fitted(description, replace(responses, plate=back), full)[0].parameters}

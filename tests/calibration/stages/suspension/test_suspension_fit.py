@@ -189,6 +189,19 @@ def test_a_wheel_off_the_plate_is_named(trials, wheel, share):
     assert f"as if {WHEELS[wheel].name} stood off the plate" in said(verdicts, "warning")
 
 
+@pytest.mark.parametrize(("gain", "named"), [(1.3, True), (0.8, True), (1.06, False), (1.0, False)])
+def test_an_arm_that_weighs_otherwise_than_its_description_says_is_named(trials, gain, named):
+    def heavier(w):
+        return w + (gain - 1.0) * (w - w[:100].mean(axis=0)) * [0.0, 0.0, 0.0, 1.0, 1.0, 0.0]
+
+    _, verdicts = fit([plated(t, heavier(t.plate_wrench[:, 0])) for t in trials])
+    warned = [v for v in verdicts if "the arm weighs" in v.message]
+    assert bool(warned) is named
+    if named:
+        (((what, size),),) = warned[0].moves
+        assert what == "links.masses" and size == pytest.approx(gain - 1.0, abs=0.05)
+
+
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_a_base_that_slips_about_the_vertical_in_one_trial_is_no_turned_plate(trials, which):
     some = [turned(t, 16.0) if k == which else t for k, t in enumerate(trials)]
