@@ -39,6 +39,7 @@ _BORNE = 0.1  # share of the weight that a wheel may bear [-]
 _TURNED, _WRONG = np.radians(4.0), np.radians(20.0)  # plate to lab: doubtful, not usable [rad]
 _MIRRORED = -0.5  # correlation [-]
 _ALIKE = 0.7  # share of common motion of two pairs of moments between which an angle means something [-]
+_SAME = 0.9  # between which a factor does; 0.99 is usual
 _STAYS, _FEW = 0.2, 100  # share of samples at the largest or least reading; samples that show one
 _FAINT = (1.0, 0.5)  # rms force [N] and moment [N.m] that say nothing of a sign
 _SHIFTED, _TWISTED = 15e-3, 0.1  # rest pose after against before: slip alone reaches 6 mm, 30 mrad [m, rad]
@@ -170,8 +171,8 @@ def _moving(lab: Laboratory, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> 
         return
     links = np.array([inertia.mass for inertia in lab.floating.inertias])[2:]
     spread = lab.description.tolerances.link_mass * float(np.linalg.norm(links) / links.sum())
-    ratio = float((p * d).sum() / (d**2).sum())
-    if abs(ratio - 1.0) > _SURE * spread:
+    ratio, alike = float((p * d).sum() / (d**2).sum()), float((p * d).sum() / np.sqrt((p**2).sum() * (d**2).sum()))
+    if alike > _SAME and abs(ratio - 1.0) > _SURE * spread:
         message = (
             f"plate: its weight is right, but its moments change by {ratio:.2f} times what moving the nominal links "
             "makes of them: the arm weighs that much more or less than the URDF says (another make?), or the plate's "
