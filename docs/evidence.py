@@ -132,10 +132,10 @@ def prose() -> Iterator[tuple[Path, str, str]]:
     yield readme, r"calibrated, [\d.]+ mm on unseen motion", f"calibrated, {rows[-1][1]} mm on unseen motion"
     yield readme, r"noisy markers, the error would be [\d.]+ mm", f"noisy markers, the error would be {run['floor']} mm"
     yield readme, r"for \d+ of \d+ parameters of the default run", f"for {inside} parameters of the default run"
-    yield readme, r"for \d+ to \d+ % on seventy", f"for {range_} on seventy"
+    yield readme, r"for \d+ to \d+ % on \d+", f"for {range_} on {len(covered)}"
     yield limits, r"floor of the instruments [\d.]+ mm", f"floor of the instruments {run['floor']} mm"
     yield limits, r"\d+ of \d+ contain the truth in the default run", f"{inside} contain the truth in the default run"
-    yield limits, r"\d+ to \d+ % on seventy", f"{range_} on seventy"
+    yield limits, r"\d+ to \d+ % on \d+", f"{range_} on {len(covered)}"
     mm = runs["payload"]["rows"][-1][1]
     loads = f"0 kg, 2 kg and a push of 20 N, by the plate: {mm} mm; the usual load: {rows[-1][1]}"
     yield limits, r"0 kg, 2 kg and a push [^|]*(?= mm \|)", loads

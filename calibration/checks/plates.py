@@ -39,7 +39,7 @@ _BORNE = 0.1  # share of the weight that a wheel may bear [-]
 _TURNED, _WRONG = np.radians(4.0), np.radians(20.0)  # plate to lab: doubtful, not usable [rad]
 _MIRRORED = -0.5  # correlation [-]
 _ALIKE = 0.7  # share of common motion of two pairs of moments between which an angle means something [-]
-_SAME = 0.9  # between which a factor does; 0.99 is usual
+_SAME = 0.9  # correlation of two pairs of moments between which a factor means something; 0.99 is usual
 _STAYS, _FEW = 0.2, 100  # share of samples at the largest or least reading; samples that show one
 _FAINT = (1.0, 0.5)  # rms force [N] and moment [N.m] that say nothing of a sign
 _SHIFTED, _TWISTED = 15e-3, 0.1  # rest pose after against before: slip alone reaches 6 mm, 30 mrad [m, rad]
@@ -165,7 +165,7 @@ def _driven(lab: Laboratory, rest: np.ndarray, pairs: Sequence[tuple[np.ndarray,
 
 
 def _moving(lab: Laboratory, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Iterator[Verdict]:
-    """Links that move and weigh otherwise than they nominally do, by moments of the plate at the right weight."""
+    """Links that move and weigh otherwise than they nominally do: p = ratio d, moments of plate and dynamics."""
     p, d = (np.concatenate([x[:, 3:5] - x[:, 3:5].mean(axis=0) for x in of]) for of in zip(*pairs, strict=True))
     if np.linalg.norm(d.std(axis=0)) < 4.0 * _FAINT[1]:
         return
@@ -174,9 +174,9 @@ def _moving(lab: Laboratory, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> 
     ratio, alike = float((p * d).sum() / (d**2).sum()), float((p * d).sum() / np.sqrt((p**2).sum() * (d**2).sum()))
     if alike > _SAME and abs(ratio - 1.0) > _SURE * spread:
         message = (
-            f"plate: its weight is right, but its moments change by {ratio:.2f} times what moving the nominal links "
-            "makes of them: the arm weighs that much more or less than the URDF says (another make?), or the plate's "
-            "moments have a gain; gears, friction and predictions from dynamics are off by as much: correct the masses"
+            f"plate: its load is right, but as the arm moves its moments change {ratio:.2f} times as much as by the "
+            f"URDF's masses: the arm weighs {ratio:.2f} times what it says (another make?), or the plate's moments "
+            "have a gain; gears, friction and predictions from dynamics are off by as much: correct the masses"
         )
         yield Verdict(STAGE, "warning", message, (((MASSES, ratio - 1.0),),))
 

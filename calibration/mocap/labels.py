@@ -14,8 +14,8 @@ Exchanges of labels that keep a body's shape: identified by markers that jump, c
 
     d(P) = rms |p_k[a] - p_k-1[P(a)]|, labels a          angle(R_P) > w dt,  x_P(a) ~ R_P x_a + c
 
-Markers that both frames show say it where they are three; else a hidden one is taken where the body's pose puts it,
-which exchanged labels turn.
+Where both frames show three markers, these decide; else a hidden one is taken where the body's pose puts it, although
+exchanged labels turn that pose.
 Between two frames dt apart the identity moves markers by more than half the cluster's shortest edge, and an order P by
 less than a third of it: the labels were exchanged by P, unless the body itself turned as P turns the drawing, which no
 robot's does faster than w. From there on they stay so until the next jump. Right are the labels that most frames have;

@@ -52,10 +52,10 @@ def test_model_1_is_not_worse_than_nominal_or_it_is_said_why(evaluation, base):
     assert found["finding"] in ("better", "no difference")
 
 
-RINGS = pytest.mark.xfail(reason="arm_1 rings with a base on wheels that have mass: docs/limits.md", strict=True)
+OPEN = pytest.mark.xfail(reason="43 % of 60: no load holds arm_1 on a side, docs/limits.md", strict=True)
 
 
-@pytest.mark.parametrize("joint", [pytest.param(j, marks=RINGS) if j == "arm_1_joint" else j for j in SEVEN])
+@pytest.mark.parametrize("joint", [pytest.param(j, marks=OPEN) if j == "arm_1_joint" else j for j in SEVEN])
 def test_the_printed_joint_model_explains_a_settled_repetition(evaluation, joint):
     found = next(x for x in evaluation["regimes"] if (x["joint"], x["regime"]) == (joint, "repetition"))
     assert found["cut_percent"] >= 60.0 and found["r2"] >= 0.85

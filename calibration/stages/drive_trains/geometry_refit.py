@@ -248,7 +248,7 @@ def _at(corrected: CorrectedTrial, robot: Clock, t: np.ndarray) -> np.ndarray:
     return interpolate_columns(robot.from_mocap(t), corrected.loads.t, corrected.loads.moment)
 
 
-def _postures(  # noqa: PLR0913  the parts of one line
+def _postures(
     description: Description,
     corrected: Sequence[CorrectedTrial],
     robot: Clock,

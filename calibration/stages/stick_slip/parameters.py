@@ -22,8 +22,10 @@ from calibration.stages.stick_slip.wheels import DRIVES, NAMES, PRIOR, PRIOR_SIG
 
 KNOWN = 0.3  # sigma of a logarithm
 _SHARPER = 0.5  # sigma over that of the prior, at most
-MODEL = {"drive_kx": 0.06, "drive_ky": 0.07, "drive_mu": DRIVES, "front_k": 0.04, "front_mu": 0.04}
-MODEL |= {"back_k": 0.1, "back_mu": 0.07, "c": 0.5, "slip": 0.3}
+MODEL = {
+    "drive_kx": 0.06, "drive_ky": 0.07, "drive_mu": DRIVES, "front_k": 0.04, "front_mu": 0.04,
+    "back_k": 0.1, "back_mu": 0.07, "c": 0.5, "slip": 0.3,
+}  # fmt: skip
 _WHEEL = {
     "drive": (("kx", "drive_kx"), ("ky", "drive_ky"), ("cx", "drive_c"), ("cy", "drive_c"), ("mu", "drive_mu")),
     "front": (("kx", "front_k"), ("ky", "front_k"), ("cx", "caster_c"), ("cy", "caster_c"), ("mu", "front_mu")),
