@@ -1,10 +1,13 @@
 """Estimation of the stick-slip base in its direction of use: from a wrench to the base's motion, one fit a source.
 
-    covariance = H^-1 + H^-1 (sum_k g_k g_k') H^-1,     p_(-k) = p + (H - H_k)^-1 g_k
+    covariance = H^-1 (c sum_k H_k + S^-2) H^-1,     H = sum_k H_k + S^-2,     p_(-k) = p + (H - H_k)^-1 g_k
+    c = n / (n - 1) sum_k g_k' A_k g_k / sum_k tr(A_k H_k),     A_k = (H_k + S^-2 / n)^-1
 
-H the information and g_k a trial's gradient at the optimum: the second term is what trials disagree about, which no
-curvature shows. p_(-k), the parameters without trial k, is a step of Gauss-Newton from there. The motion predicted
-with them says what the model is worth on an axis of the floor's plane, and how wide its band is.
+H_k the information of trial k of n, g_k its gradient at the optimum, S the prior's. How long errors hang together is
+assumed by the likelihood; c is by how much trials scatter over what that has them scatter (a sandwich of one scale: n
+gradients do not show p x p numbers). p_(-k), the parameters without trial k, is a step of Gauss-Newton from there. The
+motion predicted with them says what the model is worth on an axis of the floor's plane, and how wide its band is.
+Reference: White, Econometrica 1982.
 
 A wheel that all but slides bounds its friction on one side: the optimum is where sliding starts, and its curvature is
 that of the other side. So a friction's sigma is at least half of how far it may go, alone, before the cost rises by 4.
@@ -55,13 +58,21 @@ def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
     """The parameters that predict the trials best; from a known start (13,), where there is one, without a search."""
     best, starts = searched(trials) if start is None else (warmed(trials, start), ())
     best, (H_k, g_k) = settled(trials, best)
-    H = H_k.sum(axis=0) + trials.prior.information
+    prior = trials.prior.information
+    H = H_k.sum(axis=0) + prior
     inverse = np.linalg.inv(H)
-    covariance = inverse + inverse @ (g_k.T @ g_k) @ inverse
+    covariance = inverse @ (_scatter(H_k, g_k, prior) * H_k.sum(axis=0) + prior) @ inverse
     own = np.diag(covariance)
     covariance += np.diag(np.maximum(_one_sided(trials, best) ** 2 - own, 0.0))
     steps = np.array([_without(H, H_k[k], g_k[k], trials.prior.sigma) for k in range(len(g_k))])
     return Fitted(best.logarithms, covariance, _others(trials, best, steps), best.cost, starts)
+
+
+def _scatter(H_k: np.ndarray, g_k: np.ndarray, prior: np.ndarray) -> float:
+    """c, by information (n, p, p) and gradients (n, p) of the trials, and the prior's information (p, p)."""
+    n = len(H_k)
+    A_k = np.linalg.inv(H_k + prior / n)
+    return float(n / (n - 1) * np.einsum("ki,kij,kj", g_k, A_k, g_k) / np.einsum("kij,kji", A_k, H_k))
 
 
 def _one_sided(trials: Trials, best: Point) -> np.ndarray:

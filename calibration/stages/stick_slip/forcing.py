@@ -84,7 +84,7 @@ class Tilting:
     Attributes:
         K: (6, 6) stiffness [N/m, N.m/rad].
         C: (6, 6) damping.
-        off: (2,) how far the plate seems from its declared place under the base [m], see `plate_place`.
+        off: (2,) how far the plate seems from its declared place under the base [m], see `standing.plate_place`.
         shares: (2,) of the load that drives and back casters bear, relative to front casters [-].
     """
 

@@ -1,13 +1,14 @@
 """Stage `stick_slip`: the base that slips in the floor's plane, from calibration trials alone.
 
-1  forcing of every trial by each source of the wrench, tilt and heave by the suspension's 6x6 compliance
+1  forcing of every trial by each source of the wrench, tilt and heave by the suspension's 6x6 compliance, which is
+   fitted again where wheels lift off
 2  parameters by wheel type, ensemble and band by each source: the plate first, inverse dynamics from its optimum
 3  verdicts: the worth of each axis on trials that were left out, against a base that stays
 """
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,11 +24,9 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.band import PlainBand, heave_band, plain_band, reached
 from calibration.stages.stick_slip.fit import fit_direction
 from calibration.stages.stick_slip.forcing import (
-    HEAVE,
     PLANE,
     PlanarForcing,
     Tilting,
-    Wrenches,
     heave_apart,
     planar_forcing,
     readings_of,
@@ -36,10 +35,10 @@ from calibration.stages.stick_slip.forcing import (
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
-from calibration.stages.stick_slip.plate_place import plate_place
 from calibration.stages.stick_slip.poses import Links
 from calibration.stages.stick_slip.search import descended, displaced, tried
-from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, prior_by_tilt, wheel_set
+from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
+from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.floor_wrench import Load
 from calibration.stages.suspension.model import Source, Suspension
@@ -47,7 +46,6 @@ from calibration.stages.suspension.rest_frame import Rest, rest_of
 from calibration.verdict import Verdict
 
 STAGE = "stick_slip"
-SOURCES: tuple[Source, ...] = ("plate", "dynamics")
 _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _BETTER = 0.8  # mean square over another's, below which a prediction takes its place: the compliance's of an axis
@@ -56,15 +54,6 @@ _ELSEWHERE, _SHOWN = 0.009, 3.0  # [m] a wheel may seem off its place; chi-squar
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Read:
-    """A trial: where it begins, its wrenches."""
-
-    trial: Trial
-    rest: Rest
-    wrenches: Wrenches
 
 
 def fit_stick_slip(
@@ -79,9 +68,7 @@ def fit_stick_slip(
         return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials, trains)
-    prior = _prior(wheels, suspension)
-    off = plate_place(sources, [one.trial for one in read], [one.wrenches for one in read])
-    tilting = Tilting(suspension.K, suspension.C, off, prior.shares)
+    tilting, prior = tilting_of(sources, read, wheels, suspension)
     by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
     usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
     if not usable:
@@ -191,12 +178,6 @@ def _banded(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarF
     plain = plain_band(np.array(square), np.array(reach), pooled_noise([motion for _, motion in rows]))
     heave = heave_band([motion.tilted for _, motion in rows], [blocks(reached(f.heave)) for f, _ in rows])
     return replace(direction, plain=plain, heave=heave)
-
-
-def _prior(wheels: WheelSet, suspension: Suspension) -> Prior:
-    """Shares of the load by the tilt, where a source shows that the compliance predicts it."""
-    tilts = any(suspension.moves(source)[[*HEAVE[1:]]].all() for source in SOURCES)
-    return prior_by_tilt(wheels, suspension.K[np.ix_(HEAVE, HEAVE)]) if tilts else WIDE
 
 
 def _shifts(

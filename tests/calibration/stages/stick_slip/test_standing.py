@@ -7,18 +7,25 @@ import mjcf
 from calibration.numerics.signals import Signal
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip.forcing import Wrenches
-from calibration.stages.stick_slip.plate_place import plate_place, weighed
+from calibration.stages.stick_slip.standing import Read, plate_place, tilting_of, weighed
 from calibration.stages.stick_slip.wheels import wheel_set
-from calibration.stages.suspension.base_response import laboratory
+from calibration.stages.suspension.base_response import base_response_of, laboratory
+from calibration.stages.suspension.compliance_fit import fit_compliance
+from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.floor_wrench import Load
+from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.rest_frame import Rest, rest_of
 from tests.doubles import rigid_robot
-from tests.doubles.moving_base import WHEELS
+from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved
 
 DESCRIPTION = rigid_robot.described(wheels=[w.model_dump() for w in WHEELS])
 ROBOT, PLATE = (Clock(i, 0.0, 0.0, np.zeros((2, 2)), 0.0, 1e-4) for i in ("robot", "plate"))
 STILL = rigid_robot.Truth(marker_sigma=1e-5, encoder_quantum=0.0, robot=(0.0, 0.0), plate=(0.0, 0.0))
 OFF = np.array([4e-3, -3e-3])
 G = 9.81
+REST = Rest(np.eye(4), np.eye(4))
+HEAVE = np.ix_((2, 3, 4), (2, 3, 4))
+SPRINGS = np.array([2.0e5, 2.0e5, 0.9e5, 0.9e5, 0.6e5, 0.6e5])  # [N/m] of WHEELS: stiff drives, so casters bear little
 
 
 def robot(masses=None):
@@ -79,9 +86,9 @@ def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     postures = rigid_robot.random_angles(rng, 12)
     trial, wrench = stood(postures, masses, OFF)
-    many = plate_place(sources, [trial], [wrench])
+    many = plate_place(sources, [Read(trial, REST, wrench)])
     trial, wrench = stood(np.repeat(postures[:1], 12, axis=0), masses, OFF)
-    one = plate_place(sources, [trial], [wrench])
+    one = plate_place(sources, [Read(trial, REST, wrench)])
     assert np.linalg.norm(many - OFF) < 0.7e-3
     assert np.linalg.norm(one - OFF) > 2e-3
 
@@ -89,8 +96,8 @@ def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
 def test_a_plate_in_its_place_and_nominal_links_leave_nothing():
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     trial, wrench = stood(rigid_robot.random_angles(np.random.default_rng(3), 4), None, np.zeros(2))
-    np.testing.assert_allclose(plate_place(sources, [trial], [wrench]), 0.0, atol=1e-6)
-    np.testing.assert_array_equal(plate_place(sources, [trial], [replace(wrench, dynamics=None)]), 0.0)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)]), 0.0, atol=1e-6)
+    np.testing.assert_array_equal(plate_place(sources, [Read(trial, REST, replace(wrench, dynamics=None))]), 0.0)
 
 
 def test_seconds_in_which_a_joint_moves_do_not_count():
@@ -104,4 +111,72 @@ def test_seconds_in_which_a_joint_moves_do_not_count():
     loads = signal(t, u + moves[:, None] * [5.0, 20.0, -20.0]), signal(t, u)
     wrench = Wrenches("a", 0.0, *loads, np.zeros(0), none, wheels)
     assert 0.3 < moves.mean() < 0.95
-    np.testing.assert_allclose(plate_place(sources, [trial], [wrench]), 0.0, atol=1e-5)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)]), 0.0, atol=1e-5)
+
+
+PLANE = 1e5  # [N/m, N.m/rad]
+
+
+def pressed(wheels, p):
+    """Compression d (3,) of a floor that pulls at no wheel, N_i = w_i + k_i a_i d or 0, under loads p (n, 3)."""
+    a, found = np.column_stack([np.ones(len(SPRINGS)), wheels.position]), []
+    own = 0.8 * wheels.weight
+    for load in p:
+        touches = np.ones(len(SPRINGS), dtype=bool)
+        for _ in range(10):
+            b, k = a[touches], SPRINGS[touches]
+            d = np.linalg.solve(b.T @ (k[:, None] * b), load - b.T @ own[touches])
+            touches = own + SPRINGS * (a @ d) > 0.0
+        found.append(d)
+    return np.array(found)
+
+
+def rocked(wheels, amplitude, rng):
+    """A trial of a base that rocks on SPRINGS, a share of the seconds with casters off the floor."""
+    motor = rigid_robot.swing(np.zeros(8), np.full(8, 0.3), 12.0)
+    trial = rigid_robot.record(STILL, motor, 0.0, rng, plate=False)
+    t = trial.t_plate
+    f, phase = rng.uniform(0.2, 0.5, 3), rng.uniform(0.0, 6.0, 3)
+    swing = (np.sin(2.0 * np.pi * f * (t[:, None] - 1.0) + phase) - np.sin(phase)) * np.clip(t[:, None] - 1.0, 0.0, 1.0)
+    p = np.array([730.0, 5.0, 0.0]) + swing * amplitude * [60.0, 40.0, 25.0]
+    d = pressed(wheels, p)
+    x, w = np.zeros((len(t), 6)), np.zeros((len(t), 6))
+    x[:, 2:5] = (d - d[0]) * [-1.0, 1.0, -1.0]
+    x[:, 2:5] = x[:, (2, 4, 3)]
+    w[:, (2, 4, 3)] = p * [-1.0, 1.0, -1.0]
+    w[:, (0, 1, 5)] = swing * amplitude
+    x[:, (0, 1, 5)] = w[:, (0, 1, 5)] / PLANE
+    in_lab = w @ pin.SE3(T_LAB_BASE).dualAction.T
+    return replace(moved(trial, x, t), plate_wrench=in_lab[:, None])
+
+
+def rocking(amplitude):
+    """Tilting, as fitted with springs that pull and as `tilting_of` has it, and the springs' own K."""
+    sources, rng = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE), np.random.default_rng(2)
+    wheels = wheel_set(mjcf.urdf(), DESCRIPTION.wheels, G)
+    trials = [replace(rocked(wheels, amplitude, rng), id=name) for name in "abcd"]
+    rests = [rest_of(DESCRIPTION, trial, sources.T_base_B) for trial in trials]
+    loads = [sources.plate_load(trial, rest.T_lab_0) for trial, rest in zip(trials, rests, strict=True)]
+    seen = [base_response_of(DESCRIPTION, *one) for one in zip(trials, rests, loads, strict=True)]
+    linear = fit_compliance(seen, np.ones((6, 6), dtype=bool))
+    sums = np.ones((4, 6))
+    tried = HeldOut(1e-2 * sums, sums, 1e-6 * sums, np.full(4, 1e3))
+    none = np.zeros((6, 6))
+    suspension = Suspension("compliance", linear.K, linear.C, none, none, (("plate", tried),), (), ())
+    wrenches = [Wrenches("a", 0.0, load, None, np.zeros(0), np.zeros((0, 6, 6)), wheels) for load in loads]
+    read = [Read(*one) for one in zip(trials, rests, wrenches, strict=True)]
+    a = np.column_stack([np.ones(len(SPRINGS)), wheels.position[:, 1], -wheels.position[:, 0]])
+    return linear.K, tilting_of(sources, read, wheels, suspension)[0].K, a.T @ (SPRINGS[:, None] * a)
+
+
+def test_casters_that_lift_off_do_not_make_the_base_softer():
+    linear, found, springs = rocking(0.8)
+    assert linear[4, 4] < 0.8 * springs[2, 2]
+    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.05)
+    np.testing.assert_array_equal(found[[0, 1, 5]], linear[[0, 1, 5]])
+
+
+def test_where_no_wheel_lifts_off_the_compliance_stays():
+    linear, found, springs = rocking(0.2)
+    np.testing.assert_array_equal(found, linear)
+    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.03)
