@@ -9,7 +9,7 @@ better one. Out of valleys that no single parameter leads out of, two frictions 
 end, up to ten times as wide as the information has it: a few steps from the best of these. Without them one matched
 robot in ten ends far off, and front casters seem to slide where drives do.
 
-The cost is rough: data that differ by single precision end half a standard deviation apart. So the last steps are of
+The cost is rough: data that differ by single precision end half a standard deviation apart. So the last step is of
 
     z_i = (c(-1) - c(1)) / 2 / max(c(1) + c(-1) - 2 c(0), 2),    p = p_0 + H^-1/2 z,    c(+-1) at z_i = +-1
 
@@ -33,7 +33,7 @@ _LONGEST = 0.7  # step of a logarithm, at most
 _DAMPING = 1e-2, 6.0, 1e-5, 1e5  # at the start, factor, least, most
 _AT_ONCE = 4  # dampings that are tried: as fast as one
 _GAIN = 0.5  # of the cost, below which a search ends
-_ROUNDS = 3  # of the last steps
+_ROUNDS = 1  # of the last steps
 _CLIFF = 4.0  # rise of the cost within a standard deviation where a wheel begins to slide
 _WIDER = np.repeat([1.0, 3.0, 10.0], 16)  # draws about an end, times their sigma
 _VALLEY = 3.0  # by which the cost of another valley is less

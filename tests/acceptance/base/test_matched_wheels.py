@@ -29,7 +29,6 @@ def standardized(seed):
     return ((found.logarithms - true.logarithms) / sigma)[JUDGED], sigma[JUDGED] < KNOWN
 
 
-@pytest.mark.xfail(reason="0.973: a little too wide, docs/limits.md", strict=True)
 def test_intervals_of_wheels_contain_the_share_they_state(claim):
     z, known = (np.array(part) for part in zip(*map(standardized, range(FIRST, FIRST + ROBOTS)), strict=True))
     share = np.mean(np.abs(z[known]) < 1.96)
