@@ -2,6 +2,7 @@
 
     C = R (S + Ad V Ad') R'         of the hand's place [m2, lab],   R of T_lab_H,  Ad of T_0_H^-1
     |e| <= radius of 95 %           inside; of |e|^2 as a gamma variable, see `hand_uncertainty`
+    b = R Ad d                      by which a row on springs alone is known to be off, d by which the base slips
 
 S is the covariance of the hand's local twist in the base: parameters, readings, drive trains, column; V (6,) variances
 of the base's displacement in frame 0, or of its markers' pose where it is measured; a base on wheels that is taken to
@@ -50,7 +51,7 @@ class Bands:
             S[name][known] = self._robot(name, entry.payload).predict(trial.t_mocap[known], q[known]).covariance
         base = poses_of(self.description.base_body, trial).covariance * self.description.sigmas.marker**2
         rows = (
-            replace(row, covariance=_in_lab(row, S[row.model], base, predicted))
+            replace(row, covariance=_in_lab(row, S[row.model], base, predicted), offset=_offset(row, predicted))
             if row.model in S and row.encoder == "motor" and not self._unknown(row, predicted)
             else row
             for row in predicted.rows
@@ -94,3 +95,12 @@ def _in_lab(row: Prediction, S: np.ndarray, markers: np.ndarray, predicted: Pred
         return None
     R = T[:, :3, :3]
     return np.asarray(R @ S[:, :3, :3] @ np.swapaxes(R, 1, 2))
+
+
+def _offset(row: Prediction, predicted: PredictedTrial) -> np.ndarray | None:
+    """(n, 3) of the hand's place by where the base slips to [m, lab]; None where it does not."""
+    if row.base_offset is None or predicted.base is None or predicted.base.rest is None:
+        return None
+    T = row.T_lab_hand
+    twist = adjoint(inverse(T) @ predicted.base.rest.T_lab_0) @ row.base_offset[..., None]
+    return np.asarray((T[:, :3, :3] @ twist[:, :3])[..., 0])

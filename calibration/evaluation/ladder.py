@@ -84,7 +84,7 @@ def trial_errors(
     e, static = pose_errors(p.T_lab_hand, T_reference), p.kind == "static"
     scored, radius = scored_errors(p.t, e, dwells, static), None
     if p.covariance is not None:
-        radius = radius_95(p.covariance if static or noise is None else p.covariance + noise)
+        radius = radius_95(p.covariance if static or noise is None else p.covariance + noise, p.offset)
         radius = (
             np.array([_mean(radius[(p.t >= a) & (p.t <= b)]) for a, b in dwells]) if static else _after(p.t, radius)
         )

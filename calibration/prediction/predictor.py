@@ -85,6 +85,7 @@ class Predictor:
                 trial.t_mocap,
                 T @ poses.in_base(row, encoder, source),
                 poses.base_variance(row, source),
+                poses.base_offset(row, source),
             )
             for row, _, encoder in self._rows()
             for source in row.bases
@@ -218,7 +219,7 @@ class TrialPoses:
     def base_variance(self, row: LadderRow, source: Base) -> np.ndarray | None:
         """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known.
 
-        Of a row on springs alone: V + (x_slipping - x_springs)^2 where it is known how the base slips, with variance V.
+        Of a row on springs alone as of a base that slips, about `base_offset`, where it is known how it does.
         """
         if self.loaded is None or source not in SOURCES:
             return None
@@ -227,10 +228,16 @@ class TrialPoses:
         if source != "plate" and source != "dynamics":
             return tried.still
         if (slipped := self.slipped(source)) is not None:
-            found = None if row.bundle else self.displaced(source, row.name)
-            return slipped.motion.variance + (0.0 if found is None else (slipped.motion.x - found[1]) ** 2)
+            return slipped.motion.variance
         tried = known.get(source, tried)
         return tried.variance(tried.moves)
+
+    def base_offset(self, row: LadderRow, source: Base) -> np.ndarray | None:
+        """(n, 6) x_slipping - x_springs [m, rad, frame 0] of a row on springs alone; None where nothing slips."""
+        if row.bundle or source not in ("plate", "dynamics") or self.loaded is None:
+            return None
+        slipped, found = self.slipped(source), self.displaced(source, row.name)
+        return None if slipped is None or found is None else slipped.motion.x - found[1]
 
     def delivered(self) -> Delivered | None:
         """Parts of the row that is delivered; None where it has no prediction of this trial."""

@@ -94,10 +94,17 @@ class Predicted:
         return radius_95(self.covariance)
 
 
-def radius_95(covariance: np.ndarray) -> np.ndarray:
-    """(...) distance from a prediction within which 95 % are [m], by covariances (..., 3, 3)."""
+def radius_95(covariance: np.ndarray, offset: np.ndarray | None = None) -> np.ndarray:
+    """(...) distance from a prediction within which 95 % are [m], by covariances (..., 3, 3).
+
+    About a place that is known to be off by b (..., 3) [m], |e|^2 has the mean tr C + |b|^2 and the variance
+    2 tr C^2 + 4 b' C b.
+    """
     mean = np.trace(covariance, axis1=-2, axis2=-1)
     half = (covariance**2).sum(axis=(-2, -1))
+    if offset is not None:
+        mean = mean + (offset**2).sum(axis=-1)
+        half = half + 2.0 * np.einsum("...i,...ij,...j->...", offset, covariance, offset)
     return np.asarray(np.sqrt(gammaincinv(0.5 * mean**2 / half, 0.95) * (2.0 * half / mean)))
 
 

@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from calibration.numerics.lie import inverse
+
 
 @pytest.fixture(scope="module")
 def score(quick_run):
@@ -58,12 +60,18 @@ def test_a_zero_beside_a_gap_that_is_not_seen_is_as_uncertain_as_half_the_gap(sc
 
 def test_a_base_on_springs_alone_is_off_by_what_slips(quick_run):
     trial = next(t for t in quick_run.evaluation.predicted if t.kind != "static")
-    of = {p.model: p.base_variance for p in trial.rows if (p.base, p.encoder) == ("plate", "motor")}
+    of = {p.model: p for p in trial.rows if (p.base, p.encoder) == ("plate", "motor")}
     motion, sprung = dict(trial.base.slipped)["plate"].motion, dict(trial.base.predicted)["plate"]
-    np.testing.assert_array_equal(of["full"], motion.variance)
-    off = np.sqrt(of["model_2"] - of["full"])
-    np.testing.assert_allclose(off, np.abs(motion.x - sprung), atol=0.05 * off.max())
-    assert off[:, 5].max() > 1e-5
+    assert of["full"].base_offset is None
+    for row in (of["full"], of["model_2"]):
+        np.testing.assert_array_equal(row.base_variance, motion.variance)
+    off = of["model_2"].base_offset
+    np.testing.assert_allclose(off, motion.x - sprung, atol=0.05 * np.abs(off).max())
+    assert np.abs(off[:, 5]).max() > 1e-5
+    moved = (trial.base.rest.poses(motion.x) @ inverse(trial.base.rest.poses(motion.x - off)))[:, :3]
+    T = of["model_2"].T_lab_hand
+    at_hand = (moved[:, :, :3] @ T[:, :3, 3:] + moved[:, :, 3:])[..., 0] - T[:, :3, 3]
+    np.testing.assert_allclose(of["model_2"].offset, at_hand, atol=0.02 * np.nanmax(np.abs(at_hand)))
 
 
 def test_the_estimate_reads_back_and_predicts_the_same(quick_run):

@@ -5,7 +5,7 @@ import pytest
 
 from calibration.numerics.lie import exp6, inverse
 from calibration.robot.hand import nominal_hand
-from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
+from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points, radius_95
 from tests.doubles import rigid_robot
 
 X = np.array(rigid_robot.BODIES["gripper"][1])
@@ -48,3 +48,13 @@ def test_a_hand_that_was_seen_as_a_point_has_random_errors_of_its_place_only():
 def test_the_radius_of_a_sphere_is_that_of_chi_with_three_degrees():
     found = Predicted(np.zeros((1, 1, 3)), np.eye(3)[None, None])
     assert found.radius_95[0, 0] == pytest.approx(np.sqrt(7.815), rel=1e-3)
+
+
+@pytest.mark.parametrize("far", [0.0, 1.0, 5.0])
+def test_a_place_that_is_known_to_be_off_is_no_random_error(far):
+    rng, offset = np.random.default_rng(3), far * np.array([2.0, -1.0, 0.5])
+    A = rng.normal(size=(3, 3))
+    radius = radius_95((A @ A.T)[None], offset[None])[0]
+    e = np.linalg.norm(rng.normal(size=(100000, 3)) @ A.T + offset, axis=1)
+    assert (e <= radius).mean() == pytest.approx(0.95, abs=0.012)
+    assert radius <= radius_95((A @ A.T + np.outer(offset, offset))[None])[0]
