@@ -11,7 +11,15 @@ from calibration.stages.drive_trains.identification import Candidate, judged, lo
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.quantities import covariance_of, reported, reverses
 from calibration.stages.drive_trains.steady_contact import slipped_encoder, steady_contact
-from calibration.stages.drive_trains.train_fit import FLOORS, Problem, derivatives, evaluated, fit_train, prior_of
+from calibration.stages.drive_trains.train_fit import (
+    FLOORS,
+    Problem,
+    TrainFit,
+    derivatives,
+    evaluated,
+    fit_train,
+    prior_of,
+)
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
 ECCENTRICITY = np.array([4e-3, 1e-3, -2e-3, 3e-4, -5e-4])
@@ -234,3 +242,22 @@ def test_a_stiff_joint_s_load_is_what_its_changes_of_side_show() -> None:
     steady = steady_contact(of, theta, ECCENTRICITY)
     assert steady is not None and np.sqrt(steady.covariance[5, 5]) > 0.3
     assert loaded(steady, of).theta[-1] == pytest.approx(1.0, abs=0.15) != steady.theta[-1]
+
+
+def test_where_a_play_operator_found_the_friction_the_link_keeps_its_inertia(monkeypatch) -> None:
+    """A play operator lets a link in its gap jump where its own inertia needs more than the friction it was given."""
+    bare, inertia = data(load=0.0), 0.05
+    motion = replace(bare.motion, torque=inertia * bare.motion.a, inertia=np.full(len(bare.motion.q), inertia))
+    delta = bare.means(replace(TRUTH, dynamic=True).deltas(motion, motion.torque, np.zeros(3)))
+    of = problem(replace(bare, motion=motion, y=delta + bare.terms @ ECCENTRICITY))
+    wrong = np.array([3e-3, 8e-4, 0.6, 0.05, 0.0])
+
+    def ends(of: Problem, theta: np.ndarray, floors: tuple[float, ...]) -> TrainFit:
+        return evaluated(of, wrong if of.dynamic else np.append(TRUTH.values[:4], 0.0), ECCENTRICITY)
+
+    rough = fit_train(of, START, FLOORS[:2])
+    monkeypatch.setattr(identification, "fit_train", ends)
+    monkeypatch.setattr(Problem, "believes", lambda *_: True)
+    found = identification._dead_zone(of, rough).fit
+    assert found.problem.dynamic
+    np.testing.assert_array_equal(found.theta[:4], TRUTH.values[:4])
