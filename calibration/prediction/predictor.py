@@ -84,8 +84,7 @@ class Predictor:
                 entry.kind,
                 trial.t_mocap,
                 T @ poses.in_base(row, encoder, source),
-                poses.base_variance(row, source),
-                poses.base_offset(row, source),
+                *poses.base_spread(row, source),
             )
             for row, _, encoder in self._rows()
             for source in row.bases
@@ -216,28 +215,22 @@ class TrialPoses:
         if any(self.base(row, source) is not None for row in rows):
             self.geared(source)
 
-    def base_variance(self, row: LadderRow, source: Base) -> np.ndarray | None:
-        """(6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is measured or not known.
+    def base_spread(self, row: LadderRow, source: Base) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Variances (6,) or (n, 6) of its displacement in frame 0 [m2, rad2], None where it is measured or not known.
 
-        Of a row on springs alone as of a base that slips, about `base_offset`, where it is known how it does.
+        And, of a row on springs alone, x_slipping - x_springs (n, 6) [m, rad] where it is known how the base slips.
         """
         if self.loaded is None or source not in SOURCES:
-            return None
+            return None, None
         known = dict(self.loaded.suspension.held_out)
         tried = next(iter(known.values()))
         if source != "plate" and source != "dynamics":
-            return tried.still
+            return tried.still, None
         if (slipped := self.slipped(source)) is not None:
-            return slipped.motion.variance
+            found = None if row.bundle else self.displaced(source, row.name)
+            return slipped.motion.variance, None if found is None else slipped.motion.x - found[1]
         tried = known.get(source, tried)
-        return tried.variance(tried.moves)
-
-    def base_offset(self, row: LadderRow, source: Base) -> np.ndarray | None:
-        """(n, 6) x_slipping - x_springs [m, rad, frame 0] of a row on springs alone; None where nothing slips."""
-        if row.bundle or source not in ("plate", "dynamics") or self.loaded is None:
-            return None
-        slipped, found = self.slipped(source), self.displaced(source, row.name)
-        return None if slipped is None or found is None else slipped.motion.x - found[1]
+        return tried.variance(tried.moves), None
 
     def delivered(self) -> Delivered | None:
         """Parts of the row that is delivered; None where it has no prediction of this trial."""

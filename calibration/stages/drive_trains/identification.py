@@ -13,7 +13,6 @@ A fit without a trial is one Gauss-Newton step from the fit of all. c windows ha
 out: a stop or a jolt before decides it, whatever the form.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -24,7 +23,6 @@ from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB, HALF_GAP
 from calibration.stages.drive_trains.quantities import covariance_of, reported
 from calibration.stages.drive_trains.steady_contact import SteadyContact, steady_contact
-from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.drive_trains.train_fit import (
     FLOORS,
     Problem,
@@ -38,8 +36,6 @@ from calibration.stages.drive_trains.train_fit import (
     weights,
 )
 
-_MOST, _LEAST = 6, 0.005  # modes, and the least torque [N.m rms] one is worth: fewer make a load too large or small
-_THINNED = 10  # samples between those the modes are of
 _FRICTION, _TORQUE = 0.15, 0.045  # share of the friction, and [N.m], to which a load is not known
 _SURE, _FEW = 0.1, 20  # of the half gap that an error of the torque moves a link by; windows
 _OTHER_SIDE = 12.0**0.5  # doubt of a link that is at the other end each time
@@ -72,14 +68,6 @@ class Candidate:
     score: float
     left_out: np.ndarray
     covariance: np.ndarray
-
-
-def load_modes(loads: Sequence[LinkLoads], column: int, root: np.ndarray) -> np.ndarray:
-    """Directions (p, z) of the inertial parameters that move a joint's torque most; root (p, p) of their covariance."""
-    R = np.concatenate([of_trial.regressor[::_THINNED, column] for of_trial in loads]) @ root
-    _, size, V = np.linalg.svd(R, full_matrices=False)
-    z = min(_MOST, int((size / np.sqrt(len(R)) > _LEAST).sum()))
-    return np.asarray(root @ V[:z].T)
 
 
 def identify(

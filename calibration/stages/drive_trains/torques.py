@@ -11,6 +11,7 @@ turns all it carries by its compliance times the moment of what it carries. 5 mr
 shoulder.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,6 +30,8 @@ from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second
 _SLOW, _FAST = 5.0, 12.0  # [Hz] of the base's, from markers: at all times, and where it is jolted
 _JOLT = 0.15  # [s] over which the energy of a jolt is compared with the noise
+_MOST, _LEAST = 6, 0.005  # modes, and the least torque [N.m rms] one is worth: fewer make a load too large or small
+_THINNED = 10  # samples between those the modes are of
 _TILT, _BENDING = 5e-3, 1e-4  # [rad], [rad/(N.m)] their prior standard deviations
 
 
@@ -202,3 +205,11 @@ def _accelerations(x: Signal) -> np.ndarray:
     energy = uniform_filter1d((fast - slow) ** 2, width, axis=0)
     noise = 2.0 * np.median(energy, axis=0)
     return np.asarray(slow + np.clip(1.0 - noise / np.maximum(energy, np.finfo(float).tiny), 0.0, 1.0) * (fast - slow))
+
+
+def load_modes(loads: Sequence[LinkLoads], column: int, root: np.ndarray) -> np.ndarray:
+    """Directions (p, z) of the inertial parameters that move a joint's torque most; root (p, p) of their covariance."""
+    R = np.concatenate([of_trial.regressor[::_THINNED, column] for of_trial in loads]) @ root
+    _, size, V = np.linalg.svd(R, full_matrices=False)
+    z = min(_MOST, int((size / np.sqrt(len(R)) > _LEAST).sum()))
+    return np.asarray(root @ V[:z].T)
