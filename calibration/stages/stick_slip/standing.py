@@ -40,6 +40,7 @@ SOURCES: tuple[Source, ...] = ("plate", "dynamics")
 _ROOT = 2e-3  # [m]
 _STILL = 0.01  # [rad, m] of a joint in a second
 _FEWEST = 20  # readings in it
+_FEWEST_TRIALS = 2
 _FORCE, _LEVER = 2.0, 3e-4  # [N], [m] of the weight: what a second at rest leaves unexplained
 _LIFTED, _ROUNDS = 0.01, 2  # share of the samples in which a wheel is off the floor; fits
 
@@ -64,11 +65,11 @@ def tilting_of(
     loads = [(one, sources.plate_load(one.trial, one.rest.T_lab_0)) for one in read if one.wrenches.plate is not None]
     for _ in range(_ROUNDS if tilts else 0):
         standing = tilting.standing(wheels, "plate")
-        if not loads or np.mean([_lifted(standing, load) for _, load in loads]) < _LIFTED:
+        found = _lifting_compliance(sources, loads, standing, tilting)
+        if found is None:
             break
-        K, C = _lifting_compliance(sources, loads, standing, tilting)
-        prior = _prior(wheels, K)
-        tilting = Tilting(K, C, off, prior.shares)
+        prior = _prior(wheels, found[0])
+        tilting = Tilting(*found, off, prior.shares)
     return tilting, prior
 
 
@@ -84,8 +85,11 @@ def _lifted(standing: np.ndarray, load: Load) -> float:
 
 def _lifting_compliance(
     sources: WrenchSources, loads: Sequence[tuple[Read, Load]], standing: np.ndarray, before: Tilting
-) -> tuple[np.ndarray, np.ndarray]:
-    """K and C (6, 6), those of z, rx, ry fitted to what the wheels, rows (m, 10), bear of the plate's loads."""
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """K and C (6, 6), those of z, rx, ry fitted to what wheels, rows (m, 10), bear of the plate's loads.
+
+    None where hardly one lifts off.
+    """
 
     def response(one: Read, load: Load) -> BaseResponse | None:
         load = replace(load, signal=replace(load.signal, x=borne(standing, load.signal.x)))
@@ -94,9 +98,12 @@ def _lifting_compliance(
         except NotEnoughData:
             return None
 
-    found = side_by_side(response, *zip(*loads, strict=True))
-    couples = wheel_model(sources.lab.description.wheels, "contact").couples
-    fitted = fit_compliance([one for one in found if one is not None], couples)
+    if len(loads) < _FEWEST_TRIALS or np.mean([_lifted(standing, load) for _, load in loads]) < _LIFTED:
+        return None
+    responses = [one for one in side_by_side(response, *zip(*loads, strict=True)) if one is not None]
+    if len(responses) < _FEWEST_TRIALS:
+        return None
+    fitted = fit_compliance(responses, wheel_model(sources.lab.description.wheels, "contact").couples)
     h, K, C = np.ix_(HEAVE, HEAVE), before.K.copy(), before.C.copy()
     K[h], C[h] = fitted.K[h], fitted.C[h]
     return K, C
