@@ -33,7 +33,6 @@ _LONGEST = 0.7  # step of a logarithm, at most
 _DAMPING = 1e-2, 6.0, 1e-5, 1e5  # at the start, factor, least, most
 _AT_ONCE = 4  # dampings that are tried: as fast as one
 _GAIN = 0.5  # of the cost, below which a search ends
-_ROUNDS = 1  # of the last steps
 _CLIFF = 4.0  # rise of the cost within a standard deviation where a wheel begins to slide
 _WIDER = np.repeat([1.0, 3.0, 10.0], 16)  # draws about an end, times their sigma
 _VALLEY = 3.0  # by which the cost of another valley is less
@@ -90,16 +89,15 @@ def settled(trials: Trials, best: Point) -> tuple[Point, tuple[np.ndarray, np.nd
 
     And information (k, p, p) and gradient (k, p) of the trials there, by differences as wide.
     """
-    end, (H_k, _) = best.cost, trials.normal(best.logarithms, best.errors)
-    for _ in range(_ROUNDS):
-        root = _root(trials, H_k)
-        z, E = _around(trials, best, root)
-        (new,) = tried(trials, [best.logarithms + np.clip(z, -1.0, 1.0) @ root])
-        if new.cost > end + _GAIN:
-            break
-        (H_k, _), best = trials.weighed(E, root, best.errors), new
+    H_k, _ = trials.normal(best.logarithms, best.errors)
     root = _root(trials, H_k)
-    return best, trials.weighed(_around(trials, best, root)[1], root, best.errors)
+    z, E = _around(trials, best, root)
+    (new,) = tried(trials, [best.logarithms + np.clip(z, -1.0, 1.0) @ root])
+    if new.cost <= best.cost + _GAIN:
+        (H_k, _), best = trials.weighed(E, root, best.errors), new
+        root = _root(trials, H_k)
+        _, E = _around(trials, best, root)
+    return best, trials.weighed(E, root, best.errors)
 
 
 def _around(trials: Trials, at: Point, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
