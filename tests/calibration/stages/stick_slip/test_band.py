@@ -4,6 +4,7 @@ import pytest
 from calibration.stages.stick_slip.band import (
     LEAST,
     LEAST_HEAVE,
+    LIKE,
     PRIOR,
     Band,
     LeftOut,
@@ -53,12 +54,12 @@ def test_the_band_grows_with_the_largest_slip_and_never_shrinks_below_its_floor(
 def test_a_base_that_begins_under_another_load_is_preloaded_the_more():
     band = Band(*np.ones((4, 3)), np.array([40.0, 5.0]))
     np.testing.assert_allclose(band.begun(np.array([730.0, 40.0, 5.0])).start, 1.0)
-    np.testing.assert_allclose(band.begun(np.array([700.0, 40.0, 35.0])).start, np.sqrt(10.0))
+    np.testing.assert_allclose(band.begun(np.array([700.0, 40.0, 35.0])).start, np.sqrt(1.0 + (30.0 / LIKE) ** 2))
     found = fitted_band(
         rows(np.random.default_rng(2), 5), NOISE, np.array([[0.0, 40.0, 5.0]] * 3 + [[0.0, 9.0, 9.0]] * 2)
     )
     np.testing.assert_array_equal(found.usual, [40.0, 5.0])
-    np.testing.assert_allclose(other_start(np.array([[40.0, 5.0], [40.0, 15.0]]), found.usual), [1.0, 2.0])
+    np.testing.assert_allclose(other_start(np.array([[40.0, 5.0], [40.0, 5.0 + LIKE]]), found.usual), [1.0, 2.0])
 
 
 def test_a_slip_is_believed_as_far_as_it_is_larger_than_its_band():
