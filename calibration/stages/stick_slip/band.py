@@ -12,8 +12,8 @@ slip so far, of which a share l_a [-] stays. An error stays once it is there, so
 
 V is widened to the band's variance, (t / 1.96)^2 times by the 97.5 % quantile of n - 1 degrees of freedom of n trials.
 A dozen trials do not identify four numbers: PRIOR is what left-out and new trials of robots of development share, with
-it 95 % of the errors of 28 new ones are inside, ten fixed and 18 sampled, and after jolts of seven more. A trial that is
-left out is predicted by parameters that are less certain: its own shift (x_k - x_(-k))^2 is added to var_e.
+it 95 % of the errors of 28 new ones are inside, ten fixed and 18 sampled, and after jolts of seven more. A trial that
+is left out is predicted by parameters that are less certain: its own shift (x_k - x_(-k))^2 is added to var_e.
 
 Where the band is wider than the slip that is predicted, that prediction is worth nothing:
 
