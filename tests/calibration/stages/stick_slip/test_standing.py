@@ -24,7 +24,6 @@ STILL = rigid_robot.Truth(marker_sigma=1e-5, encoder_quantum=0.0, robot=(0.0, 0.
 OFF = np.array([4e-3, -3e-3])
 G = 9.81
 REST = Rest(np.eye(4), np.eye(4))
-HEAVE = np.ix_((2, 3, 4), (2, 3, 4))
 SPRINGS = np.array([2.0e5, 2.0e5, 0.9e5, 0.9e5, 0.6e5, 0.6e5])  # [N/m] of WHEELS: stiff drives, so casters bear little
 
 
