@@ -76,7 +76,7 @@ class SlipState(NamedTuple):
         before: (11,) the last sample as the kernel takes it.
         bases: The members, then the preloaded optimum.
         found: (5, 3) see `banded`.
-        band: (4, 3) s, r, p g, l of a trial that begins so.
+        band: (4, 3) s, r, (p^2 + g^2)^1/2, l of a trial that begins so.
         x: (3,) x, y, yaw [m, rad, frame 0].
     """
 

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from calibration.stages.stick_slip.band import (
+    FAR,
     LEAST,
     LEAST_HEAVE,
-    LIKE,
+    OTHER,
     PRIOR,
     Band,
     LeftOut,
@@ -27,7 +28,7 @@ def rows(rng, n, size=1.0):
     """Trials whose errors, one each, grow with the slip and the members' spread `size` times as robots' do."""
     ensemble, preloaded = rng.gamma(1.0, 1e-11, (n, 3)), rng.gamma(1.0, 1e-9, (n, 3))
     slipped = rng.gamma(1.0, 1e-6, (n, 3))
-    s, r, p, slip = size * np.exp(PRIOR).T
+    s, r, p, slip = size * np.exp(PRIOR[0]).T
     V = np.maximum(s, LEAST) ** 2 + r**2 * ensemble + p**2 * preloaded + slip**2 * slipped
     return LeftOut(V * rng.normal(size=(n, 3)) ** 2, ensemble, preloaded, slipped)
 
@@ -54,12 +55,16 @@ def test_the_band_grows_with_the_largest_slip_and_never_shrinks_below_its_floor(
 def test_a_base_that_begins_under_another_load_is_preloaded_the_more():
     band = Band(*np.ones((4, 3)), np.array([40.0, 5.0]))
     np.testing.assert_allclose(band.begun(np.array([730.0, 40.0, 5.0])).start, 1.0)
-    np.testing.assert_allclose(band.begun(np.array([700.0, 40.0, 35.0])).start, np.sqrt(1.0 + (30.0 / LIKE) ** 2))
+    half = band.begun(np.array([700.0, 40.0, 5.0 + FAR])).start
+    np.testing.assert_allclose(half, np.sqrt(1.0 + 0.5 * OTHER**2))
+    most = band.begun(np.array([700.0, 40.0, 5.0 + 1e3 * FAR])).start
+    np.testing.assert_allclose(most, np.sqrt(1.0 + OTHER**2), rtol=1e-6)
     found = fitted_band(
         rows(np.random.default_rng(2), 5), NOISE, np.array([[0.0, 40.0, 5.0]] * 3 + [[0.0, 9.0, 9.0]] * 2)
     )
     np.testing.assert_array_equal(found.usual, [40.0, 5.0])
-    np.testing.assert_allclose(other_start(np.array([[40.0, 5.0], [40.0, 5.0 + LIKE]]), found.usual), [1.0, 2.0])
+    loads = np.array([[40.0, 5.0], [40.0, 5.0 + FAR]])
+    np.testing.assert_allclose(other_start(loads, found.usual), [0.0, 0.5 * OTHER**2])
 
 
 def test_a_slip_is_believed_as_far_as_it_is_larger_than_its_band():
