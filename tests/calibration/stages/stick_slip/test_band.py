@@ -24,21 +24,25 @@ from tests.calibration.stages.stick_slip.slipping import TRUTH
 NOISE = np.array([1e-6, 1e-6, 1e-6])
 
 
-def rows(rng, n, size=1.0):
+def rows(rng, n, size=1.0, corrected=True):
     """Trials whose errors, one each, grow with the slip and the members' spread `size` times as robots' do."""
     ensemble, preloaded = rng.gamma(1.0, 1e-11, (n, 3)), rng.gamma(1.0, 1e-9, (n, 3))
     slipped = rng.gamma(1.0, 1e-6, (n, 3))
-    s, r, p, slip = size * np.exp(PRIOR[0]).T
+    s, r, p, slip = size * np.exp(PRIOR[0 if corrected else 1]).T
     V = np.maximum(s, LEAST) ** 2 + r**2 * ensemble + p**2 * preloaded + slip**2 * slipped
     return LeftOut(V * rng.normal(size=(n, 3)) ** 2, ensemble, preloaded, slipped)
 
 
-@pytest.mark.parametrize(("size", "low", "high"), [(0.5, 0.93, 0.99), (1.0, 0.90, 0.98), (2.0, 0.87, 0.98)])
-def test_the_band_holds_its_share_of_what_it_has_not_seen(size, low, high):
+@pytest.mark.parametrize(
+    ("corrected", "size", "low", "high"),
+    [(True, 0.5, 0.93, 0.99), (True, 1.0, 0.90, 0.98), (True, 2.0, 0.87, 0.98), (False, 1.0, 0.90, 0.98)],
+)
+def test_the_band_holds_its_share_of_what_it_has_not_seen(corrected, size, low, high):
     rng = np.random.default_rng(1)
     share = []
     for _ in range(40):
-        band, new = fitted_band(rows(rng, 13, size), NOISE, np.zeros((13, 3))), rows(rng, 100, size)
+        band = fitted_band(rows(rng, 13, size, corrected), NOISE, np.zeros((13, 3)), corrected)
+        new = rows(rng, 100, size, corrected)
         V = band.variance(new.ensemble, new.preloaded, new.slipped)
         share.append((new.square < 1.96**2 * V).mean(axis=0))
     assert np.all(np.mean(share, axis=0) > low) and np.all(np.mean(share, axis=0) < high)
