@@ -29,7 +29,9 @@ ROOT = Path(__file__).parents[3]
 LOG_FILE = ROOT / "tests/data/vicon_forceplate_2023-09-20.csv"
 T = np.arange(0.0, 30.0, 0.01)
 START = 23.416  # [s] of the log, where the fitted swings are at rest
-PITCH = pytest.mark.xfail(reason="pitch of the log, 79.5 % inside since wheels have mass: docs/limits.md", strict=True)
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+ASKED = {"as sampled": ("y", "roll", "pitch", "yaw"), "markers shift": AXES[1:], "and casters turn": AXES}
+OPEN = {40: {("as sampled", "pitch")}}  # 79.5 % of the time, docs/limits.md
 
 
 @pytest.fixture(scope="module")
@@ -222,17 +224,16 @@ def test_the_swings_start_at_full_speed_under_the_joints_limits():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 20, pytest.param(40, marks=PITCH)])
+@pytest.mark.parametrize("seed", [0, 20, 40])
 def test_the_log_moves_among_the_draws(log, seed, claim):
     """As drawn y, roll, pitch and yaw; z, too, where markers shift as the log's; all where casters turn as well."""
-    trials, scenario = recorded(load_dataset(log)), load("reality", [f"seed={seed}"])
-    drawn, shifting, turning = (compare_replay(scenario, trials, 20, c).share for c in (AS_DRAWN, *CAUSES))
-    for name, shares in {"as sampled": drawn, "markers shift": shifting, "and casters turn": turning}.items():
-        for axis, share in zip(("x", "y", "z", "roll", "pitch", "yaw"), shares, strict=True):
-            claim(f"reality/replay/{name}/{axis}#{seed}", share)
-    assert min(drawn[k] for k in (1, 3, 4, 5)) >= 0.8
-    assert min(shifting[1:]) >= 0.8
-    assert min(turning) >= 0.8
+    trials, scenario, less = recorded(load_dataset(log)), load("reality", [f"seed={seed}"]), set()
+    for condition, cause in zip(ASKED, (AS_DRAWN, *CAUSES), strict=True):
+        shares = dict(zip(AXES, compare_replay(scenario, trials, 20, cause).share, strict=True))
+        for axis, share in shares.items():
+            claim(f"reality/replay/{condition}/{axis}#{seed}", share)
+        less |= {(condition, axis) for axis in ASKED[condition] if shares[axis] < 0.8}
+    assert less == OPEN.get(seed, set())
 
 
 @pytest.mark.slow
