@@ -77,12 +77,13 @@ def _scatter(H_k: np.ndarray, g_k: np.ndarray, prior: np.ndarray) -> float:
 
 def _one_sided(trials: Trials, best: Point) -> np.ndarray:
     """Standard deviations (13,) by the side on which a friction goes farther alone; 0 of all but frictions."""
-    sigma, n = np.zeros(len(best.logarithms)), len(_REACH)
-    steps = np.concatenate([-_REACH, _REACH])
-    for i in FRICTIONS:
-        points = tried(trials, best.logarithms + np.outer(steps, np.eye(len(sigma))[i]))
-        rise = np.maximum.accumulate(np.reshape([p.cost - best.cost for p in points], (2, n)), axis=1)
-        sigma[i] = 0.5 * max(np.interp(_RISE, side, _REACH) for side in rise)
+    sigma, directions = np.zeros(len(best.logarithms)), np.eye(len(best.logarithms))[list(FRICTIONS)]
+    steps = np.concatenate([-_REACH[1:], _REACH[1:]])
+    points = tried(trials, best.logarithms + np.concatenate([np.outer(steps, axis) for axis in directions]))
+    rises = np.reshape([p.cost - best.cost for p in points], (len(FRICTIONS), 2, len(_REACH) - 1))
+    rises = np.maximum.accumulate(np.pad(rises, ((0, 0), (0, 0), (1, 0))), axis=2)
+    for i, sides in zip(FRICTIONS, rises, strict=True):
+        sigma[i] = 0.5 * max(np.interp(_RISE, side, _REACH) for side in sides)
     return sigma
 
 
@@ -93,14 +94,14 @@ def _without(H: np.ndarray, H_k: np.ndarray, g_k: np.ndarray, longest: np.ndarra
 
 def _others(trials: Trials, best: Point, steps: np.ndarray) -> np.ndarray:
     """Parameters (k, 13) without each trial: as much of its step (k, 13) as the other trials bear best."""
-    found = np.repeat(best.logarithms[None], len(steps), axis=0)
-    least = best.cost - trials.costs(best.errors)
-    for part in _PARTS:
-        at = best.logarithms + part * steps
-        costs = np.array([p.cost - trials.costs(p.errors)[k] for k, p in enumerate(tried(trials, at))])
-        found[costs < least] = at[costs < least]
-        least = np.minimum(least, costs)
-    return found
+    at = best.logarithms + np.multiply.outer([0.0, *_PARTS], steps)
+    costs = np.empty(at.shape[:2])
+    costs[0] = best.cost - trials.costs(best.errors)
+    points = tried(trials, at[1:].reshape(-1, len(best.logarithms)))
+    for i, p in enumerate(points):
+        part, k = divmod(i, len(steps))
+        costs[1 + part, k] = p.cost - trials.costs(p.errors)[k]
+    return np.take_along_axis(at, costs.argmin(axis=0)[None, :, None], axis=0)[0]
 
 
 def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = None) -> Direction:

@@ -8,7 +8,7 @@ the noise of the markers. Parameters are logarithms, p with a normal prior.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, pl
 from calibration.stages.stick_slip.kernel.bases import Bases, at_rest
 from calibration.stages.stick_slip.kernel.integration import simulated
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, pooled_noise
-from calibration.stages.stick_slip.wheels import WIDE, Prior, SlipParameters, WheelSet
+from calibration.stages.stick_slip.wheels import NAMES, WIDE, Prior, WheelSet
 from calibration.stages.suspension.model import Source
 
 CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel.corrector`
@@ -106,15 +106,12 @@ class Trials:
         ids, starts = self.ids[k : k + 1], np.array([0, b - a])
         return Trials(ids, self.wheels, self.corrected, starts, drive, inertia, rest, motions, self.prior)
 
-    def simulated(
-        self, logarithms: np.ndarray, preload: np.ndarray | None = None, places: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def simulated(self, logarithms: np.ndarray, preload: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Positions (k, n, 3) since the first second of each trial, and shares of wheels that slid (k, n).
 
-        By parameters (k, p); the wheels' deflections (k, m, 2) at the start of each trial, and places (k, m, 2) other
-        than declared, may be given.
+        By parameters (k, p); the wheels' deflections (k, m, 2) at the start of each trial may be given.
         """
-        bases = bases_of(self.wheels, logarithms, self.corrected, preload, places)
+        bases = bases_of(self.wheels, logarithms, self.corrected, preload)
         x, share = simulated(self.starts, self.drive, self.inertia, bases, STEP, len(logarithms))
         for a, b in self.spans:
             x[:, a:b] -= x[:, a:b][:, self.rest[a:b]].mean(axis=1, keepdims=True)
@@ -122,12 +119,19 @@ class Trials:
 
     def errors(self, logarithms: np.ndarray, places: np.ndarray | None = None) -> list[np.ndarray]:
         """By each of some parameters (k, p), and places of the wheels (k, m, 2) other than declared, see `error`."""
-        return side_by_side(self.error, self.simulated(logarithms, places=places)[0])
+        bases = bases_of(self.wheels, logarithms, self.corrected, places=places)
+        x, _ = simulated(self.starts, self.drive, self.inertia, bases, STEP, len(logarithms), BLOCK)
+        return side_by_side(self.error, x)
 
     def error(self, x: np.ndarray) -> np.ndarray:
-        """Measured minus predicted x (n, 3) by window (w, WINDOW, 3), its mean taken off; 0 where it does not count."""
+        """Measured minus predicted x (b, 3), by window (w, WINDOW, 3), its mean taken off; 0 where it does not count.
+
+        Predicted by blocks, since whenever. A base that no step can follow is `_FAR` off, to one side and the other: no
+        mean of a window takes that away.
+        """
         _, index, counts = self.windows
-        return np.asarray(_by_window(np.ascontiguousarray(x), self.starts, self.measured, index, counts))
+        off, other = self.measured - x, np.where(np.arange(len(x)) % 2, -_FAR, _FAR)[:, None]
+        return np.asarray(_by_window(np.where(np.abs(off) <= _FAR, off, other), index, counts))
 
     @cached_property
     def independent(self) -> np.ndarray:
@@ -137,7 +141,7 @@ class Trials:
     def variances(self, errors: np.ndarray) -> np.ndarray:
         """Of each window and axis (w, 3), noise included."""
         count = np.maximum(self.windows[2].sum(axis=1), 1)
-        return np.asarray((errors**2).sum(axis=1) / count[:, None] + self.noise**2)
+        return np.asarray(np.einsum("wia,wia->wa", errors, errors) / count[:, None] + self.noise**2)
 
     def cost(self, logarithms: np.ndarray, errors: np.ndarray) -> float:
         """-2 log of the posterior."""
@@ -169,30 +173,9 @@ class Trials:
 
 
 @njit(cache=True, error_model="numpy")
-def _of_blocks(x: np.ndarray, starts: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Measured (b, 3) minus the means of x (n, 3) over blocks.
-
-    A base that no step can follow is `_FAR` off, to one side and the other: no mean of a window takes that away.
-    """
-    e, b = np.empty(measured.shape), 0
-    for trial in range(len(starts) - 1):
-        for first in range(starts[trial], starts[trial + 1] - BLOCK + 1, BLOCK):
-            for a in range(3):
-                total = x[first, a]
-                for i in range(1, BLOCK):
-                    total += x[first + i, a]
-                off = measured[b, a] - total / BLOCK
-                e[b, a] = off if abs(off) <= _FAR else _FAR * (1 - 2 * (b % 2))
-            b += 1
-    return e
-
-
-@njit(cache=True, error_model="numpy")
-def _by_window(
-    x: np.ndarray, starts: np.ndarray, measured: np.ndarray, index: np.ndarray, counts: np.ndarray
-) -> np.ndarray:
-    """`Trials.error`."""
-    e, out = _of_blocks(x, starts, measured), np.zeros((index.shape[0], index.shape[1], 3))
+def _by_window(e: np.ndarray, index: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """`Trials.error` of errors (b, 3)."""
+    out = np.zeros((index.shape[0], index.shape[1], 3))
     for w in range(len(index)):
         for a in range(3):
             total, count = 0.0, 0
@@ -205,9 +188,12 @@ def _by_window(
     return out
 
 
-def body(p: SlipParameters, corrected: bool) -> np.ndarray:
-    """(4,) as the kernel takes it."""
-    return np.array([p.body_c, p.body_cr, CORRECTION[0] if corrected else 0.0, CORRECTION[1]])
+def bodies(values: np.ndarray, corrected: bool) -> np.ndarray:
+    """(k, 4) as the kernel takes them, by parameters (k, 13) in the order of NAMES."""
+    found = np.empty((len(values), 4))
+    found[:, :2] = values[:, [NAMES.index("body_c"), NAMES.index("body_cr")]]
+    found[:, 2:] = CORRECTION[0] if corrected else 0.0, CORRECTION[1]
+    return found
 
 
 def bases_of(
@@ -218,10 +204,8 @@ def bases_of(
     places: np.ndarray | None = None,
 ) -> Bases:
     """Bases of parameters (k, p), preloaded by deflections (k, m, 2), on wheels at other places (k, m, 2)."""
-    each = [SlipParameters.of(own) for own in logarithms]
-    sets = [wheels] * len(each) if places is None else [replace(wheels, position=own) for own in places]
-    rows = np.array([own.rows(p) for own, p in zip(sets, each, strict=True)])
-    return at_rest(rows, np.array([body(p, corrected) for p in each]), preload)
+    values = np.exp(logarithms)
+    return at_rest(wheels.each(values, places), bodies(values, corrected), preload)
 
 
 def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], prior: Prior = WIDE) -> Trials:

@@ -94,6 +94,7 @@ def fit_stick_slip(
 def _read(sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains | None) -> list[Read]:
     def read(trial: Trial) -> Read | None:
         try:
+            trial = MeasuredTrial.of(sources.lab.description, trial)
             rest = rest_of(sources.lab.description, trial, sources.T_base_B)
             wrenches = replace(wrenches_of(sources, trial, rest.T_lab_0), seen=True)
             if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:

@@ -19,9 +19,9 @@ from calibration.stages.stick_slip.band import banded
 from calibration.stages.stick_slip.forcing import STEP, UNMOVED
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, PLATE, STEPS, VELOCITY, Bases, at_rest
 from calibration.stages.stick_slip.kernel.integration import advance
-from calibration.stages.stick_slip.likelihood import body
+from calibration.stages.stick_slip.likelihood import bodies
 from calibration.stages.stick_slip.model import Direction, StickSlip
-from calibration.stages.stick_slip.wheels import PRELOADS, SlipParameters, WheelSet, preloads
+from calibration.stages.stick_slip.wheels import PRELOADS, WheelSet, preloads
 
 UNDRIVEN = np.array([0.0] * 3 + [UNMOVED, 0.0, 0.0, UNMOVED, 0.0, UNMOVED])
 _NO_REST = np.zeros(6)
@@ -148,13 +148,12 @@ def slip_stream(model: StickSlip) -> SlipStream:
     """
     found = model.direction("plate")
     optimum = found.parameters
-    parameters = [*(SlipParameters.of(own) for own in found.ensemble), *[optimum] * PRELOADS]
-    wheels = np.array([model.wheels.rows(p) for p in parameters])
-    bodies = np.array([body(p, found.corrected) for p in parameters])
+    values = np.array([*np.exp(found.ensemble), *[optimum.values] * PRELOADS])
+    wheels, own = model.wheels.each(values), bodies(values, found.corrected)
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
     linear, off = np.asarray(found.linear, dtype=bool), model.tilting.off
-    fitted = Fitted(len(found.ensemble), len(bodies), compliance, found.slips, linear, off)
-    return SlipStream(found, model.wheels, wheels, bodies, fitted)
+    fitted = Fitted(len(found.ensemble), len(own), compliance, found.slips, linear, off)
+    return SlipStream(found, model.wheels, wheels, own, fitted)
 
 
 @njit(cache=True, error_model="numpy")

@@ -109,9 +109,14 @@ class SlipParameters:
         return cls(*(float(v) for v in np.exp(logarithms)))
 
     @property
-    def logarithms(self) -> np.ndarray:
+    def values(self) -> np.ndarray:
         """(13,) in the order of NAMES."""
-        return np.log([getattr(self, name) for name in NAMES])
+        return np.array([getattr(self, name) for name in NAMES])
+
+    @property
+    def logarithms(self) -> np.ndarray:
+        """(13,) of the values."""
+        return np.log(self.values)
 
 
 @dataclass(frozen=True)
@@ -141,20 +146,45 @@ class WheelSet:
 
     def rows(self, p: SlipParameters) -> np.ndarray:
         """(m, 11) x, y, kx, ky, c, mu, n, G, mass as the kernel takes them."""
-        k = {"drive": (p.drive_kx, p.drive_ky), "front": (p.front_k, p.front_k), "back": (p.back_k, p.back_k)}
-        mu = {"drive": p.drive_mu, "front": p.front_mu, "back": p.back_mu}
-        c = [p.drive_c if kind == "drive" else p.caster_c for kind in self.types]
-        n, G = self.loads(p.drive_load, p.back_load)
-        columns = self.position, [k[kind] for kind in self.types], c, [mu[kind] for kind in self.types], n, G, self.mass
-        return np.ascontiguousarray(np.column_stack(columns))
+        return self.each(p.values[None])[0]
+
+    def each(self, values: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
+        """Rows (k, m, 11) by parameters (k, 13) in the order of NAMES; the wheels at places (k, m, 2) if given."""
+        of = dict(zip(NAMES, values.T, strict=True))
+        kx, ky = (
+            self._typed(of["drive_kx"], of["front_k"], of["back_k"]),
+            self._typed(of["drive_ky"], of["front_k"], of["back_k"]),
+        )
+        c, mu = (
+            self._typed(of["drive_c"], of["caster_c"], of["caster_c"]),
+            self._typed(of["drive_mu"], of["front_mu"], of["back_mu"]),
+        )
+        position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
+        n, G = self._loads(position, of["drive_load"], of["back_load"])
+        mass = np.broadcast_to(self.mass, n.shape)
+        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, mass[..., None])
+        return np.concatenate([position, *parts], axis=2)
+
+    def _typed(self, drive: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
+        """(k, m) of each wheel, by numbers (k,) of its type."""
+        of = {"drive": drive, "front": front, "back": back}
+        return np.stack([of[kind] for kind in self.types], axis=1)
 
     def loads(self, drive_load: float, back_load: float) -> tuple[np.ndarray, np.ndarray]:
         """n (m,) [N] and G (m, 3) of N = n + G (-Fz, My, -Mx)."""
-        share = np.array([{"drive": drive_load, "front": 1.0, "back": back_load}[kind] for kind in self.types])
-        A = np.column_stack([np.ones(len(share)), self.position])
-        G = share[:, None] * (A @ np.linalg.pinv(A.T @ (share[:, None] * A)))
+        n, G = self._loads(self.position[None], np.array([drive_load]), np.array([back_load]))
+        return n[0], G[0]
+
+    def _loads(
+        self, position: np.ndarray, drive_load: np.ndarray, back_load: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same, (k, m) and (k, m, 3), of wheels at places (k, m, 2)."""
+        share = self._typed(drive_load, np.ones(len(drive_load)), back_load)[..., None]
+        A = np.concatenate([np.ones_like(share), position], axis=2)
+        across = A.transpose(0, 2, 1)
+        G = share * (A @ np.linalg.pinv(across @ (share * A)))
         own = _OWN * self.weight
-        return own - G @ (A.T @ own), G
+        return own - (G @ (across @ own)[..., None])[..., 0], G
 
     def standing(self, shares: np.ndarray = _ALIKE, off: np.ndarray = _IN_PLACE) -> np.ndarray:
         """(m, 10) x, y, four zeros, n and G, of wheels that share the load as springs alone do.

@@ -15,7 +15,7 @@ from calibration.stages.stick_slip import planar_forcing, wrenches_of
 from calibration.stages.stick_slip.forcing import STEP
 from calibration.stages.stick_slip.kernel.bases import at_rest
 from calibration.stages.stick_slip.kernel.integration import simulated
-from calibration.stages.stick_slip.likelihood import body
+from calibration.stages.stick_slip.likelihood import bodies
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.rest_frame import rest_of
 from tests.acceptance.series import series
@@ -51,7 +51,7 @@ def errors(model, direction, forcing):
 
     def moved(wheels):
         starts = np.array([0, len(forcing.inertia)])
-        bases = at_rest(wheels[None], body(p, direction.corrected)[None])
+        bases = at_rest(wheels[None], bodies(p.values[None], direction.corrected))
         (x,), _ = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, 1)
         return x - x[forcing.rest].mean(axis=0)
 

@@ -2,6 +2,8 @@
 
 integration    `simulated`: some bases in trials one after the other; `advance`: one sample on
 bases          `Bases`: how they lie in memory; `at_rest`
+wheel_forces   what wheels put on the floor that stick or slide
+heaving        heave and tilt beside
 corrector      what a force plate corrects of their positions
 lifted         the load of wheels that are left on the floor
 """

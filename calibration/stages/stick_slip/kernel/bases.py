@@ -9,12 +9,14 @@ STEPS = 2  # of the integration to a sample
 COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
 LANES = 16  # bases side by side
 VECTOR = 4  # lanes that one instruction takes
-WHEEL, E, U, MASS = 15, 10, 12, 14  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), mass
+WHEEL, E, U = 17, 10, 12  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), mass, see `yielding` (2)
+MASS, YIELDS = 14, 15
 VELOCITY, ACCELERATION = 3, 9  # three rows each of a state
 X, V, DX, STICKS, P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels that stuck plus one, P
 D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, force, wheels that slide, which stick
 BODY = 30  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
-LEANS, PULL, W, ROWS = 34, 36, 37, 40  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
+LEANS, PULL, W = 34, 36, 37  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
+STUCK, ROWS = 40, 43  # force of a wheel that sticks (2), its load
 
 
 class Bases(NamedTuple):
@@ -47,7 +49,7 @@ def at_rest(wheels: np.ndarray, bodies: np.ndarray, preload: np.ndarray | None =
     groups = -(-k // LANES)
     own = np.minimum(np.arange(groups * LANES), k - 1)
     e = np.zeros((k, m, 2)) if preload is None else preload
-    each = np.concatenate([wheels[..., :E], e, np.zeros_like(e), wheels[..., E:]], axis=2)[own]
+    each = np.concatenate([wheels[..., :E], e, np.zeros_like(e), wheels[..., E:], np.zeros_like(e)], axis=2)[own]
     rows = each.reshape(groups, LANES, m, WHEEL).transpose(0, 2, 3, 1)
     lanes = np.minimum(k - LANES * np.arange(groups), LANES)
     state = np.zeros((groups, ROWS, LANES))

@@ -34,32 +34,27 @@ from calibration.stages.stick_slip.kernel.bases import (
     LANES,
     LEANS,
     LOAD,
-    MASS,
     PLATE,
     PULL,
     SLID,
     STICKS,
-    WHEEL,
     Bases,
     D,
-    E,
     F,
     P,
-    U,
     V,
     W,
     X,
 )
 from calibration.stages.stick_slip.kernel.corrector import cofactors, corrector
 from calibration.stages.stick_slip.kernel.lifted import lifted
-
-_NONE = 1e-30  # [N2]
+from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels, on_wheels, yielding
 
 
 @njit(cache=True, error_model="numpy")
-def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
-    """d of a step in n lanes of a flat state, its last parts those of the load, and the base's dampers' force."""
-    z, my, mx = u[3], u[4], u[5]
+def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) -> int:
+    """d of a step in n lanes of a flat state, the load, and the base's dampers' force; lanes in which wheels pulled."""
+    z, my, mx, pull = u[3], u[4], u[5], 0
     z0, z1, z2, my0, my1, my2, mx0, mx1, mx2 = (
         inertia[6], inertia[7], inertia[8], inertia[9], inertia[10], inertia[11], inertia[12], inertia[13], inertia[14]
     )  # fmt: skip
@@ -81,42 +76,17 @@ def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         s[BITS * LANES + l] = 1.0
         s[LEANS * LANES + l] = s[(LEANS + 1) * LANES + l] = 0.0
         s[W * LANES + l] = s[(W + 1) * LANES + l] = s[(W + 2) * LANES + l] = 0.0
+        pull += 1 if s[PULL * LANES + l] < 0.0 else 0
+    return pull
 
 
 @njit(cache=True, error_model="numpy")
-def _on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float, n: int) -> None:
-    """Add the forces of wheels in n lanes of a flat state, and bit i where wheel i sticks; deflections follow."""
-    rows, rate = WHEEL * LANES, 1.0 / h
-    for i in range(len(wheels) // rows):
-        w, bit = wheels[i * rows : (i + 1) * rows], float(1 << i)
-        for l in range(n):
-            px, py, kx, ky = w[l], w[LANES + l], w[2 * LANES + l], w[3 * LANES + l]
-            c, before_x, before_y = w[4 * LANES + l], w[E * LANES + l], w[(E + 1) * LANES + l]
-            d3, d4, d5 = s[LOAD * LANES + l], s[(LOAD + 1) * LANES + l], s[(LOAD + 2) * LANES + l]
-            load = w[6 * LANES + l] + w[7 * LANES + l] * d3 + w[8 * LANES + l] * d4 + w[9 * LANES + l] * d5
-            N = max(load, 0.0)
-            turn, spin = s[(D + 2) * LANES + l], s[(V + 2) * LANES + l]
-            mass, ux, uy = w[MASS * LANES + l] * rate, w[U * LANES + l], w[(U + 1) * LANES + l]
-            ex, ey = before_x + s[D * LANES + l] - turn * py, before_y + s[(D + 1) * LANES + l] + turn * px
-            fx = kx * ex + c * (s[V * LANES + l] - spin * py) - N * ry + mass * ux
-            fy = ky * ey + c * (s[(V + 1) * LANES + l] + spin * px) + N * rx + mass * uy
-            square, limit = fx * fx + fy * fy, w[5 * LANES + l] * N
-            cut = min(limit / np.sqrt(square + _NONE), 1.0)
-            x, y = fx * (1.0 - cut) / (kx * h + c + mass), fy * (1.0 - cut) / (ky * h + c + mass)
-            w[U * LANES + l], w[(U + 1) * LANES + l] = x, y
-            fx, fy, gx, gy = fx * cut, fy * cut, mass * (x - ux), mass * (y - uy)
-            w[E * LANES + l], w[(E + 1) * LANES + l] = ex, ey = ex - h * x, ey - h * y
-            s[LEANS * LANES + l] += N * ex
-            s[(LEANS + 1) * LANES + l] += N * ey
-            s[PULL * LANES + l] += min(load, 0.0)
-            s[W * LANES + l] += gx
-            s[(W + 1) * LANES + l] += gy
-            s[(W + 2) * LANES + l] += px * gy - py * gx
-            s[F * LANES + l] += fx
-            s[(F + 1) * LANES + l] += fy
-            s[(F + 2) * LANES + l] += px * fy - py * fx
-            s[SLID * LANES + l] += 1.0 if cut < 1.0 else 0.0
-            s[BITS * LANES + l] += 0.0 if cut < 1.0 else bit
+def _changed(s: np.ndarray, n: int) -> int:
+    """Lanes in which another wheel slides, or one less, than a step before."""
+    change = 0
+    for l in range(n):
+        change += 1 if s[STICKS * LANES + l] != s[BITS * LANES + l] else 0
+    return change
 
 
 @njit(cache=True, error_model="numpy")
@@ -156,39 +126,27 @@ def _ended(s: np.ndarray, u: np.ndarray, M: np.ndarray, h: float, n: int) -> Non
 
 
 @njit(cache=True, error_model="numpy")
-def without_wheels(wheels: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    """M (6,) of the robot without its wheels, the first lane's of flat wheels."""
-    M = inertia[:6].copy()
-    for i in range(len(wheels) // (WHEEL * LANES)):
-        w = wheels[i * WHEEL * LANES :]
-        px, py, mass = w[0], w[LANES], w[MASS * LANES]
-        M[0] -= mass
-        M[2] += mass * py
-        M[3] -= mass
-        M[4] -= mass * px
-        M[5] -= mass * (px * px + py * py)
-    return M
-
-
-@njit(cache=True, error_model="numpy")
-def _advance(s: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int) -> None:
-    """`advance` with all arrays of the bases flat."""
-    M = without_wheels(wheels, inertia)
+def _advance(  # noqa: PLR0913
+    s: np.ndarray, wheels: np.ndarray, own: np.ndarray, drive: np.ndarray, inertia: np.ndarray, h: float, n: int
+) -> None:
+    """`advance` with all arrays of the bases flat; own M (6,) of the wheels."""
+    M = inertia[:6] - own
     for l in range(LANES):
         s[SLID * LANES + l] = 0.0
     for k in range(len(drive)):
         u = drive[k]
-        _begun(s, u, inertia, h, n)
-        for l in range(n):
-            if s[PULL * LANES + l] < 0.0:
-                lifted(wheels, s, l)
-            s[PULL * LANES + l] = 0.0
-        _on_wheels(wheels, s, u[6], u[7], h, n)
-        if s[(BODY + 2) * LANES] > 0.0:
+        if _begun(s, u, inertia, h, n) > 0:
             for l in range(n):
-                if s[STICKS * LANES + l] != s[BITS * LANES + l]:
-                    s[STICKS * LANES + l] = s[BITS * LANES + l]
-                    corrector(wheels, l, s[(BODY + 3) * LANES + l], s)
+                if s[PULL * LANES + l] < 0.0:
+                    lifted(wheels, s, l)
+                    s[PULL * LANES + l] = 0.0
+        on_wheels(wheels, s, u[6], u[7], h, n)
+        if s[(BODY + 2) * LANES] > 0.0:
+            if _changed(s, n) > 0:
+                for l in range(n):
+                    if s[STICKS * LANES + l] != s[BITS * LANES + l]:
+                        s[STICKS * LANES + l] = s[BITS * LANES + l]
+                        corrector(wheels, l, s[(BODY + 3) * LANES + l], s)
             _corrected(s, u[PLATE], u[PLATE + 1], u[PLATE + 2], h, n)
         _ended(s, u, M, h, n)
 
@@ -205,11 +163,13 @@ def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: n
         h: [s].
         n: A multiple of VECTOR.
     """
-    _advance(state.reshape(-1), wheels.reshape(-1), drive, inertia, h, n)
+    flat = wheels.reshape(-1)
+    yielding(flat, h, n)
+    _advance(state.reshape(-1), flat, moving_wheels(flat), drive, inertia, h, n)
 
 
-def simulated(
-    starts: np.ndarray, drive: np.ndarray, inertia: np.ndarray, bases: Bases, h: float, k: int
+def simulated(  # noqa: PLR0913
+    starts: np.ndarray, drive: np.ndarray, inertia: np.ndarray, bases: Bases, h: float, k: int, every: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (k, n, 3) [m, rad] and shares of wheels that slid (k, n) of k bases in trials one after the other.
 
@@ -220,9 +180,14 @@ def simulated(
         bases: At rest: so each trial starts.
         h: Length of a step [s].
         k: How many of them.
+        every: Samples of a trial, of which means are returned; what is left at its end is not.
     """
-    x, share = np.empty((k, len(inertia), 3)), np.empty((k, len(inertia)))
-    side_by_side(lambda a, b: _simulated(x, share, a, b, drive, inertia, bases, h), starts[:-1], starts[1:])
+    first = np.cumsum([0, *(np.diff(starts) // every)])
+    x, share = np.empty((k, first[-1], 3)), np.empty((k, first[-1]))
+    side_by_side(
+        lambda a, b, out: _simulated(x, share, (a, b, out, every), drive, inertia, bases, h),
+        starts[:-1], starts[1:], first[:-1],
+    )  # fmt: skip
     return x, share
 
 
@@ -230,21 +195,33 @@ def simulated(
 def _simulated(  # noqa: PLR0913
     x: np.ndarray,
     share: np.ndarray,
-    a: int,
-    b: int,
+    of: tuple[int, int, int, int],
     drive: np.ndarray,
     inertia: np.ndarray,
     bases: Bases,
     h: float,
 ) -> None:
-    """Samples a to b, one trial, of `simulated`'s x and share."""
+    """One trial of `simulated`'s x and share: its first sample, its end, its first mean, samples of a mean."""
+    a, b, out, every = of
     k, m, steps = len(x), bases.wheels.shape[1], len(drive) // len(inertia)
+    total = np.zeros(4 * LANES)
     for g in range(len(bases.lanes)):
         lanes = bases.lanes[g]
         state, wheels = bases.state[g].copy().reshape(-1), bases.wheels[g].copy().reshape(-1)
+        yielding(wheels, h, lanes)
+        own = moving_wheels(wheels)
         for t in range(a, b):
-            _advance(state, wheels, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)
-            for l in range(min(lanes, k - LANES * g)):
-                share[LANES * g + l, t] = state[SLID * LANES + l] / (m * steps)
-                for i in range(3):
-                    x[LANES * g + l, t, i] = state[(X + i) * LANES + l]
+            _advance(state, wheels, own, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)
+            for l in range(3 * LANES):
+                total[l] += state[X * LANES + l]
+            for l in range(LANES):
+                total[3 * LANES + l] += state[SLID * LANES + l]
+            done = t + 1 - a
+            if done % every == 0:
+                at = out + done // every - 1
+                for l in range(min(lanes, k - LANES * g)):
+                    share[LANES * g + l, at] = total[3 * LANES + l] / (m * steps * every)
+                    for i in range(3):
+                        x[LANES * g + l, at, i] = total[i * LANES + l] / every
+                total[:] = 0.0
+        total[:] = 0.0

@@ -43,7 +43,8 @@ def pulled(rows: np.ndarray, p: np.ndarray) -> np.ndarray:
     m, legs = len(rows), 0
     off, A, b, c = np.zeros(m, np.bool_), np.empty((3, 3)), np.empty(3), np.zeros(3)
     for _ in range(m):
-        same, legs, A[:], b[:] = True, m, np.eye(3), 0.0
+        same, legs, A[:], b[:] = True, m, 0.0, 0.0
+        A[0, 0] = A[1, 1] = A[2, 2] = 1.0
         for i in range(m):
             w = rows[i]
             own = w[6] + w[7] * p[0] + w[8] * p[1] + w[9] * p[2]
@@ -62,8 +63,7 @@ def pulled(rows: np.ndarray, p: np.ndarray) -> np.ndarray:
 def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
     """Add c to the load of a lane of a flat state, by its flat wheels."""
     at = LOAD * LANES + lane
-    rows = wheels.reshape(-1, WHEEL, LANES)[:, :, lane].copy()
-    c = pulled(rows, s[at : at + 3 * LANES : LANES].copy())
+    c = pulled(wheels.reshape(-1, WHEEL, LANES)[:, :, lane], s[at : at + 3 * LANES : LANES])
     for k in range(3):
         s[at + k * LANES] += c[k]
 

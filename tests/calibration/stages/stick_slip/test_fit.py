@@ -155,4 +155,4 @@ def test_a_wheel_declared_in_a_wrong_place_is_found(trials, found, wheel, axis):
 def test_a_base_that_no_step_can_follow_is_far_off(trials):
     last = trials.windows[0] == 3
     for value in (np.nan, np.inf, 1e9):
-        assert trials.variances(trials.error(np.full((len(trials.inertia), 3), value)))[last].min() > 0.1**2
+        assert trials.variances(trials.error(np.full(trials.measured.shape, value)))[last].min() > 0.1**2
