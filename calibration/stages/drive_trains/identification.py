@@ -21,6 +21,7 @@ import numpy as np
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB, HALF_GAP
+from calibration.stages.drive_trains.mesh_friction import continued, hinted
 from calibration.stages.drive_trains.quantities import covariance_of, reported
 from calibration.stages.drive_trains.steady_contact import SteadyContact, steady_contact
 from calibration.stages.drive_trains.train_fit import (
@@ -46,8 +47,6 @@ _FRICTIONS = (0.15, 0.5)  # [N.m]
 _VISCOUS = 0.05  # [N.m.s/rad]
 _ROUGH, _FINE = FLOORS[:2], FLOORS[2:]
 _TRIED = 3
-_SLIPS, _LIKELY = (0.1, 0.4, 2.0), 2  # [N.m]; starts
-_HINT = 6.0  # cost that friction in the mesh must save in one trial
 _BETTER = 10.0  # score by which a richer form must win
 _PATTERN, _WORTH = (1.0, 0.5, 0.25), 0.5  # steps of a search [standard deviations], and the cost worth one
 _DAMPED = 0.02  # share of the information that damps a step without a trial
@@ -141,34 +140,16 @@ def best_train(problem: Problem, coarse: JointData, backlash: float, deflection:
     plain = _dead_zone(problem, rough)
     prior = prior_of(problem.data, "friction_held", backlash, deflection)
     richer = Problem(problem.joint, problem.data, prior, "friction_held", True)
-    whole = replace(richer, data=coarse)
-    roughly = [fit_train(whole, theta, _ROUGH[1:]) for theta in _hinted(problem, richer, coarse, plain.fit.theta)]
-    found = [judged(fit_train(richer, fit.theta, _FINE)) for fit in roughly]
-    if not found:
+    whole, starts = replace(richer, data=coarse), hinted(problem, richer, coarse, plain.fit.theta)
+    starts += [fit_train(whole, theta, _ROUGH[1:]).theta for theta in starts]
+    if not starts:
         return plain
+    found = [judged(continued(richer, theta, _FINE)) for theta in starts]
     richest = min(found, key=lambda candidate: candidate.score)
     without = replace(richer, form="dead_zone", prior=problem.prior)
     n = len(richest.fit.theta) - problem.data.modes.shape[1]
     same = judged(fit_train(without, np.delete(richest.fit.theta, [n - 2, n - 1]), _FINE))
     return richest if richest.score < min(plain.score, same.score) - _BETTER else plain
-
-
-def _hinted(problem: Problem, richer: Problem, coarse: JointData, theta: np.ndarray) -> list[np.ndarray]:
-    """Starts with friction in the mesh, where it explains the trial of most travel better than a dead zone.
-
-    In coarse windows and in fine ones: jolts that no model of one joint has look like friction in either alone.
-    """
-    motion, starts = coarse.motion, _with_friction(theta, problem.prior.nominal[1])
-    travel = np.add.reduceat(np.abs(np.diff(motion.q, append=motion.q[-1])), motion.begins[:-1])
-    trial, likely = int(np.argmax(travel)), []
-    for data, floors, tried in ((coarse, _ROUGH[1:], 1), (problem.data, FLOORS[1:3], _LIKELY)):
-        one = data.only(trial)
-        still, of = replace(problem, form="dead_zone", data=one), replace(richer, data=one)
-        glances = sorted((fit_train(of, x, ()) for x in starts), key=lambda fit: fit.cost)
-        likely = [fit_train(of, fit.theta, floors) for fit in glances[:tried]]
-        if min(fit.cost for fit in likely) > fit_train(still, theta, floors).cost - _HINT:
-            return []
-    return [fit.theta for fit in likely]
 
 
 def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
@@ -278,18 +259,3 @@ def _starts(problem: Problem) -> list[np.ndarray]:
         ]
         found.append(min((fit_train(problem, theta, ()) for theta in grid), key=lambda fit: fit.cost))
     return [fit.theta for fit in sorted(found, key=lambda fit: fit.cost)[:_TRIED]]
-
-
-def _with_friction(theta: np.ndarray, compliance: float) -> list[np.ndarray]:
-    """Starts with friction in the mesh and more of it at the link, from theta without.
-
-    A dead zone that friction misled may be far too stiff or rub too much: as well from a `compliance` [rad/(N.m)].
-    """
-    soft = np.concatenate(
-        [theta[:1], [max(theta[1], compliance), min(theta[2], _FRICTIONS[0]), theta[3], 0.0], theta[5:]]
-    )
-    return [
-        np.concatenate([x[:2], [x[2] + t], x[3:5], [1.0 / max(x[1], 1e-5), t], x[5:]])
-        for x in (theta, soft)
-        for t in _SLIPS
-    ]

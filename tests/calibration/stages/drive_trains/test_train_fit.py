@@ -109,7 +109,7 @@ def test_friction_in_the_mesh_must_predict_better_than_a_dead_zone_of_the_same_w
     worse = replace(plain, score=plain.score + poor)  # steady contact alone, where jolts misled it
     monkeypatch.setattr(identification, "_dead_zone", lambda *_: worse)
     with_mesh = np.concatenate([plain.fit.theta[:5], [5e3, 0.1]])
-    monkeypatch.setattr(identification, "_hinted", lambda *_: [with_mesh])
+    monkeypatch.setattr(identification, "hinted", lambda *_: [with_mesh])
     assert identification.best_train(of, of.data, 8e-3, 1e-2) is worse
 
 
