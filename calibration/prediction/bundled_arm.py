@@ -160,7 +160,8 @@ class BundledArm:
 
     def variance(self, hand: HandModel, positions: ArmPositions, reading_sigma: np.ndarray) -> np.ndarray:
         """(n, m) of the chain's joints: random error of the reading where there is no drive train."""
-        known = {q.name: q.sigma for train in self.trains.trains for q in train.parameters if np.isfinite(q.sigma)}
+        plain = [train for train in self.trains.trains if train.form == "dead_zone"]  # of others the residual says it
+        known = {q.name: q.sigma for train in plain for q in train.parameters if np.isfinite(q.sigma)}
         sigma = np.array([known.get(f"gear.{joint}.compliance", 0.0) for joint in hand.chain.joints])
         driven = np.isin(hand.chain.joints, [train.joint for train in self.trains.trains])
         own, torque, rests = (x[:, hand.chain.columns] for x in (positions.variance, positions.torque, positions.rests))

@@ -11,6 +11,7 @@ from calibration.prediction.predict import predictor
 from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion, harmonic_terms
 from calibration.stages.drive_trains.identification import identify
 from calibration.stages.drive_trains.joint_data import COARSE, CORRELATED, WINDOW, joint_data
+from calibration.stages.drive_trains.quantities import MOTOR
 from calibration.stages.drive_trains.stage import DEFLECTION, is_long, loads_of_trial
 from calibration.stages.drive_trains.torques import inertial_tolerances, load_modes
 from scenarios import load
@@ -77,7 +78,8 @@ def judged(campaign, joint, rng):
     low, high = train.ends(motion.torque[motion.begins[:-1]])
     delta = train.deltas(motion, motion.torque, low + rng.uniform(size=len(low)) * (high - low), STEP)
     angle = np.concatenate([of.angle[:, j] for of in campaign.loads])
-    y = delta - harmonic_terms(angle) @ eccentricity + ERROR * correlated(rng, np.diff(motion.begins), motion.t)
+    off = MOTOR * rng.normal(size=4) - eccentricity  # of the motor encoder less the link's
+    y = delta + harmonic_terms(angle) @ off + ERROR * correlated(rng, np.diff(motion.begins), motion.t)
     differences = [np.repeat(part[:, None], j + 1, axis=1) for part in np.split(y, motion.begins[1:-1])]
     modes = load_modes(campaign.loads, j, campaign.root)
     data, coarse = (joint_data(campaign.loads, differences, j, modes, window) for window in (WINDOW, COARSE))
