@@ -28,8 +28,8 @@ from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.fit.identification import identify
 from calibration.stages.drive_trains.geometry_refit import NOTHING, RefittedGeometry, refit_geometry
-from calibration.stages.drive_trains.identification import identify
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
 from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial, unidentified
 from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances, load_modes

@@ -20,9 +20,9 @@ from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.identification import identify
+from calibration.stages.drive_trains.fit.identification import identify
+from calibration.stages.drive_trains.fit.steady_contact import Slip, slipped_encoder
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, joint_data
-from calibration.stages.drive_trains.steady_contact import Slip, slipped_encoder
 from calibration.stages.drive_trains.torques import (
     Dynamics,
     LinkLoads,

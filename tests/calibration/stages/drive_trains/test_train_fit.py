@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.stages.drive_trains import identification
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
-from calibration.stages.drive_trains.identification import Candidate, judged, loaded, residual_and_doubt, torque_sigma
-from calibration.stages.drive_trains.joint_data import JointData
-from calibration.stages.drive_trains.quantities import covariance_of, reported, reverses
-from calibration.stages.drive_trains.steady_contact import slipped_encoder, steady_contact
-from calibration.stages.drive_trains.train_fit import (
+from calibration.stages.drive_trains.fit import identification
+from calibration.stages.drive_trains.fit.identification import (
+    Candidate,
+    judged,
+    loaded,
+    residual_and_doubt,
+    torque_sigma,
+)
+from calibration.stages.drive_trains.fit.quantities import covariance_of, reported, reverses
+from calibration.stages.drive_trains.fit.steady_contact import slipped_encoder, steady_contact
+from calibration.stages.drive_trains.fit.train_fit import (
     FLOORS,
     Problem,
     TrainFit,
@@ -20,6 +25,7 @@ from calibration.stages.drive_trains.train_fit import (
     fit_train,
     prior_of,
 )
+from calibration.stages.drive_trains.joint_data import JointData
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
 ECCENTRICITY = np.array([4e-3, 1e-3, -2e-3, 3e-4, -5e-4])

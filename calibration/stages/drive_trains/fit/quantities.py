@@ -15,7 +15,7 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.numerics.robust_covariance import block_covariance
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, Quantity, Status
-from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, TrainFit, derivatives, weights
+from calibration.stages.drive_trains.fit.train_fit import GAMMA_INFORMATION, TrainFit, derivatives, weights
 
 _NARROWED, _SHARE = 0.5, 0.33
 _RARER = 0.01  # share of the samples, at least, in which a mesh may lie on its rarer side

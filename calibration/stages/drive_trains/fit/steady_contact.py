@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.stages.drive_trains.train_fit import GAMMA_INFORMATION, NU, Problem, TrainFit, derivatives
+from calibration.stages.drive_trains.fit.train_fit import GAMMA_INFORMATION, NU, Problem, TrainFit, derivatives
 
 _ROUNDS, _WEIGHTED = 4, 8
 _CLEAR = 2  # windows beside a change of side
