@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain, harmonic_terms
-from calibration.stages.drive_trains.fit import identification
+from calibration.stages.drive_trains.fit import identification, mesh_friction
 from calibration.stages.drive_trains.fit.identification import (
     Candidate,
     judged,
@@ -14,7 +14,7 @@ from calibration.stages.drive_trains.fit.identification import (
     residual_and_doubt,
     torque_sigma,
 )
-from calibration.stages.drive_trains.fit.quantities import covariance_of, reported, reverses
+from calibration.stages.drive_trains.fit.quantities import FORM, MOTOR, covariance_of, reported, reverses
 from calibration.stages.drive_trains.fit.steady_contact import slipped_encoder, steady_contact
 from calibration.stages.drive_trains.fit.train_fit import (
     FLOORS,
@@ -267,3 +267,37 @@ def test_where_a_play_operator_found_the_friction_the_link_keeps_its_inertia(mon
     found = identification._dead_zone(of, rough).fit
     assert found.problem.dynamic
     np.testing.assert_array_equal(found.theta[:4], TRUTH.values[:4])
+
+
+def of_train(fit: TrainFit) -> DriveTrain:
+    return replace(fit.problem.train(fit.theta), link=np.zeros(5), torque_sigma=0.0)
+
+
+def test_readings_show_a_link_encoder_s_eccentricity_less_the_motor_s() -> None:
+    fit = fit_train(problem(data()), START, FLOORS[:2])
+    own = np.sqrt(np.diag(covariance_of(fit)))[-4:]
+    found = {q.name: q.sigma for q in reported(of_train(fit), fit, covariance_of(fit), 0.0).parameters}
+    stated = [found[f"encoder.joint.link.{what}"] for what in ("cos1", "sin1", "cos2", "sin2")]
+    np.testing.assert_allclose(stated, np.hypot(own, MOTOR))
+
+
+def test_a_mesh_that_friction_holds_is_known_no_better_than_its_form() -> None:
+    of_data = data()
+    of = Problem("joint", of_data, prior_of(of_data, "friction_held", 8e-3, 1e-2), "friction_held", dynamic=False)
+    fit = evaluated(of, np.concatenate([TRUTH.values[:4], [0.0, 1.0 / TRUTH.values[1], 0.2]]), ECCENTRICITY)
+    known = np.zeros((len(fit.theta) + 5,) * 2)
+    found = {q.name.split(".")[2]: q for q in reported(of_train(fit), fit, known, 0.0).parameters[:6]}
+    for name, what in (("gap", "half_gap"), ("compliance", "compliance"), ("slip", "slip"), ("stiffness", "spring")):
+        assert found[name].sigma == pytest.approx(FORM[what] * found[name].value)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_friction_in_the_mesh_is_found_from_a_dead_zone_that_it_misled(seed) -> None:
+    """Too wide a gap and a third of the link's friction, as on arm_5 of scenario `friction_held`."""
+    true = DriveTrain("joint", "friction_held", np.array([1.5e-3, 8e-4, 1.0, 0.05, 6e-3, 1.2e3, 0.3]), dynamic=False)
+    of_data = data(true, load=2.0, seed=seed)
+    misled, prior = np.array([5e-3, 7e-4, 0.3, 0.2, 0.0]), prior_of(of_data, "friction_held", 8e-3, 1e-2)
+    richer = Problem("joint", of_data, prior, "friction_held", dynamic=False)
+    starts = mesh_friction.hinted(problem(of_data), richer, of_data, misled)
+    best = min((mesh_friction.continued(richer, x, FLOORS[2:]) for x in starts), key=lambda fit: fit.cost)
+    np.testing.assert_allclose(best.theta[[0, 2, 6]], true.values[[0, 2, 6]], rtol=0.12)
