@@ -151,14 +151,9 @@ class WheelSet:
     def each(self, values: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
         """Rows (k, m, 11) by parameters (k, 13) in the order of NAMES; the wheels at places (k, m, 2) if given."""
         of = dict(zip(NAMES, values.T, strict=True))
-        kx, ky = (
-            self._typed(of["drive_kx"], of["front_k"], of["back_k"]),
-            self._typed(of["drive_ky"], of["front_k"], of["back_k"]),
-        )
-        c, mu = (
-            self._typed(of["drive_c"], of["caster_c"], of["caster_c"]),
-            self._typed(of["drive_mu"], of["front_mu"], of["back_mu"]),
-        )
+        kx, ky = (self._typed(of[drive], of["front_k"], of["back_k"]) for drive in ("drive_kx", "drive_ky"))
+        c = self._typed(of["drive_c"], of["caster_c"], of["caster_c"])
+        mu = self._typed(of["drive_mu"], of["front_mu"], of["back_mu"])
         position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         mass = np.broadcast_to(self.mass, n.shape)

@@ -21,7 +21,7 @@ _NARROWED, _SHARE = 0.5, 0.33
 _RARER = 0.01  # share of the samples, at least, in which a mesh may lie on its rarer side
 _SEEN = 1e-6  # share of the prior's standard deviation: less, and no block speaks for a parameter
 MOTOR = np.array([3e-4, 3e-4, 1e-4, 1e-4])  # [rad] prior of a motor encoder's eccentricity, seen at the joint
-FORM = {"half_gap": 0.16, "compliance": 0.21, "coulomb": 0.27, "viscous": 0.45, "spring": 0.2, "slip": 0.16}  # of them
+FORM = {"half_gap": 0.16, "compliance": 0.21, "coulomb": 0.27, "viscous": 0.45, "spring": 0.2, "slip": 0.16}  # shares
 _REMEDIES = {
     "half_gap": "move {0} back and forth in postures where its load changes sign",
     "compliance": "hold {0} in postures of different load, or with a payload and without",
