@@ -126,8 +126,8 @@ class Trials:
     def error(self, x: np.ndarray) -> np.ndarray:
         """Measured minus predicted x (b, 3), by window (w, WINDOW, 3), its mean taken off; 0 where it does not count.
 
-        Predicted by blocks, since whenever. A base that no step can follow is `_FAR` off, to one side and the other: no
-        mean of a window takes that away.
+        x are means of blocks, from any origin. A base that no step can follow is `_FAR` off, to one side and the other:
+        no mean of a window takes that away.
         """
         _, index, counts = self.windows
         off, other = self.measured - x, np.where(np.arange(len(x)) % 2, -_FAR, _FAR)[:, None]
