@@ -10,8 +10,8 @@ dm_i and dc_i. All of them normal: o as a marker body is on its link, links as `
 of the root, which stands as it was built, to 2 mm. Postures tell the links' masses from the plate's place.
 
 The suspension's compliance has springs that pull. Where wheels lift off in calibration trials, z, rx, ry are fitted
-again under the wrench that is as if they could (`kernel.lifted`), by rounds: K says how wheels share the load, and so
-when one lifts off.
+again under the wrench that is as if they could (`kernel.lifted`), by rounds until K stays: it says how wheels share the
+load, and so when one lifts off.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +42,8 @@ _STILL = 0.01  # [rad, m] of a joint in a second
 _FEWEST = 20  # readings in it
 _FEWEST_TRIALS = 2
 _FORCE, _LEVER = 2.0, 3e-4  # [N], [m] of the weight: what a second at rest leaves unexplained
-_LIFTED, _ROUNDS = 0.01, 2  # share of the samples in which a wheel is off the floor; fits
+_LIFTED = 0.01  # share of the samples in which a wheel is off the floor
+_ROUNDS, _SAME = 6, 0.01  # fits at most, and by how much the last one still changes the stiffness in tilt
 
 
 @dataclass(frozen=True)
@@ -68,8 +69,11 @@ def tilting_of(
         found = _lifting_compliance(sources, loads, standing, tilting)
         if found is None:
             break
+        change = np.abs(np.diag(found[0]) / np.diag(tilting.K) - 1.0)[[*HEAVE[1:]]].max()
         prior = _prior(wheels, found[0])
         tilting = Tilting(*found, off, prior.shares)
+        if change < _SAME:
+            break
     return tilting, prior
 
 

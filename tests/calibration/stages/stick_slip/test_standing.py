@@ -171,7 +171,7 @@ def rocking(amplitude):
 def test_casters_that_lift_off_do_not_make_the_base_softer():
     linear, found, springs = rocking(0.8)
     assert linear[4, 4] < 0.8 * springs[2, 2]
-    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.05)
+    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
     np.testing.assert_array_equal(found[[0, 1, 5]], linear[[0, 1, 5]])
 
 
