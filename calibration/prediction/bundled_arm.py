@@ -22,6 +22,7 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.numerics.lie import adjoint, inverse
 from calibration.robot.hand import HandModel
+from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.column_bending import ColumnBending, moved
 from calibration.stages.drive_trains.drive_trains import RESTS, DriveTrains, Stream, StreamState, stream_of
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -80,11 +81,11 @@ class BundledArm:
         q_motor: np.ndarray,
         velocity: np.ndarray | None = None,
         T_lab_base: np.ndarray | None = None,
-        push: np.ndarray | None = None,
+        push: Push | None = None,
     ) -> ArmPositions:
         """Of readings q_motor (n, k) [rad, m] at t (n,) [s].
 
-        Velocity (n, k), the base (n, 4, 4) and what pushes the hand (n, 6) where known.
+        Velocity (n, k), the base (n, 4, 4) and what pushes the hand where known.
 
         Raises:
             NotEnoughData: Less than a second of readings and no velocity.

@@ -24,6 +24,7 @@ from calibration.recording.trial import REST
 from calibration.robot.kinematics import shift
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
+from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, Readings, wrenches_along
 from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, LANES, STEPS, Bases
@@ -107,11 +108,11 @@ class SlippingBase:
         t: np.ndarray,
         q_motor: np.ndarray,
         wrench: np.ndarray | None,
-        push: np.ndarray | None = None,
+        push: Push | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """How the base moved in the lab (n, 4, 4) and variances (n, 6) of its displacement in frame 0.
 
-        Without a plate's wrench inverse dynamics move it; the hand may be pushed by (n, 6).
+        Without a plate's wrench inverse dynamics move it; the hand may be pushed.
 
         Raises:
             NotEnoughData: Less than a second, or nothing says what point the wrench is about.

@@ -6,11 +6,15 @@ w: reading, the hand's action on the sensor; f: wrench that moves what hangs on 
 and the declared payload, of weight W, along the readings; w_0: mean of f + w in the trial's first second, in which
 nothing pushes. Zeros of encoders, tolerances of masses and a base that shakes left up to 0.39 W on twenty robots that
 nothing pushed: the hand is pushed in trials in which p's force, averaged over 0.4 s, exceeds 0.75 W.
+
+f is along the motors. Where joint i's link moves otherwise, p misses I_i times that acceleration about the joint, I_i
+the inertia of what hangs on the sensor. So the link's inertia under the load of p is M_ii - I_i.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -28,6 +32,18 @@ _CUTOFF = 20.0  # [Hz]
 _AVERAGE = 0.4  # [s]
 _SHARE = 0.75  # of the weight: less is no push [-]
 _STRIDE = 4  # samples from one to the next where a push is looked for
+
+
+class Push(NamedTuple):
+    """What pushes the hand.
+
+    Attributes:
+        wrench: p (n, 6), axes and origin of the tree's last body [N, N.m].
+        inertia: (n, k) I about each joint [kg.m2, kg].
+    """
+
+    wrench: np.ndarray
+    inertia: np.ndarray
 
 
 def hung_bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[pin.Inertia]:
@@ -68,8 +84,8 @@ class WristSensor:
     body: np.ndarray
     at_rest: np.ndarray
 
-    def push(self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> np.ndarray | None:
-        """Wrench (n, 6) on the hand at t (n,) [s], axes and origin of the tree's last body [N, N.m]; None: no push.
+    def push(self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> Push | None:
+        """What pushes the hand at t (n,) [s]; None: nothing does.
 
         Args:
             t: Times.
@@ -84,22 +100,26 @@ class WristSensor:
         v = np.gradient(found.x[:, :k], 1.0 / RATE, axis=0)
         moving = np.stack([found.x[:, :k], v, np.gradient(v, 1.0 / RATE, axis=0)])
 
-        def outside(stride: int) -> np.ndarray:
-            p = self._moved(*moving[:, ::stride]) + found.x[::stride, k:]
-            return np.asarray(p - p[found.t[::stride] <= found.t[0] + REST].mean(axis=0))
+        def outside(stride: int) -> Push:
+            f, inertia = self._moved(*moving[:, ::stride])
+            p = f + found.x[::stride, k:]
+            return Push(p - p[found.t[::stride] <= found.t[0] + REST].mean(axis=0), inertia)
 
-        force = uniform_filter1d(outside(_STRIDE)[:, :3], int(_AVERAGE * RATE / _STRIDE), axis=0)
+        force = uniform_filter1d(outside(_STRIDE).wrench[:, :3], int(_AVERAGE * RATE / _STRIDE), axis=0)
         if np.linalg.norm(force, axis=1).max() <= limit:
             return None
-        p = outside(1)
-        return interpolate_columns(t, found.t, p @ pin.SE3(self.body).dualAction.T)
+        p, inertia = outside(1)
+        wrench = interpolate_columns(t, found.t, p @ pin.SE3(self.body).dualAction.T)
+        return Push(wrench, interpolate_columns(t, found.t, inertia))
 
-    def _moved(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """f (n, 6) in the sensor's axes about its origin."""
-        f = dynamics_along(self.tree, q, v, a, self.at_rest).root
+    def _moved(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """f (n, 6) in the sensor's axes about its origin, and I (n, k)."""
+        found = dynamics_along(self.tree, q, v, a, self.at_rest)
+        f = found.root
         T = self.root @ self.chain.poses(q[:, self.chain.columns], self.link)
         R, moment = T[:, :3, :3], f[:, 3:] - np.cross(T[:, :3, 3], f[:, :3])
-        return np.concatenate([(f[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]], axis=1)
+        f = np.concatenate([(f[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]], axis=1)
+        return f, found.inertia
 
 
 @lru_cache(maxsize=8)
@@ -129,9 +149,7 @@ def wrist_sensor(urdf: str, description: Description) -> WristSensor | None:
     return WristSensor(tree, lab.chain, link, base.homogeneous, frame.placement.homogeneous, at_rest)
 
 
-def hand_push(
-    urdf: str, description: Description, t: np.ndarray, q: np.ndarray, wrench: np.ndarray
-) -> np.ndarray | None:
+def hand_push(urdf: str, description: Description, t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> Push | None:
     """`WristSensor.push` of a robot with its payload; None without readings or a sensor, or where nothing pushes."""
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
     return None if sensor is None else sensor.push(t, q, wrench)

@@ -21,7 +21,7 @@ from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
-from calibration.robot.wrist_sensor import hand_push
+from calibration.robot.wrist_sensor import Push, hand_push
 from calibration.stages.drive_trains import link_motion
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Drives
@@ -114,8 +114,8 @@ class DriveTrains:
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
         return base_acceleration(self.dynamics.gravity, t, T_lab_root, at)
 
-    def push(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> np.ndarray | None:
-        """What pushes the hand (n, 6), see `hand_push`; None where nothing does."""
+    def push(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> Push | None:
+        """What pushes the hand, see `hand_push`; None where nothing does."""
         return hand_push(self.urdf, self.description, t, q, wrist)
 
     def likely(self, loads: LinkLoads) -> np.ndarray:

@@ -1,7 +1,8 @@
 """What moves the links in a trial: motor positions, velocities, accelerations, torques and inertias of all joints.
 
     tau = M(q) a + C(q, v) v + g(q) - J' p        nominal inverse dynamics with the trial's payload       [N.m, N]
-                                           p what pushes the hand, by the wrist's sensor
+                                           p what pushes the hand, by the wrist's sensor, which takes the inertia
+                                           of what hangs on it off M_jj, see `robot.wrist_sensor`
     tau + R(q, v, a) dphi                  of other masses and first moments (m, m c) by body [kg, kg.m], a tilt of the
                                            base about x and y [rad], and bending of the first joint's column [rad/(N.m)]
 
@@ -26,6 +27,7 @@ from calibration.numerics.signals import RATE, Signal, even, interpolate_columns
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
+from calibration.robot.wrist_sensor import Push
 
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second
 _SLOW, _FAST = 5.0, 12.0  # [Hz] of the base's, from markers: at all times, and where it is jolted
@@ -91,33 +93,34 @@ class Dynamics:
         t: np.ndarray,
         q: np.ndarray,
         base: np.ndarray | None = None,
-        push: np.ndarray | None = None,
+        push: Push | None = None,
     ) -> LinkLoads:
         """Loads at motor readings q (n, k) taken at t (n,) [s], without NaN.
 
-        `base` (n, 6) as `base_acceleration` has it, `push` (n, 6) on the hand as `WristSensor.push` has it.
+        `base` (n, 6) as `base_acceleration` has it, `push` on the hand.
         """
         smooth, v, a = derivatives(t, q, CUTOFF)
         return LinkLoads(trial_id, t, q, smooth - self.offset, v, a, *self.evaluated(smooth, v, a, base, push))
 
     def evaluated(
-        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: np.ndarray | None = None
+        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: Push | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Torques and inertias (n, k), regressors (n, k, p), moments (n, 2) at readings and derivatives (n, k)."""
         root = self.root(base)
         if push is not None:
-            root = np.concatenate([np.broadcast_to(root, (len(push), 12)), push], axis=1)
+            root = np.concatenate([np.broadcast_to(root, (len(q), 12)), push.wrench], axis=1)
         found = dynamics_along(self.tree, q - self.offset, v, a, root, True)
-        push, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
+        inertia = found.inertia if push is None else found.inertia - push.inertia
+        a_0, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
         tilt = np.stack(
             [
-                pull[..., 1] * push[..., 2] - pull[..., 2] * push[..., 1],
-                pull[..., 2] * push[..., 0] - pull[..., 0] * push[..., 2],
+                pull[..., 1] * a_0[..., 2] - pull[..., 2] * a_0[..., 1],
+                pull[..., 2] * a_0[..., 0] - pull[..., 0] * a_0[..., 2],
             ],
             axis=2,
         )
         bending = -(tilt @ found.moment[..., None])
-        return found.torque, found.inertia, np.concatenate([found.regressor, tilt, bending], axis=2), found.moment
+        return found.torque, inertia, np.concatenate([found.regressor, tilt, bending], axis=2), found.moment
 
     def root(self, base: np.ndarray | None) -> np.ndarray:
         """Twist, zero, and proper acceleration (n, 12) of the base; `base` (n, 6) as of `loads`."""

@@ -22,7 +22,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
-from calibration.robot.wrist_sensor import hand_push
+from calibration.robot.wrist_sensor import Push, hand_push
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
 from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
 from calibration.stages.stick_slip.kernel.lifted import borne
@@ -137,12 +137,12 @@ class Readings(NamedTuple):
     Attributes:
         t: (n,) [s, mocap clock].
         q: (n, k) [rad, m].
-        push: (n, 6) on the hand as `WristSensor.push` has it; None where nothing does.
+        push: What pushes the hand; None where nothing does.
     """
 
     t: np.ndarray
     q: np.ndarray
-    push: np.ndarray | None = None
+    push: Push | None = None
 
 
 def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wrenches:

@@ -25,6 +25,7 @@ from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import dynamics_along
+from calibration.robot.wrist_sensor import Push
 
 _DECIMATED = 0.005  # [s] plate samples averaged together
 _MASS_SAMPLES = 20  # configurations the inertia is averaged over
@@ -70,15 +71,15 @@ def motion_load(
     q_motor: np.ndarray,
     T_lab_0: np.ndarray,
     cutoff: float,
-    push: np.ndarray | None = None,
+    push: Push | None = None,
 ) -> Load:
-    """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock], the hand pushed by (n, 6)."""
+    """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock], and what pushes the hand."""
     description = lab.description
     q = low_passed(even(t, q_motor), cutoff)
     spline, T_0_root = CubicSpline(q.t, q.x), root_in_base(lab.floating, description)
     root = root_at_rest(lab, T_lab_0)
     if push is not None:
-        pushed = interpolate_columns(q.t, t, push)
+        pushed = interpolate_columns(q.t, t, push.wrench)
         root = np.concatenate([np.broadcast_to(root, (len(pushed), 12)), pushed], axis=1)
     along = dynamics_along(lab.tree, q.x, spline(q.t, 1), spline(q.t, 2), root)
     w = along.root @ T_0_root.dualAction.T

@@ -1,11 +1,12 @@
 """What the wrist's sensor shows of a push at the hand, and what it does to the joints."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import mjcf
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.wrist_sensor import hand_push
+from calibration.robot.wrist_sensor import hand_push, hung_bodies
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.wrist_load import expected_load
 from tests.doubles import rigid_robot
@@ -42,7 +43,33 @@ def test_a_push_is_the_reading_less_the_weight_and_loads_the_joints_by_its_power
         turn = np.array([there[2, 1], there[0, 2], there[1, 0]])
         power = outside[250] @ np.concatenate([there[:3, 3], turn]) / h
         assert loaded[250, j] - bare[250, j] == pytest.approx(-power, abs=2e-3)
-    np.testing.assert_allclose(push[:150], 0.0, atol=1e-6)
+    np.testing.assert_allclose(push.wrench[:150], 0.0, atol=1e-6)
+
+
+def hung():
+    """Inertia of all beyond the sensor, in its axes."""
+    model = pin.buildModelFromXML(LAB.urdf)
+    data, sensor = model.createData(), model.getFrameId(LINK)
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    return data.oMf[sensor].actInv(sum(hung_bodies(model, data, sensor), pin.Inertia.Zero()))
+
+
+@pytest.mark.parametrize("j", [1, 3, 4, 6])
+def test_what_hangs_on_the_sensor_does_not_hold_a_link_in_its_gap_back_twice(j):
+    """The motors stand and a link does not: by the readings its load is that of its own motion, pushed."""
+    q, w, _ = readings(np.array([5.0, -18.0, 7.0]))
+    a = 10.0 * np.sin(4.0 * np.pi * T) * (T > 1.0)  # [rad/s2], a motion too small to change anything else
+    step = 1e-6 * np.eye(8)[j]
+    moved = np.linalg.inv(LAB.chain.poses(Q[None], LINK)[0]) @ LAB.chain.poses(Q[None] + step, LINK)[0]
+    twist = np.array([*moved[:3, 3], moved[2, 1], moved[0, 2], moved[1, 0]]) / 1e-6
+    seen = w - a[:, None] * (hung() * pin.Motion(twist)).vector
+    robot = dynamics(LAB.urdf, HUNG, np.zeros(8))
+    bare, pushed, held = (
+        robot.loads("", T, q, push=p) for p in (None, *(hand_push(LAB.urdf, HUNG, T, q, x) for x in (w, seen)))
+    )
+    rows = slice(120, 380)
+    own = pushed.torque[:, j] + bare.inertia[:, j] * a
+    np.testing.assert_allclose((held.torque[:, j] + held.inertia[:, j] * a)[rows], own[rows], atol=0.02)
 
 
 def test_a_small_force_is_no_push_and_without_a_sensor_there_is_none():
