@@ -115,11 +115,10 @@ class WristSensor:
     def _moved(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """f (n, 6) in the sensor's axes about its origin, and I (n, k)."""
         found = dynamics_along(self.tree, q, v, a, self.at_rest)
-        f = found.root
         T = self.root @ self.chain.poses(q[:, self.chain.columns], self.link)
-        R, moment = T[:, :3, :3], f[:, 3:] - np.cross(T[:, :3, 3], f[:, :3])
-        f = np.concatenate([(f[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]], axis=1)
-        return f, found.inertia
+        R, moment = T[:, :3, :3], found.root[:, 3:] - np.cross(T[:, :3, 3], found.root[:, :3])
+        f = [(found.root[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]]
+        return np.concatenate(f, axis=1), found.inertia
 
 
 @lru_cache(maxsize=8)

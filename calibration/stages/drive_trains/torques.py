@@ -49,7 +49,7 @@ class LinkLoads:
         v: Motor velocities.
         a: Motor accelerations.
         torque: tau [N.m, N].
-        inertia: M_jj [kg.m2, kg].
+        inertia: M_jj [kg.m2, kg]; while the hand is pushed, less what hangs on the wrist's sensor.
         regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
     """

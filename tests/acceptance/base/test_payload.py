@@ -6,7 +6,7 @@ and how far a drive slides depends on a few newtons of its load:
     plate: usual     0 kg         2 kg          push         measured: usual     push
     .26              .25          .94           .64          .31                 .42
 
-While it is pushed the hand errs no more than else; where arm_1 rests in its gap before and after, nothing shows.
+While it is pushed the hand errs no more than else; before and after, nothing shows where arm_1 rests in its gap.
 """
 
 import json
