@@ -1,12 +1,13 @@
 """The band of each row: where the hand is with 95 %, by the covariance that `Compensator` states with its poses.
 
     C = R (S + Ad V Ad') R'         of the hand's place [m2, lab],   R of T_lab_H,  Ad of T_0_H^-1
-    |e| <= radius of 95 %           inside; of |e|^2 as a gamma variable, see `hand_uncertainty`
-    b = R Ad d                      by which a row on springs alone is known to be off, d by which the base slips
+    b = p_full - p                  by which a row is known to be off where row `full` is delivered, whose C it has
+    |e| <= radius of 95 %           inside; of |e|^2 as a gamma variable about b, see `hand_uncertainty`
 
 S is the covariance of the hand's local twist in the base: parameters, readings, drive trains, column; V (6,) variances
 of the base's displacement in frame 0, or of its markers' pose where it is measured; a base on wheels that is taken to
-stay has no band without a suspension. Noise of a reference is added.
+stay has no band without a suspension. Noise of a reference is added. b is from the same source of the base's motion; of
+a base that is taken to stay, from the best that predicts it.
 """
 
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.estimate.estimate import Estimate
-from calibration.estimate.rows import LADDER, LadderRow
+from calibration.estimate.rows import LADDER, SOURCES, Base, LadderRow, row_of
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.postures import readings_at
 from calibration.numerics.lie import adjoint, inverse
@@ -45,18 +46,25 @@ class Bands:
         if self.estimate.urdf is None or self.estimate.robot is None or self.clock is None or not len(trial.t_robot):
             return predicted
         q = readings_at(trial, self.clock, trial.t_mocap, trial.q_motor)
-        known, wanted = np.isfinite(q).all(axis=1), {row.model for row in predicted.rows}
-        S = {name: np.full((len(q), 6, 6), np.nan) for name in self._rows if name in wanted}
+        known, wanted = np.isfinite(q).all(axis=1), self._rows.keys() & {row.model for row in predicted.rows}
+        S = {name: np.full((len(q), 6, 6), np.nan) for name in ({self._delivered} & wanted or wanted)}
         for name in S:
             S[name][known] = self._robot(name, entry.payload).predict(trial.t_mocap[known], q[known]).covariance
         base = poses_of(self.description.base_body, trial).covariance * self.description.sigmas.marker**2
-        rows = (
-            replace(row, covariance=_in_lab(row, S[row.model], base, predicted), offset=_offset(row, predicted))
+        rows = tuple(
+            replace(row, covariance=_in_lab(row, S[row.model], base, predicted))
             if row.model in S and row.encoder == "motor" and not self._unknown(row, predicted)
             else row
             for row in predicted.rows
         )
-        return replace(predicted, rows=tuple(rows))
+        best = {row.base: row for row in rows if row.model == self._delivered and row.encoder == "motor"}
+        off = (_off(row, best) if row.model in wanted and row.encoder == "motor" else row for row in rows)
+        return replace(predicted, rows=tuple(off))
+
+    @property
+    def _delivered(self) -> str:
+        """Row `full` where it is the main one and has drive trains; empty where it is not."""
+        return self.estimate.main if self.estimate.bundle is not None and row_of(self.estimate.main).bundle else ""
 
     def _unknown(self, row: Prediction, predicted: PredictedTrial) -> bool:
         """Whether the row leaves a base on wheels where it was and nothing says how far it moves."""
@@ -97,10 +105,10 @@ def _in_lab(row: Prediction, S: np.ndarray, markers: np.ndarray, predicted: Pred
     return np.asarray(R @ S[:, :3, :3] @ np.swapaxes(R, 1, 2))
 
 
-def _offset(row: Prediction, predicted: PredictedTrial) -> np.ndarray | None:
-    """(n, 3) of the hand's place by where the base slips to [m, lab]; None where it does not."""
-    if row.base_offset is None or predicted.base is None or predicted.base.rest is None:
-        return None
-    T = row.T_lab_hand
-    twist = adjoint(inverse(T) @ predicted.base.rest.T_lab_0) @ row.base_offset[..., None]
-    return np.asarray((T[:, :3, :3] @ twist[:, :3])[..., 0])
+def _off(row: Prediction, best: Mapping[Base, Prediction]) -> Prediction:
+    """The row with the band of the delivered one, whose predictions are by source of the base's motion."""
+    sources = SOURCES if row.base == "fixed" else (row.base,)
+    by = next((best[source] for source in sources if source in best), None)
+    if by is None or by.covariance is None:
+        return row
+    return replace(row, covariance=by.covariance, offset=by.T_lab_hand[:, :3, 3] - row.T_lab_hand[:, :3, 3])

@@ -67,9 +67,8 @@ class Prediction:
         t: (n,) [s, mocap clock].
         T_lab_hand: (n, 4, 4), NaN where it cannot be predicted.
         base_variance: (6,) or (n, 6) of the base's displacement in frame 0 [m2, rad2]; None where it is measured.
-        base_offset: (n, 6) by which a base that slips is elsewhere than the row's [m, rad, frame 0]; None without one.
         covariance: (n, 3, 3) of the hand's place [m2, lab]; None where the row states none.
-        offset: (n, 3) of the hand's place by base_offset [m, lab]; None where there is none.
+        offset: (n, 3) by which the hand is known to be elsewhere, which `covariance` is about [m, lab]; None without.
     """
 
     model: str
@@ -80,7 +79,6 @@ class Prediction:
     t: np.ndarray
     T_lab_hand: np.ndarray
     base_variance: np.ndarray | None = None
-    base_offset: np.ndarray | None = None
     covariance: np.ndarray | None = None
     offset: np.ndarray | None = None
 

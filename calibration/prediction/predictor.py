@@ -84,7 +84,7 @@ class Predictor:
                 entry.kind,
                 trial.t_mocap,
                 T @ poses.in_base(row, encoder, source),
-                *poses.base_spread(row, source),
+                poses.base_variance(row, source),
             )
             for row, _, encoder in self._rows()
             for source in row.bases
@@ -215,22 +215,18 @@ class TrialPoses:
         if any(self.base(row, source) is not None for row in rows):
             self.geared(source)
 
-    def base_spread(self, row: LadderRow, source: Base) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Variances (6,) or (n, 6) of its displacement in frame 0 [m2, rad2], None where it is measured or not known.
-
-        And, of a row on springs alone, x_slipping - x_springs (n, 6) [m, rad] where it is known how the base slips.
-        """
+    def base_variance(self, row: LadderRow, source: Base) -> np.ndarray | None:
+        """Variances (6,) or (n, 6) of its displacement in frame 0 [m2, rad2]; None where it is not predicted."""
         if self.loaded is None or source not in SOURCES:
-            return None, None
+            return None
         known = dict(self.loaded.suspension.held_out)
         tried = next(iter(known.values()))
         if source != "plate" and source != "dynamics":
-            return tried.still, None
-        if (slipped := self.slipped(source)) is not None:
-            found = None if row.bundle else self.displaced(source, row.name)
-            return slipped.motion.variance, None if found is None else slipped.motion.x - found[1]
+            return tried.still
+        if row.bundle and (slipped := self.slipped(source)) is not None:
+            return slipped.motion.variance
         tried = known.get(source, tried)
-        return tried.variance(tried.moves), None
+        return tried.variance(tried.moves)
 
     def delivered(self) -> Delivered | None:
         """Parts of the row that is delivered; None where it has no prediction of this trial."""
