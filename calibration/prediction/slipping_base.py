@@ -73,12 +73,12 @@ class Place(NamedTuple):
 
 
 class Earlier(NamedTuple):
-    """What a sample carries on of `BaseState`, `heave` of its x, and of `SlipState`, `row` its `before`."""
+    """What a sample carries on of `BaseState`, and of `SlipState`, `row` its `before`."""
 
     wrench: np.ndarray
     y: np.ndarray
     u: np.ndarray
-    heave: np.ndarray
+    x: np.ndarray
     lags: np.ndarray
     rest: np.ndarray
     row: np.ndarray
@@ -141,7 +141,7 @@ class SlippingBase:
         slip, modes, stream = before.slip, at.suspension.modes, self._stream
         place = Place(at.action, self.model.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity)
         earlier = Earlier(
-            before.rest, before.y, before.u, before.x[2:5], before.lags, slip.rest, slip.before, slip.found, slip.band
+            before.rest, before.y, before.u, before.x, before.lags, slip.rest, slip.before, slip.found, slip.band
         )
         motion = _UNMOVED if moving is None else moving
         tree, actions, work, room = self._robot
@@ -264,12 +264,14 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     for i in range(6):
         for c in range(6):
             w[0, i] += place.action[i, c] * wrench[c]
-    sprung = w.copy()
-    bear(place.standing, sprung)
+    sprung, slid = w.copy(), np.empty((1, 3))
+    for k in range(3):
+        slid[0, k] = fitted.moves[k] * (before.found[1, k] - before.x[PLANE[k]])
+    bear(place.standing, sprung, slid)
     for i in range(6):
         change[i] = sprung[0, i] - before.wrench[i]
     modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, change, dt, x)
-    lags, heaving = lagged(x[2:5], before.heave, before.lags, dt)
+    lags, heaving = lagged(x[2:5], before.x[2:5], before.lags, dt)
     if moving.shape[1]:
         driving = driven(tree, (dual, back), place.gravity, heaving, moving, work, room)
     after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes)

@@ -17,18 +17,17 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
-from calibration.numerics.signals import RATE, Signal, even, low_passed
+from calibration.numerics.signals import RATE, Signal, interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.rigid_tree import dynamics_along
 from calibration.robot.wrist_sensor import Push, hand_push
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
 from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
 from calibration.stages.stick_slip.kernel.lifted import borne
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import Forcing, WrenchSources, forcing_of
-from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load, root_in_base
+from calibration.stages.suspension.floor_wrench import Load, composite_inertia, motion_load, plate_load
 from calibration.stages.suspension.lifting_response import predicted_lifting
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source
@@ -37,7 +36,6 @@ CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-_INERTIA_STRIDE = 5  # samples from one composite inertia to the next
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
 
 
@@ -112,7 +110,8 @@ class Wrenches:
         wheels: Of the robot.
         links: By inverse dynamics of link angles, where they are known: they strike in their gaps as motors do not.
         slips: A base of the most likely parameters, for heave and tilt while it slips; None: as if it stuck.
-        seen: Whether the plate shows how the base heaves and tilts, whatever is to move it: in a calibration trial.
+        slid: How far the base has slid (k, 3), on which the plate stands still, where that is known: predicted, or in
+            a calibration trial as its markers show it. Then the plate shows heave and tilt, whatever is to move it.
     """
 
     trial_id: str
@@ -124,7 +123,7 @@ class Wrenches:
     wheels: WheelSet
     links: Load | None = None
     slips: Bases | None = None
-    seen: bool = False
+    slid: Signal | None = None
 
     def moved_by(self, source: Source) -> Load | None:
         """What moves the base where `source` is what was measured."""
@@ -166,7 +165,7 @@ def readings_of(lab: Laboratory, robot: Clock, trial: Trial) -> Readings:
 def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_lab_0: np.ndarray) -> Wrenches:
     """The wrench of the plate, and that of readings."""
     t, q = readings.t, readings.q
-    dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, readings.push), composite_inertia(lab, t, q, T_lab_0)
+    dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, readings.push), composite_inertia(lab, t, q, CUTOFF)
     return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab))
 
 
@@ -219,6 +218,13 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[::STEPS], early, linear(t))
 
 
+def on_wheels(load: Load, standing: np.ndarray, slid: Signal | None) -> Load:
+    """A plate's load as the wheels bear it, rows (m, 10), of a base that has slid."""
+    t, x = load.signal.t, load.signal.x
+    moved = None if slid is None else interpolate_columns(t, slid.t, slid.x)
+    return replace(load, signal=replace(load.signal, x=borne(standing, x, moved)))
+
+
 def _compliant(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) -> tuple[np.ndarray, np.ndarray]:
     """Times (k,) [s, mocap clock] and displacements (k, 6) by the compliance of a base whose wheels may lift off.
 
@@ -226,8 +232,7 @@ def _compliant(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load)
     """
     standing = tilting.standing(wrenches.wheels, source)
     if source == "plate":
-        load = replace(load, signal=replace(load.signal, x=borne(standing, load.signal.x)))
-        forcing = forcing_of(load, wrenches.start)
+        forcing = forcing_of(on_wheels(load, standing, wrenches.slid), wrenches.start)
         return forcing.t, predicted(tilting.K, tilting.C, forcing)
     forcing = forcing_of(load, wrenches.start)
     return forcing.t, predicted_lifting(tilting.K, tilting.C, forcing, standing)
@@ -240,7 +245,7 @@ def _swayed(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) ->
     """
     grid, compliant = _compliant(wrenches, tilting, source, load)
     heave, linear = (CubicSpline(grid, compliant[:, axes]) for axes in (HEAVE, PLANE))
-    if source == "dynamics" and wrenches.seen and wrenches.plate is not None:
+    if source == "dynamics" and wrenches.slid is not None and wrenches.plate is not None:
         grid, compliant = _compliant(wrenches, tilting, "plate", wrenches.plate)
         return CubicSpline(grid, compliant[:, HEAVE]), linear
     if source == "dynamics" and wrenches.slips is not None:
@@ -253,7 +258,7 @@ def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases | None) -> np
     load = wrenches.moved_by("dynamics")
     if load is None or wrenches.plate is None:
         return None
-    found, _ = _swayed(replace(wrenches, seen=False, slips=slips), tilting, "dynamics", load)
+    found, _ = _swayed(replace(wrenches, slid=None, slips=slips), tilting, "dynamics", load)
     t, compliant = _compliant(wrenches, tilting, "plate", wrenches.plate)
     inside = (t >= found.x[0]) & (t <= found.x[-1])
     h = compliant[inside][:, HEAVE]
@@ -281,17 +286,6 @@ def _inertia(M: np.ndarray) -> np.ndarray:
 
 def _at(signal: Signal, t: np.ndarray) -> np.ndarray:
     return np.asarray(CubicSpline(signal.t, signal.x)(t))
-
-
-def composite_inertia(
-    lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, T_lab_0: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Times (k,) [s, mocap clock] and M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes."""
-    q = low_passed(even(t, q_motor), CUTOFF)
-    T_0_root, rows = root_in_base(lab.floating, lab.description), q.x[::_INERTIA_STRIDE]
-    none = np.zeros_like(rows)
-    M = dynamics_along(lab.tree, rows, none, none, np.zeros((1, 12))).composite
-    return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
 
 
 def _resampled(t: np.ndarray, M: np.ndarray, at: np.ndarray) -> np.ndarray:

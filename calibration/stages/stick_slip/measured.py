@@ -6,6 +6,8 @@
 The markers stand 0.3 m above the floor and 0.4 m apart: their own tilt would add its noise times 0.3 m to t, which is
 twice that of u. The tilt (rx, ry) is therefore the compliance's. Means over blocks of 50 ms, of the measured and of the
 predicted motion alike, stand for an anti-aliasing filter.
+
+How far the base has slid is what its markers show beyond its compliance under the plate's wrench.
 """
 
 from collections.abc import Sequence
@@ -15,10 +17,14 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
-from calibration.numerics.signals import GAP, RATE
+from calibration.numerics.signals import GAP, RATE, Signal
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
-from calibration.stages.stick_slip.forcing import HEAVE, PlanarForcing
+from calibration.stages.stick_slip.forcing import HEAVE, PLANE, PlanarForcing
+from calibration.stages.suspension.base_response import base_response_of
+from calibration.stages.suspension.floor_wrench import Load
+from calibration.stages.suspension.modal_response import predicted
+from calibration.stages.suspension.model import Suspension
 from calibration.stages.suspension.rest_frame import Rest
 
 BLOCK = 5  # samples averaged together
@@ -65,6 +71,17 @@ def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: P
     b = n // BLOCK
     valid = seen[: b * BLOCK].reshape(b, BLOCK).all(axis=1)
     return PlanarMotion(blocks(plane), valid, noise, np.where(valid[:, None], blocks(excess), np.nan))
+
+
+def slid(description: Description, trial: Trial, rest: Rest, plate: Load, suspension: Suspension) -> Signal:
+    """x, y, yaw (n, 3) [m, rad, frame 0] by which the base has slid, where its markers are seen.
+
+    Raises:
+        NotEnoughData: Markers or wrench are missing.
+    """
+    seen = base_response_of(description, trial, rest, plate)
+    x, good = seen.x - predicted(suspension.K, suspension.C, seen.forcing), seen.valid
+    return Signal(seen.forcing.t[good], x[good][:, PLANE], good[good])
 
 
 def blocks(x: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.numerics.lie import from_vector
+from calibration.numerics.signals import Signal
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.drive_trains import DriveTrains
@@ -114,11 +115,17 @@ class Links(NamedTuple):
 def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | None) -> PlanarForcing:
     """What drives the base; where inverse dynamics do, of links on a base that moves as their motors move it.
 
+    A plate's moments are about where the base has slid to.
+
     Raises:
         NotEnoughData: The wrench was not recorded.
         NoSuchElement: The model was not fitted from that source.
     """
     found = model.direction(source)
+    if source == "plate" and found.slips.any():
+        forcing = planar_forcing(wrenches, model.tilting, source)
+        moved = np.where(found.slips, model.predict(forcing).x - forcing.linear, 0.0)
+        wrenches = replace(wrenches, slid=Signal(forcing.t, moved, np.ones(len(moved), dtype=bool)))
     if source == "plate":
         return planar_forcing(wrenches, model.tilting, source)
     if links is not None and links.trains.trains:

@@ -33,7 +33,7 @@ from calibration.stages.stick_slip.forcing import (
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
-from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise
+from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.poses import Links
 from calibration.stages.stick_slip.search import descended, displaced, tried
@@ -67,7 +67,7 @@ def fit_stick_slip(
     if len(description.wheels) < _LEAST_WHEELS:
         return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
-    read = _read(sources, trials, trains)
+    read = _read(sources, trials, suspension, trains)
     tilting, prior = tilting_of(sources, read, wheels, suspension)
     by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
     usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
@@ -91,12 +91,17 @@ def fit_stick_slip(
     return model, findings
 
 
-def _read(sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains | None) -> list[Read]:
+def _read(
+    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, trains: DriveTrains | None
+) -> list[Read]:
     def read(trial: Trial) -> Read | None:
         try:
             trial = MeasuredTrial.of(sources.lab.description, trial)
             rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-            wrenches = replace(wrenches_of(sources, trial, rest.T_lab_0), seen=True)
+            wrenches = wrenches_of(sources, trial, rest.T_lab_0)
+            if wrenches.plate is not None:
+                moved = slid(sources.lab.description, trial, rest, wrenches.plate, suspension)
+                wrenches = replace(wrenches, slid=moved)
             if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
                 wrenches = replace(wrenches, links=_linked(sources.lab, trains, sources.robot, trial, rest))
             return Read(trial, rest, wrenches)

@@ -15,7 +15,7 @@ load, and so when one lifts off.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -25,8 +25,7 @@ from calibration.numerics.side_by_side import side_by_side
 from calibration.recording.schema import Tolerances
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.stick_slip.forcing import HEAVE, Tilting, Wrenches, vertical
-from calibration.stages.stick_slip.kernel.lifted import borne
+from calibration.stages.stick_slip.forcing import HEAVE, Tilting, Wrenches, on_wheels, vertical
 from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, prior_by_tilt
 from calibration.stages.suspension.base_response import BaseResponse, WrenchSources, base_response_of
 from calibration.stages.suspension.compliance_fit import fit_compliance
@@ -96,7 +95,7 @@ def _lifting_compliance(
     """
 
     def response(one: Read, load: Load) -> BaseResponse | None:
-        load = replace(load, signal=replace(load.signal, x=borne(standing, load.signal.x)))
+        load = on_wheels(load, standing, one.wrenches.slid)
         try:
             return base_response_of(sources.lab.description, one.trial, one.rest, load)
         except NotEnoughData:

@@ -28,6 +28,7 @@ from calibration.robot.rigid_tree import dynamics_along
 from calibration.robot.wrist_sensor import Push
 
 _DECIMATED = 0.005  # [s] plate samples averaged together
+_INERTIA_STRIDE = 5  # samples from one composite inertia to the next
 _MASS_SAMPLES = 20  # configurations the inertia is averaged over
 
 
@@ -88,6 +89,17 @@ def motion_load(
     weight = float(M[0, 0] * np.linalg.norm(description.gravity))
     com = np.array([M[2, 4] * -1.0, M[2, 3], M[0, 4]]) / max(M[0, 0], np.finfo(float).tiny)
     return Load(Signal(q.t, -w, q.valid), M, weight, com, np.eye(4))
+
+
+def composite_inertia(
+    lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, cutoff: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (k,) [s, mocap clock] and M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes."""
+    q = low_passed(even(t, q_motor), cutoff)
+    T_0_root, rows = root_in_base(lab.floating, lab.description), q.x[::_INERTIA_STRIDE]
+    none = np.zeros_like(rows)
+    M = dynamics_along(lab.tree, rows, none, none, np.zeros((1, 12))).composite
+    return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
 
 
 def root_in_base(model: pin.Model, description: Description) -> pin.SE3:

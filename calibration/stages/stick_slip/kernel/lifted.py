@@ -4,6 +4,8 @@
 
 p is (-Fz, My, -Mx). With J the wheels off the floor, A c = b of A = 1 - sum_J a_i G_i and b = sum_J a_i (n_i + G_i p);
 J is found by trying. Where fewer than three wheels are left, the base tips over, and p stays as it is.
+
+A force plate stands still: about a base that has slid by (x, y, yaw) its moments are R(yaw)' ((My, -Mx) + Fz (x, y)).
 """
 
 import numpy as np
@@ -68,19 +70,23 @@ def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
         s[at + k * LANES] += c[k]
 
 
-def borne(standing: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+def borne(standing: np.ndarray, wrench: np.ndarray, slid: np.ndarray | None = None) -> np.ndarray:
     """Wrenches (n, 6) on the floor [N, N.m, frame 0] as if wheels, rows (m, 10), could pull.
 
-    The springs being linear, heave and tilt are those of the wheels in contact.
+    The springs being linear, heave and tilt are those of the wheels in contact. `slid` (n, 3): how far the base has.
     """
     found = np.array(wrench, dtype=float, order="C")
-    bear(standing, found)
+    bear(standing, found, np.zeros((len(found), 3)) if slid is None else slid)
     return found
 
 
 @njit(cache=True, error_model="numpy")
-def bear(standing: np.ndarray, wrench: np.ndarray) -> None:
-    """Add c to (-Fz, My, -Mx) of wrenches (n, 6), by rows (m, 10) of wheels."""
-    for w in wrench:
-        c = pulled(standing, np.array([-w[2], w[4], -w[3]]))
-        w[2], w[3], w[4] = w[2] - c[0], w[3] - c[2], w[4] + c[1]
+def bear(standing: np.ndarray, wrench: np.ndarray, slid: np.ndarray) -> None:
+    """Turn (-Fz, My, -Mx) of wrenches (n, 6) to a base that has slid (n, 3), add c, by rows (m, 10) of wheels."""
+    p = np.empty(3)
+    for k in range(len(wrench)):
+        w, yaw = wrench[k], slid[k, 2]
+        pitching, rolling = w[4] + w[2] * slid[k, 0], -w[3] + w[2] * slid[k, 1]
+        p[0], p[1], p[2] = -w[2], pitching + yaw * rolling, rolling - yaw * pitching
+        c = pulled(standing, p)
+        w[2], w[3], w[4] = -p[0] - c[0], -p[2] - c[2], p[1] + c[1]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mjcf
+from calibration.numerics.signals import Signal
 from calibration.recording.clock import Clock
 from calibration.stages.drive_trains import DriveTrain, DriveTrains
 from calibration.stages.drive_trains.torques import dynamics
@@ -54,8 +55,25 @@ def links(trial, half_gap):
 
 def test_a_plate_moves_the_base_whatever_the_links_do(trial):
     wrenches, of = wrenches_of(SOURCES, trial, T_LAB_BASE), model()
-    one, other = forced(of, wrenches, "plate", links(trial, 3e-3)), planar_forcing(wrenches, of.tilting, "plate")
+    one, other = (forced(of, wrenches, "plate", behind) for behind in (links(trial, 3e-3), None))
     np.testing.assert_array_equal(one.drive, other.drive)
+
+
+def test_a_base_that_slides_away_from_the_plates_centre_tilts(trial):
+    """Its weight stays where it is on the base: the plate's moment about the base is what the tilt follows."""
+    wrenches, of = wrenches_of(SOURCES, trial, T_LAB_BASE), model()
+    weak = TRUTH.logarithms.copy()
+    weak[4:7] += np.log(0.2)
+    slippery = replace(of, directions=tuple(replace(d, logarithms=weak, ensemble=weak[None]) for d in of.directions))
+    found, still = forced(slippery, wrenches, "plate", None), planar_forcing(wrenches, of.tilting, "plate")
+    far = slippery.predict(still).x - still.linear
+    end = slice(-20, None)
+    x, y, yaw = far[end].T
+    weight, pitching, rolling = still.drive[::2][end, 3:6].T
+    assert np.abs(far[end, :2]).max() > 2e-4
+    expected = np.column_stack([weight * y + yaw * pitching, yaw * rolling - weight * x]) / np.diag(K)[3:5]
+    tilted = (found.heave - still.heave)[end, 1:]
+    np.testing.assert_allclose(tilted, expected, atol=0.1 * np.abs(expected).max())
 
 
 def test_links_that_strike_in_their_gaps_move_the_base(trial):
@@ -75,7 +93,8 @@ def test_the_base_tilts_as_it_slips(trial):
     slippery = replace(of, directions=tuple(replace(d, logarithms=weak, ensemble=weak[None]) for d in of.directions))
     firm, loose = (forced(one, wrenches, "dynamics", None).heave for one in (of, slippery))
     assert np.all(np.abs(loose - firm).max(axis=0)[1:] > 0.2 * np.abs(firm).max(axis=0)[1:])
-    seen = planar_forcing(replace(wrenches, seen=True), of.tilting, "dynamics")
+    nowhere = Signal(np.array([0.0, 1e3]), np.zeros((2, 3)), np.ones(2, dtype=bool))
+    seen = planar_forcing(replace(wrenches, slid=nowhere), of.tilting, "dynamics")
     np.testing.assert_allclose(
         seen.heave, planar_forcing(wrenches, of.tilting, "plate").heave[: len(seen.t)], atol=1e-9
     )

@@ -7,6 +7,7 @@ import mjcf
 from calibration.numerics.signals import Signal
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip.forcing import Wrenches
+from calibration.stages.stick_slip.measured import slid
 from calibration.stages.stick_slip.standing import Read, plate_place, tilting_of, weighed
 from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import base_response_of, laboratory
@@ -130,8 +131,8 @@ def pressed(wheels, p):
     return np.array(found)
 
 
-def rocked(wheels, amplitude, rng):
-    """A trial of a base that rocks on SPRINGS, a share of the seconds with casters off the floor."""
+def rocked(wheels, amplitude, far, rng):
+    """A trial of a base that rocks on SPRINGS, a share of the seconds with casters off the floor, and slides `far`."""
     motor = rigid_robot.swing(np.zeros(8), np.full(8, 0.3), 12.0)
     trial = rigid_robot.record(STILL, motor, 0.0, rng, plate=False)
     t = trial.t_plate
@@ -142,27 +143,33 @@ def rocked(wheels, amplitude, rng):
     x, w = np.zeros((len(t), 6)), np.zeros((len(t), 6))
     x[:, 2:5] = (d - d[0]) * [-1.0, 1.0, -1.0]
     x[:, 2:5] = x[:, (2, 4, 3)]
-    w[:, (2, 4, 3)] = p * [-1.0, 1.0, -1.0]
-    w[:, (0, 1, 5)] = swing * amplitude
-    x[:, (0, 1, 5)] = w[:, (0, 1, 5)] / PLANE
+    slides = np.clip(t[:, None] - 2.0, 0.0, 1.0) * far
+    yaw, (pitching, rolling) = slides[:, 2], p[:, 1:].T
+    w[:, (0, 1, 5)], w[:, 2] = 20.0 * swing * amplitude, -p[:, 0]
+    w[:, 4] = pitching - yaw * rolling + p[:, 0] * slides[:, 0]
+    w[:, 3] = -(rolling + yaw * pitching + p[:, 0] * slides[:, 1])
+    x[:, (0, 1, 5)] = w[:, (0, 1, 5)] / PLANE + slides
     in_lab = w @ pin.SE3(T_LAB_BASE).dualAction.T
     return replace(moved(trial, x, t), plate_wrench=in_lab[:, None])
 
 
-def rocking(amplitude):
+def rocking(amplitude, far=(0.0, 0.0, 0.0), seen_to_slide=True):
     """Tilting, as fitted with springs that pull and as `tilting_of` has it, and the springs' own K."""
     sources, rng = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE), np.random.default_rng(2)
     wheels = wheel_set(mjcf.urdf(), DESCRIPTION.wheels, G)
-    trials = [replace(rocked(wheels, amplitude, rng), id=name) for name in "abcd"]
+    trials = [replace(rocked(wheels, amplitude, np.array(far), rng), id=name) for name in "abcd"]
     rests = [rest_of(DESCRIPTION, trial, sources.T_base_B) for trial in trials]
     loads = [sources.plate_load(trial, rest.T_lab_0) for trial, rest in zip(trials, rests, strict=True)]
     seen = [base_response_of(DESCRIPTION, *one) for one in zip(trials, rests, loads, strict=True)]
-    linear = fit_compliance(seen, np.ones((6, 6), dtype=bool))
+    in_plane = np.isin(np.arange(6), (0, 1, 5))
+    linear = fit_compliance(seen, np.equal.outer(in_plane, in_plane))
     sums = np.ones((4, 6))
     tried = HeldOut(1e-2 * sums, sums, 1e-6 * sums, np.full(4, 1e3))
     none = np.zeros((6, 6))
     suspension = Suspension("compliance", linear.K, linear.C, none, none, (("plate", tried),), (), ())
-    wrenches = [Wrenches("a", 0.0, load, None, np.zeros(0), np.zeros((0, 6, 6)), wheels) for load in loads]
+    moved = [slid(DESCRIPTION, *one, suspension) for one in zip(trials, rests, loads, strict=True)]
+    moved, none = moved if seen_to_slide else [None] * len(loads), (np.zeros(0), np.zeros((0, 6, 6)), wheels)
+    wrenches = [Wrenches("a", 0.0, load, None, *none, slid=far) for load, far in zip(loads, moved, strict=True)]
     read = [Read(*one) for one in zip(trials, rests, wrenches, strict=True)]
     a = np.column_stack([np.ones(len(SPRINGS)), wheels.position[:, 1], -wheels.position[:, 0]])
     return linear.K, tilting_of(sources, read, wheels, suspension)[0].K, a.T @ (SPRINGS[:, None] * a)
@@ -170,12 +177,21 @@ def rocking(amplitude):
 
 def test_casters_that_lift_off_do_not_make_the_base_softer():
     linear, found, springs = rocking(0.8)
-    assert linear[4, 4] < 0.8 * springs[2, 2]
+    assert linear[4, 4] < 0.85 * springs[2, 2]
     np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
     np.testing.assert_array_equal(found[[0, 1, 5]], linear[[0, 1, 5]])
+
+
+def test_casters_that_lift_off_a_base_that_slides_do_not_either():
+    """A plate stands still: 730 N that are 6 mm from where they were make 4 N.m."""
+    far = (6e-3, -4e-3, 0.03)
+    _, found, springs = rocking(0.8, far)
+    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
+    _, other, _ = rocking(0.8, far, seen_to_slide=False)
+    assert np.abs(np.diag(other)[3:5] / np.diag(springs)[1:] - 1.0).max() > 0.1
 
 
 def test_where_no_wheel_lifts_off_the_compliance_stays():
     linear, found, springs = rocking(0.2)
     np.testing.assert_array_equal(found, linear)
-    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.03)
+    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)

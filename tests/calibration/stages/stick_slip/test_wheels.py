@@ -84,6 +84,18 @@ def test_wheels_seen_from_another_place_bear_the_same():
     np.testing.assert_allclose(found[0, (4, 3)] + found[0, 2] * off * [1.0, -1.0], true[0, (4, 3)], rtol=1e-9)
 
 
+def test_wheels_of_a_base_that_has_slid_bear_the_load_where_they_are():
+    """The plate's moments are about where it stood; the wheels are 5 mm and 0.03 rad away."""
+    N, far = np.array([150.0, 170.0, 180.0, 190.0, 30.0, 20.0]), np.array([5e-3, -3e-3, 0.03])
+    here = far[:2] + POSITION @ np.array([[1.0, far[2]], [-far[2], 1.0]])
+    wrench, at_rest = np.zeros((1, 6)), np.zeros((1, 6))
+    wrench[0, (2, 4, 3)] = -N.sum(), N @ here[:, 0], -N @ here[:, 1]
+    at_rest[0, (2, 4, 3)] = -N.sum(), N @ POSITION[:, 0], -N @ POSITION[:, 1]
+    found = borne(WHEELS.standing(), wrench, far[None])
+    np.testing.assert_allclose(found, at_rest, atol=0.1)  # to first order in the turn: 1e-3 of 60 N.m
+    assert np.abs(wrench - at_rest).max() > 3.0
+
+
 def tilt_stiffness(wheels=WHEELS):
     """(3, 3) of heave and tilt on vertical springs, wheel by wheel."""
     K = np.zeros((3, 3))
