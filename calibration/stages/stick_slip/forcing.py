@@ -272,7 +272,8 @@ def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcin
     springs = Springs(tilting.K[h], tilting.C[h], (tilting.K + forcing.tangent)[h], forcing.rest[[*HEAVE]], standing)
     w = CubicSpline(t, forcing.w[:, order])(t[0] + np.arange(STEPS * len(t)) * STEP)
     state, wheels, own = slips.state[0].copy(), slips.wheels[0].copy(), np.ascontiguousarray(M[:, order][:, :, order])
-    found = heaving(state, wheels, np.ascontiguousarray(w), own, _inertia(M), springs, STEP)
+    w = np.ascontiguousarray(w)
+    found = heaving(state, wheels, slips.lanes[0], w, own, _inertia(M), springs, STEP)
     return CubicSpline(t, found[::STEPS])
 
 

@@ -50,12 +50,13 @@ def _respond(
             u[m] += b[m, i] * w[0, i]
     y = u.copy()
     for n in range(len(w)):
-        drive[:] = w[n]
+        for i in range(6):
+            drive[i] = w[n, i]
         for _ in range(_REPEATS):
             drive[2], drive[3], drive[4] = w[n, 2] - c[0], w[n, 3] - c[2], w[n, 4] + c[1]
             found = advance_modes(modes, y, u, drive, step, x[n])
             before, c = c, _pulls(modes, springs, standing, found, x[n])
-            if np.abs(c - before).max() < _SETTLED:
+            if max(abs(c[0] - before[0]), abs(c[1] - before[1]), abs(c[2] - before[2])) < _SETTLED:
                 break
         y, u = found[0], found[1]
 
@@ -69,16 +70,17 @@ def _pulls(
     x: np.ndarray,
 ) -> np.ndarray:
     """c (3,) of modes y, u (2, k) and their displacement x (6,)."""
-    (a, _, tau), (K, C, rest), rate, c = modes, springs, np.zeros(6), np.zeros(3)
-    L = rest.copy()
+    (a, _, tau), (K, C, rest), rate, c, L = modes, springs, np.zeros(6), np.zeros(3), np.empty(6)
     for m in range(len(tau)):
         moving = (found[1, m] - found[0, m]) / tau[m]
         for i in range(6):
             rate[i] += (a[i, m] * moving).real
     for i in range(2, 5):
+        L[i] = rest[i]
         for j in range(6):
             L[i] += K[i, j] * x[j] + C[i, j] * rate[j]
-    for w in standing:
+    for k in range(len(standing)):
+        w = standing[k]
         N = w[6] - w[7] * L[2] + w[8] * L[4] - w[9] * L[3]
         if N < 0.0:
             c[0], c[1], c[2] = c[0] + N, c[1] + N * w[0], c[2] + N * w[1]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.numerics.compiled import njit
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, STEPS, VECTOR, F, W
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, STEPS, F, W
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels
 
@@ -48,6 +48,22 @@ def _by(A: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
+def _inverse(A: np.ndarray) -> np.ndarray:
+    """Of a matrix (3, 3)."""
+    B = np.empty((3, 3))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for n in range(3):
+            p, q = (n + 1) % 3, (n + 2) % 3
+            B[n, i] = A[j, p] * A[k, q] - A[j, q] * A[k, p]
+    d = A[0, 0] * B[0, 0] + A[0, 1] * B[1, 0] + A[0, 2] * B[2, 0]
+    for i in range(3):
+        for n in range(3):
+            B[i, n] /= d
+    return B
+
+
+@njit(cache=True, error_model="numpy")
 def _stepped(
     of: Springs, inverse: np.ndarray, f: np.ndarray, h: np.ndarray, c: np.ndarray, step: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -55,31 +71,83 @@ def _stepped(
 
     `inverse` is of the inertia and half a step of what resists.
     """
-    half = h[1] + 0.5 * step * h[2]
-    ahead = h[0] + step * (h[1] + 0.25 * step * h[2])
-    f, new = f - _by(of.C, half) - _by(of.tangent, ahead), np.empty((3, 3))
+    half, ahead, force, new = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
+    for i in range(3):
+        half[i] = h[1, i] + 0.5 * step * h[2, i]
+        ahead[i] = h[0, i] + step * (h[1, i] + 0.25 * step * h[2, i])
+    damped, sprung = _by(of.C, half), _by(of.tangent, ahead)
     for _ in range(_REPEATS):
-        new[2] = _by(inverse, f + c)
-        new[1], new[0] = half + 0.5 * step * new[2], ahead + 0.25 * step * step * new[2]
-        L, before, c = of.rest + _by(of.K, new[0]) + _by(of.C, new[1]), c, np.zeros(3)
-        for w in of.standing:
-            N = w[6] - w[7] * L[0] + w[8] * L[2] - w[9] * L[1]
-            if N < 0.0:
-                c[0], c[1], c[2] = c[0] - N, c[1] - N * w[1], c[2] + N * w[0]
-        if np.abs(c - before).max() < _SETTLED:
+        for i in range(3):
+            force[i] = f[i] - damped[i] - sprung[i] + c[i]
+        a = _by(inverse, force)
+        for i in range(3):
+            new[2, i] = a[i]
+            new[1, i], new[0, i] = half[i] + 0.5 * step * a[i], ahead[i] + 0.25 * step * step * a[i]
+        before, c = c, _pulls(of, _by(of.K, new[0]), _by(of.C, new[1]))
+        if max(abs(c[0] - before[0]), abs(c[1] - before[1]), abs(c[2] - before[2])) < _SETTLED:
             break
     return new, c
 
 
 @njit(cache=True, error_model="numpy")
-def heaving(
-    state: np.ndarray, wheels: np.ndarray, w: np.ndarray, M: np.ndarray, rows: np.ndarray, of: Springs, step: float
+def _pulls(of: Springs, sprung: np.ndarray, damped: np.ndarray) -> np.ndarray:
+    """c (3,) of wheels off the floor, by what springs and dampers bear (3,)."""
+    c = np.zeros(3)
+    z, rx, ry = (
+        of.rest[0] + sprung[0] + damped[0],
+        of.rest[1] + sprung[1] + damped[1],
+        of.rest[2] + sprung[2] + damped[2],
+    )
+    for k in range(len(of.standing)):
+        w = of.standing[k]
+        N = w[6] - w[7] * z + w[8] * ry - w[9] * rx
+        if N < 0.0:
+            c[0], c[1], c[2] = c[0] - N, c[1] - N * w[1], c[2] + N * w[0]
+    return c
+
+
+@njit(cache=True, error_model="numpy")
+def _sampled(
+    M: np.ndarray,
+    row: np.ndarray,
+    carried: np.ndarray,
+    of: Springs,
+    step: float,
+    out: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """The inverse that `_stepped` takes; S, M_ph and M_hh (3, 3) of a sample are filled."""
+    (S, ph, hh), A = out, np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            ph[i, j], hh[i, j], A[i, j] = M[3 + j, i], M[3 + i, 3 + j], row[_UPPER[i][j]] - carried[_UPPER[i][j]]
+    plane = _inverse(A)
+    for i in range(3):
+        for j in range(3):
+            S[i, j] = ph[0, i] * plane[0, j] + ph[1, i] * plane[1, j] + ph[2, i] * plane[2, j]
+    for i in range(3):
+        for j in range(3):
+            moved = S[i, 0] * ph[0, j] + S[i, 1] * ph[1, j] + S[i, 2] * ph[2, j]
+            A[i, j] = hh[i, j] - moved + 0.5 * step * of.C[i, j] + 0.25 * step * step * of.tangent[i, j]
+    return _inverse(A)
+
+
+@njit(cache=True, error_model="numpy")
+def heaving(  # noqa: PLR0913
+    state: np.ndarray,
+    wheels: np.ndarray,
+    lanes: int,
+    w: np.ndarray,
+    M: np.ndarray,
+    rows: np.ndarray,
+    of: Springs,
+    step: float,
 ) -> np.ndarray:
     """z, rx, ry (STEPS n, 3) [m, rad] of a base, one lane of `Bases`, from rest.
 
     Args:
         state: (ROWS, LANES), changed.
         wheels: (m, WHEEL, LANES), changed.
+        lanes: As `advance` takes them.
         w: (STEPS n, 6) change since rest: Fx, Fy, Mz, Fz, Mx, My [N, N.m].
         M: (n, 6, 6) in the same order.
         rows: (n, 15) inertia as `advance` takes it.
@@ -87,28 +155,24 @@ def heaving(
         step: [s].
     """
     out, h, c, drive = np.zeros((len(w), 3)), np.zeros((3, 3)), np.zeros(3), np.zeros((1, COLUMNS))
-    before, floor, S, inverse = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
-    hp, ph, hh, plane = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    carried, resisting = moving_wheels(wheels.reshape(-1)), 0.5 * step * of.C + 0.25 * step * step * of.tangent
+    before, floor, left, carried = np.zeros(3), np.zeros(3), np.zeros(3), moving_wheels(wheels.reshape(-1))
+    S, ph, hh, inverse = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(w)):
         if k % STEPS == 0:
-            m = M[k // STEPS]
-            hp[:], hh[:] = m[3:, :3], m[3:, 3:]
-            for i in range(3):
-                for j in range(3):
-                    plane[i, j] = rows[k // STEPS, _UPPER[i][j]] - carried[_UPPER[i][j]]
-            S[:] = hp @ np.linalg.inv(plane)
-            ph[:] = hp.T
-            inverse[:] = np.linalg.inv(hh - S @ ph + resisting)
+            inverse = _sampled(M[k // STEPS], rows[k // STEPS], carried, of, step, (S, ph, hh))
         for i in range(3):
             now = state[F + i, 0] + state[W + i, 0]
             floor[i], before[i] = 2.0 * now - before[i], now
-        h, c = _stepped(of, inverse, w[k, 3:] - _by(S, w[k, :3] - floor), h, c, step)
-        moved, load = _by(ph, h[2]), of.rest + w[k, 3:] - _by(hh, h[2])
+            left[i] = w[k, i] - floor[i]
+        driven = _by(S, left)
         for i in range(3):
-            drive[0, i] = w[k, i] - moved[i]
-        drive[0, 3], drive[0, 4], drive[0, 5] = -load[0], load[2], -load[1]
+            left[i] = w[k, 3 + i] - driven[i]
+        h, c = _stepped(of, inverse, left, h, c, step)
+        shared, own = _by(ph, h[2]), _by(hh, h[2])
+        for i in range(3):
+            drive[0, i], left[i] = w[k, i] - shared[i], of.rest[i] + w[k, 3 + i] - own[i]
+            out[k, i] = h[0, i]
+        drive[0, 3], drive[0, 4], drive[0, 5] = -left[0], left[2], -left[1]
         drive[0, 6], drive[0, 7] = h[0, 1], h[0, 2]
-        advance(state, wheels, drive, rows[k // STEPS], step, VECTOR)
-        out[k] = h[0]
+        advance(state, wheels, drive, rows[k // STEPS], step, lanes)
     return out

@@ -223,5 +223,7 @@ def _simulated(  # noqa: PLR0913
                     share[LANES * g + l, at] = total[3 * LANES + l] / (m * steps * every)
                     for i in range(3):
                         x[LANES * g + l, at, i] = total[i * LANES + l] / every
-                total[:] = 0.0
-        total[:] = 0.0
+                for l in range(4 * LANES):
+                    total[l] = 0.0
+        for l in range(4 * LANES):
+            total[l] = 0.0

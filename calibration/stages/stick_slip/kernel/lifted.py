@@ -11,7 +11,7 @@ A force plate stands still: about a base that has slid by (x, y, yaw) its moment
 import numpy as np
 
 from calibration.numerics.compiled import njit
-from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, WHEEL
+from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, WHEEL, E
 
 _LEGS = 3
 
@@ -45,8 +45,11 @@ def pulled(rows: np.ndarray, p: np.ndarray) -> np.ndarray:
     m, legs = len(rows), 0
     off, A, b, c = np.zeros(m, np.bool_), np.empty((3, 3)), np.empty(3), np.zeros(3)
     for _ in range(m):
-        same, legs, A[:], b[:] = True, m, 0.0, 0.0
-        A[0, 0] = A[1, 1] = A[2, 2] = 1.0
+        same, legs = True, m
+        for i in range(3):
+            b[i] = 0.0
+            for j in range(3):
+                A[i, j] = 1.0 if i == j else 0.0
         for i in range(m):
             w = rows[i]
             own = w[6] + w[7] * p[0] + w[8] * p[1] + w[9] * p[2]
@@ -64,8 +67,13 @@ def pulled(rows: np.ndarray, p: np.ndarray) -> np.ndarray:
 @njit(cache=True, error_model="numpy")
 def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
     """Add c to the load of a lane of a flat state, by its flat wheels."""
-    at = LOAD * LANES + lane
-    c = pulled(wheels.reshape(-1, WHEEL, LANES)[:, :, lane], s[at : at + 3 * LANES : LANES])
+    at, rows, p = LOAD * LANES + lane, np.empty((len(wheels) // (WHEEL * LANES), E)), np.empty(3)
+    for i in range(len(rows)):
+        for k in range(E):
+            rows[i, k] = wheels[(i * WHEEL + k) * LANES + lane]
+    for k in range(3):
+        p[k] = s[at + k * LANES]
+    c = pulled(rows, p)
     for k in range(3):
         s[at + k * LANES] += c[k]
 

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from calibration.stages.stick_slip.forcing import STEP, STEPS
+from calibration.stages.stick_slip.kernel.bases import VECTOR
 from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
 from calibration.stages.stick_slip.likelihood import bases_of
 from tests.calibration.stages.stick_slip.slipping import MASS, POSITION, TRUTH, WEIGHT, WHEELS
@@ -41,7 +42,7 @@ def found(p, w, springs, on=BARE):
     rows = np.zeros((n, 15))
     rows[:, :6] = MASS[np.triu_indices(3)]
     rows[:, 6:] = (M[3:, :3][[0, 2, 1]] * np.array([1.0, -1.0, 1.0])[:, None]).ravel()
-    return heaving(state, wheels, w, np.repeat(M[None], n, axis=0), rows, springs, STEP)
+    return heaving(state, wheels, VECTOR, w, np.repeat(M[None], n, axis=0), rows, springs, STEP)
 
 
 def springs():
