@@ -73,15 +73,20 @@ def planar_motion(description: Description, trial: Trial, rest: Rest, forcing: P
     return PlanarMotion(blocks(plane), valid, noise, np.where(valid[:, None], blocks(excess), np.nan))
 
 
-def slid(description: Description, trial: Trial, rest: Rest, plate: Load, suspension: Suspension) -> Signal:
-    """x, y, yaw (n, 3) [m, rad, frame 0] by which the base has slid, where its markers are seen.
+def slid(description: Description, trial: Trial, rest: Rest, plate: Load, suspension: Suspension) -> Signal | None:
+    """x, y, yaw (n, 3) [m, rad, frame 0] by which the base has slid, at the times its markers are seen.
 
-    Raises:
-        NotEnoughData: Markers or wrench are missing.
+    None where markers and wrench overlap for less than two seconds.
     """
-    seen = base_response_of(description, trial, rest, plate)
-    x, good = seen.x - predicted(suspension.K, suspension.C, seen.forcing), seen.valid
-    return Signal(seen.forcing.t[good], x[good][:, PLANE], good[good])
+    try:
+        seen = base_response_of(description, trial, rest, plate)
+    except NotEnoughData:
+        return None
+    good = seen.valid
+    if not good.any():
+        return None
+    x = seen.x - predicted(suspension.K, suspension.C, seen.forcing)
+    return Signal(seen.forcing.t[good], x[good][:, PLANE], np.ones(int(good.sum()), dtype=bool))
 
 
 def blocks(x: np.ndarray) -> np.ndarray:

@@ -100,8 +100,8 @@ def _read(
             rest = rest_of(sources.lab.description, trial, sources.T_base_B)
             wrenches = wrenches_of(sources, trial, rest.T_lab_0)
             if wrenches.plate is not None:
-                moved = slid(sources.lab.description, trial, rest, wrenches.plate, suspension)
-                wrenches = replace(wrenches, slid=moved)
+                far = slid(sources.lab.description, trial, rest, wrenches.plate, suspension)
+                wrenches = replace(wrenches, slid=far)
             if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
                 wrenches = replace(wrenches, links=_linked(sources.lab, trains, sources.robot, trial, rest))
             return Read(trial, rest, wrenches)

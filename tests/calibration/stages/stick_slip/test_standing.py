@@ -153,6 +153,10 @@ def rocked(wheels, amplitude, far, rng):
     return replace(moved(trial, x, t), plate_wrench=in_lab[:, None])
 
 
+def on_springs(K, C, tried):
+    return Suspension("compliance", K, C, np.zeros((6, 6)), np.zeros((6, 6)), (("plate", tried),), (), ())
+
+
 def rocking(amplitude, far=(0.0, 0.0, 0.0), seen_to_slide=True):
     """Tilting, as fitted with springs that pull and as `tilting_of` has it, and the springs' own K."""
     sources, rng = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE), np.random.default_rng(2)
@@ -165,11 +169,10 @@ def rocking(amplitude, far=(0.0, 0.0, 0.0), seen_to_slide=True):
     linear = fit_compliance(seen, np.equal.outer(in_plane, in_plane))
     sums = np.ones((4, 6))
     tried = HeldOut(1e-2 * sums, sums, 1e-6 * sums, np.full(4, 1e3))
-    none = np.zeros((6, 6))
-    suspension = Suspension("compliance", linear.K, linear.C, none, none, (("plate", tried),), (), ())
-    moved = [slid(DESCRIPTION, *one, suspension) for one in zip(trials, rests, loads, strict=True)]
-    moved, none = moved if seen_to_slide else [None] * len(loads), (np.zeros(0), np.zeros((0, 6, 6)), wheels)
-    wrenches = [Wrenches("a", 0.0, load, None, *none, slid=far) for load, far in zip(loads, moved, strict=True)]
+    suspension = on_springs(linear.K, linear.C, tried)
+    slides = [slid(DESCRIPTION, *one, suspension) for one in zip(trials, rests, loads, strict=True)]
+    slides, none = slides if seen_to_slide else [None] * len(loads), (np.zeros(0), np.zeros((0, 6, 6)), wheels)
+    wrenches = [Wrenches("a", 0.0, load, None, *none, slid=own) for load, own in zip(loads, slides, strict=True)]
     read = [Read(*one) for one in zip(trials, rests, wrenches, strict=True)]
     a = np.column_stack([np.ones(len(SPRINGS)), wheels.position[:, 1], -wheels.position[:, 0]])
     return linear.K, tilting_of(sources, read, wheels, suspension)[0].K, a.T @ (SPRINGS[:, None] * a)
@@ -189,6 +192,21 @@ def test_casters_that_lift_off_a_base_that_slides_do_not_either():
     np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
     _, other, _ = rocking(0.8, far, seen_to_slide=False)
     assert np.abs(np.diag(other)[3:5] / np.diag(springs)[1:] - 1.0).max() > 0.1
+
+
+def test_markers_show_how_far_a_base_has_slid():
+    sources, far = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE), np.array([6e-3, -4e-3, 0.03])
+    trial = rocked(wheel_set(mjcf.urdf(), DESCRIPTION.wheels, G), 0.2, far, np.random.default_rng(2))
+    rest, K = rest_of(DESCRIPTION, trial, sources.T_base_B), np.diag([PLANE, PLANE, 5e5, 2e4, 1e4, PLANE])
+    load, of = (
+        sources.plate_load(trial, rest.T_lab_0),
+        on_springs(K, 1e-3 * K, HeldOut(*np.ones((3, 1, 6)), np.ones(1))),
+    )
+    found = slid(DESCRIPTION, trial, rest, load, of)
+    np.testing.assert_allclose(found.x[found.t < 1.5], 0.0, atol=1e-4)
+    np.testing.assert_allclose(found.x[found.t > 4.0].mean(axis=0), far, atol=1e-4)
+    parts = (load.signal.t[:150], load.signal.x[:150], load.signal.valid[:150])
+    assert slid(DESCRIPTION, trial, rest, replace(load, signal=Signal(*parts)), of) is None
 
 
 def test_where_no_wheel_lifts_off_the_compliance_stays():
