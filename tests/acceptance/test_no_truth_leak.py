@@ -89,8 +89,15 @@ def whole_run(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("campaign", ["quick_run", "whole_run"])
-@pytest.mark.parametrize("factor", [3.0, 1.0 / 3.0])
+@pytest.mark.parametrize(
+    ("factor", "campaign"),
+    [
+        (3.0, "quick_run"),
+        (3.0, "whole_run"),
+        (1.0 / 3.0, "quick_run"),
+        pytest.param(1.0 / 3.0, "whole_run", marks=pytest.mark.xfail(reason="docs/limits.md: arm_1", strict=True)),
+    ],
+)
 def test_the_headline_moves_by_a_tenth_at_most_when_all_priors_are_wider_or_narrower(
     request, tmp_path, factor, campaign
 ):
