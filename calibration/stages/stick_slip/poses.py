@@ -122,11 +122,12 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
         NoSuchElement: The model was not fitted from that source.
     """
     found = model.direction(source)
-    if source == "plate" and found.slips.any():
-        forcing = planar_forcing(wrenches, model.tilting, source)
-        moved = np.where(found.slips, model.predict(forcing).x - forcing.linear, 0.0)
-        wrenches = replace(wrenches, slid=Signal(forcing.t, moved, np.ones(len(moved), dtype=bool)))
     if source == "plate":
+        forcing = planar_forcing(wrenches, model.tilting, source)
+        if not found.slips.any():
+            return forcing
+        far = np.where(found.slips, model.predict(forcing).x - forcing.linear, 0.0)
+        wrenches = replace(wrenches, slid=Signal(forcing.t, far, np.ones(len(far), dtype=bool)))
         return planar_forcing(wrenches, model.tilting, source)
     if links is not None and links.trains.trains:
         forcing = planar_forcing(wrenches, model.tilting, source)

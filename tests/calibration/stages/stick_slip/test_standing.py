@@ -179,8 +179,8 @@ def rocking(amplitude, far=(0.0, 0.0, 0.0), seen_to_slide=True):
 
 
 def test_casters_that_lift_off_do_not_make_the_base_softer():
-    linear, found, springs = rocking(0.8)
-    assert linear[4, 4] < 0.85 * springs[2, 2]
+    linear, found, springs = rocking(0.85)
+    assert linear[4, 4] < 0.8 * springs[2, 2]
     np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
     np.testing.assert_array_equal(found[[0, 1, 5]], linear[[0, 1, 5]])
 
@@ -198,10 +198,8 @@ def test_markers_show_how_far_a_base_has_slid():
     sources, far = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE), np.array([6e-3, -4e-3, 0.03])
     trial = rocked(wheel_set(mjcf.urdf(), DESCRIPTION.wheels, G), 0.2, far, np.random.default_rng(2))
     rest, K = rest_of(DESCRIPTION, trial, sources.T_base_B), np.diag([PLANE, PLANE, 5e5, 2e4, 1e4, PLANE])
-    load, of = (
-        sources.plate_load(trial, rest.T_lab_0),
-        on_springs(K, 1e-3 * K, HeldOut(*np.ones((3, 1, 6)), np.ones(1))),
-    )
+    load, tried = sources.plate_load(trial, rest.T_lab_0), HeldOut(*np.ones((3, 1, 6)), np.ones(1))
+    of = on_springs(K, 1e-3 * K, tried)
     found = slid(DESCRIPTION, trial, rest, load, of)
     np.testing.assert_allclose(found.x[found.t < 1.5], 0.0, atol=1e-4)
     np.testing.assert_allclose(found.x[found.t > 4.0].mean(axis=0), far, atol=1e-4)
