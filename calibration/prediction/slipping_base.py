@@ -27,7 +27,7 @@ from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, 
 from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, Readings, wrenches_along
-from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, LANES, STEPS, Bases
+from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, STEPS, VELOCITY, Bases
 from calibration.stages.stick_slip.kernel.lifted import bear
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import Links, forced
@@ -37,6 +37,7 @@ from calibration.stages.stick_slip.stream import (
     Sample,
     SlipState,
     SlipStream,
+    mean_of,
     slip_stream,
     step_members,
 )
@@ -47,7 +48,7 @@ from calibration.stages.suspension.model import Source
 _UPPER = tuple((PLANE[i], PLANE[j]) for i, j in UPPER)
 _UNMOVED = np.zeros((3, 0))
 _LAG = 1.0 / (2.0 * np.pi * CUTOFF)  # [s] tau
-_LEVEL = np.zeros(3)  # accelerations of heave and tilt
+_STILL = np.zeros((2, 3))  # velocities in the plane, accelerations of heave and tilt
 
 
 class Place(NamedTuple):
@@ -171,7 +172,7 @@ class SlippingBase:
     def _driven(self, gravity: np.ndarray, moving: np.ndarray) -> np.ndarray:
         """What the arm does to the base in the floor's plane (9,), see `Sample`; gravity (3,) in frame 0."""
         tree, actions, work, found = self._robot
-        return np.asarray(driven(tree, actions, gravity, _LEVEL, moving, work, found))
+        return np.asarray(driven(tree, actions, gravity, _STILL, moving, work, found))
 
     @cached_property
     def _robot(self) -> tuple[RigidTree, tuple[np.ndarray, np.ndarray], np.ndarray, TreeDynamics]:
@@ -190,16 +191,20 @@ def driven(
     tree: RigidTree,
     actions: tuple[np.ndarray, np.ndarray],
     gravity: np.ndarray,
-    heaving: np.ndarray,
+    base: np.ndarray,
     moving: np.ndarray,
     work: np.ndarray,
     found: TreeDynamics,
 ) -> np.ndarray:
-    """`SlippingBase._driven` at readings, velocities and accelerations (3, k), heave and tilt accelerating by (3,)."""
+    """`SlippingBase._driven` at readings, velocities and accelerations (3, k).
+
+    `base` (2, 3): velocities of x, y, yaw and accelerations of z, rx, ry, in its axes.
+    """
     (dual, back), root, out = actions, np.zeros((1, 12)), np.zeros(9)
     for i in range(6):
         for c in range(3):
-            root[0, 6 + i] += back[i, 2 + c] * heaving[c] - back[i, c] * gravity[c]
+            root[0, i] += back[i, PLANE[c]] * base[0, c]
+            root[0, 6 + i] += back[i, HEAVE[c]] * base[1, c] - back[i, c] * gravity[c]
     sample(tree, moving[0:1], moving[1:2], moving[2:3], root, work, found)
     for i in range(3):
         for r in range(6):
@@ -225,17 +230,15 @@ def lagged(h: np.ndarray, before: np.ndarray, lags: np.ndarray, dt: float) -> tu
 
 
 @njit(cache=True, error_model="numpy")
-def accelerating(state: np.ndarray, members: int, heaving: np.ndarray, T_lab_0: np.ndarray) -> np.ndarray:
-    """(2, 3) linear and angular, lab axes: the members' mean in the plane, (3,) of heave and tilt."""
+def accelerating(planar: np.ndarray, heaving: np.ndarray, T_lab_base: np.ndarray) -> np.ndarray:
+    """(2, 3) linear and angular, lab axes, of a base that accelerates by (3,) in the plane, (3,) in heave and tilt."""
     own, a = np.zeros(6), np.zeros((2, 3))
     for k in range(3):
-        own[HEAVE[k]] = heaving[k]
-        for e in range(members):
-            own[PLANE[k]] += state[e // LANES, ACCELERATION + k, e % LANES] / members
+        own[HEAVE[k]], own[PLANE[k]] = heaving[k], planar[k]
     for i in range(3):
         for c in range(3):
-            a[0, i] += T_lab_0[i, c] * own[c]
-            a[1, i] += T_lab_0[i, c] * own[3 + c]
+            a[0, i] += T_lab_base[i, c] * own[c]
+            a[1, i] += T_lab_base[i, c] * own[3 + c]
     return a
 
 
@@ -273,7 +276,9 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, change, dt, x)
     lags, heaving = lagged(x[2:5], before.x[2:5], before.lags, dt)
     if moving.shape[1]:
-        driving = driven(tree, (dual, back), place.gravity, heaving, moving, work, room)
+        base = np.empty((2, 3))
+        base[0], base[1] = mean_of(bases.state, VELOCITY, fitted.members), heaving
+        driving = driven(tree, (dual, back), place.gravity, base, moving, work, room)
     after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes)
     readings = w[0], x[2:5], driving, before.rest, before.row, before.found
     step_members(after, readings, fitted, before.band, dt / STEPS, row, found)
@@ -285,6 +290,6 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     from_vectors(own, turn)
     moved, scratch = place.T_lab_0.copy().reshape(1, 4, 4), np.empty((3, 4))
     shift(moved[0], turn[0], scratch)
+    a = accelerating(mean_of(after.state, ACCELERATION, fitted.members), heaving, moved[0])
     shift(moved[0], place.T_0_lab, scratch)
-    a = accelerating(after.state, fitted.members, heaving, place.T_lab_0)
     return sprung[0], modes, x, lags, moved, a, row, after.state, after.wheels, found

@@ -1,12 +1,11 @@
 """What drives the base in the floor's plane in one trial.
 
-    w = (Fx, Fy, Mz) of nominal inverse dynamics, base at rest  -  M_ph d2/dt2 (z, rx, ry)
+    w = (Fx, Fy, Mz) of inverse dynamics on a base that does not accelerate  -  M_ph d2/dt2 (z, rx, ry)
     vertical load (-Fz, My, -Mx) of the plate, or of inverse dynamics less M_h. d2/dt2 (z, rx, ry)
 
-all in frame 0, about its origin; p: x, y, yaw, h: z, rx, ry; M(q) the composite inertia of the nominal robot with the
-payload of the trial. Heave and tilt are those of the 6x6 compliance under the same source. Forces in the floor's plane
-count from their mean in the first second. A sample takes STEPS steps, the first at its time: its position is that of
-the last one, 5 ms later; one that ended at its time would follow the plate 5 ms late, a correction acts a step late.
+all about the base frame's origin, in its axes, a plate's in frame 0; p: x, y, yaw, h: z, rx, ry; M(q) the composite
+inertia of the nominal robot with the payload of the trial. Heave and tilt are those of the 6x6 compliance under that
+source. Forces in the floor's plane count from their mean in the first second. The last of STEPS steps is at its sample.
 Where there are no joint readings the base has no inertia: then the plate alone moves it, at the rate of the correction.
 """
 
@@ -72,7 +71,7 @@ class PlanarForcing:
 def planar_force(drive: np.ndarray, source: Source) -> np.ndarray:
     """Change of Fx, Fy, Mz (n, 3) on the floor by its source, of drives (STEPS n, 11)."""
     first = PLATE if source == "plate" else 0
-    return np.asarray(drive[::STEPS, first : first + 3])
+    return np.asarray(drive[STEPS - 1 :: STEPS, first : first + 3])
 
 
 @dataclass(frozen=True)
@@ -91,6 +90,11 @@ class Tilting:
     off: np.ndarray = field(default_factory=lambda: np.zeros(2))
     shares: np.ndarray = field(default_factory=lambda: np.ones(2))
 
+    def leans(self, load: np.ndarray) -> np.ndarray:
+        """(rx, ry) [rad] from the vertical under a load (-Fz, My, -Mx) at rest, by springs of the same length."""
+        h = np.linalg.solve(self.K[np.ix_(HEAVE, HEAVE)], load[[0, 2, 1]] * (-1.0, -1.0, 1.0))
+        return np.asarray(h[1:])
+
     def standing(self, wheels: WheelSet, source: Source) -> np.ndarray:
         """Rows (m, 10) of wheels, see `WheelSet.standing`, as the source's wrench counts their places."""
         return wheels.standing(self.shares, self.off if source == "plate" else np.zeros(2))
@@ -108,7 +112,8 @@ class Wrenches:
         t: (k,) times of the inertia; empty without.
         M: (k, 6, 6) composite inertia.
         wheels: Of the robot.
-        links: By inverse dynamics of link angles, where they are known: they strike in their gaps as motors do not.
+        links: By inverse dynamics of link angles on a base that turns and moves, where they are known: links strike in
+            their gaps as motors do not.
         slips: A base of the most likely parameters, for heave and tilt while it slips; None: as if it stuck.
         slid: How far the base has slid (k, 3), on which the plate stands still, where that is known: predicted, or in
             a calibration trial as its markers show it. Then the plate shows heave and tilt, whatever is to move it.
@@ -125,9 +130,10 @@ class Wrenches:
     slips: Bases | None = None
     slid: Signal | None = None
 
-    def moved_by(self, source: Source) -> Load | None:
-        """What moves the base where `source` is what was measured."""
-        return self.plate if source == "plate" else self.links or self.dynamics
+    @property
+    def inner(self) -> Load | None:
+        """By inverse dynamics of what is known best."""
+        return self.links or self.dynamics
 
 
 class Readings(NamedTuple):
@@ -185,8 +191,7 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     Raises:
         NotEnoughData: The wrench asked for was not recorded.
     """
-    main = wrenches.moved_by(source)
-    dynamics = wrenches.dynamics if source == "plate" else main
+    main, dynamics = wrenches.plate if source == "plate" else wrenches.inner, wrenches.inner
     if main is None:
         what = "force plate" if source == "plate" else "encoder readings"
         raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")
@@ -195,8 +200,8 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     if dynamics is not None:
         first, last = max(first, dynamics.signal.t[0]), min(last, dynamics.signal.t[-1])
     n = int((last - first) * RATE + 1e-6)
-    t, fine = first + np.arange(n) / RATE, first + np.arange(n * STEPS) * STEP
-    rest = fine <= wrenches.start + REST
+    fine = first + np.arange(n * STEPS) * STEP
+    t, rest = fine[STEPS - 1 :: STEPS], fine <= wrenches.start + REST
     tilt, load, rows, drive = heave(fine), _at(main.signal, fine), np.zeros((n, 15)), np.zeros((len(fine), COLUMNS))
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
@@ -208,14 +213,14 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
         if main is dynamics:
             load, rows = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0), _inertia(M)
     drive[:, 3:6] = vertical(load)
-    drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:]
     if source == "plate":
         drive[:, 4:6], drive[:, PLATE:] = (
             drive[:, 4:6] - drive[:, 3:4] * tilting.off,
             load[:, PLANE] - load[rest][:, PLANE].mean(axis=0),
         )
-    early = t <= wrenches.start + REST
-    return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[::STEPS], early, linear(t))
+    drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:] + tilting.leans(drive[rest, 3:6].mean(axis=0))
+    own = slice(STEPS - 1, None, STEPS)
+    return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[own], rest[own], linear(t))
 
 
 def on_wheels(load: Load, standing: np.ndarray, slid: Signal | None) -> Load:
@@ -255,7 +260,7 @@ def _swayed(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) ->
 
 def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases | None) -> np.ndarray | None:
     """Mean squares (2, 3) of z, rx, ry by dynamics less the plate's, and of what these reach; None without either."""
-    load = wrenches.moved_by("dynamics")
+    load = wrenches.inner
     if load is None or wrenches.plate is None:
         return None
     found, _ = _swayed(replace(wrenches, slid=None, slips=slips), tilting, "dynamics", load)
@@ -269,11 +274,11 @@ def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcin
     """z, rx, ry of a base while it slips, see `kernel.heaving`."""
     h, order, t = np.ix_(HEAVE, HEAVE), [*PLANE, *HEAVE], forcing.t
     standing, M = tilting.standing(wrenches.wheels, "dynamics"), _resampled(wrenches.t, wrenches.M, t)
-    springs = Springs(tilting.K[h], tilting.C[h], (tilting.K + forcing.tangent)[h], forcing.rest[[*HEAVE]], standing)
+    rest, leans = forcing.rest[[*HEAVE]], tilting.leans(vertical(forcing.rest[None])[0])
+    springs = Springs(tilting.K[h], tilting.C[h], (tilting.K + forcing.tangent)[h], rest, standing, leans)
     w = CubicSpline(t, forcing.w[:, order])(t[0] + np.arange(STEPS * len(t)) * STEP)
     state, wheels, own = slips.state[0].copy(), slips.wheels[0].copy(), np.ascontiguousarray(M[:, order][:, :, order])
-    w = np.ascontiguousarray(w)
-    found = heaving(state, wheels, slips.lanes[0], w, own, _inertia(M), springs, STEP)
+    found = heaving(state, wheels, slips.lanes[0], np.ascontiguousarray(w), own, _inertia(M), springs, STEP)
     return CubicSpline(t, found[::STEPS])
 
 

@@ -1,7 +1,7 @@
 """Where the base's markers are in a trial, predicted: its first second and a wrench, nothing else.
 
 T_lab_B(t) = T_lab_0 exp(x(t)) T_0_B,     covariance of x: diag V(t), in frame 0
-use_i = |K_i e_i + N_i (-ry, rx)| / (mu_i N_i),  the share of its friction that wheel i needs: 1 where it slides
+use_i = |K_i e_i + (N_i - m_i G) (-ry, rx)| / (mu_i N_i), the share of its friction that wheel i needs: 1, it slides
 """
 
 from dataclasses import dataclass, replace
@@ -9,13 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calibration.numerics.lie import from_vector
-from calibration.numerics.signals import Signal
+from calibration.errors import NotEnoughData
+from calibration.numerics.lie import from_vector, inverse, to_vector
+from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.forcing import (
     CUTOFF,
+    PLANE,
     STEP,
     STEPS,
     PlanarForcing,
@@ -27,6 +29,7 @@ from calibration.stages.stick_slip.forcing import (
 )
 from calibration.stages.stick_slip.kernel.bases import LOAD
 from calibration.stages.stick_slip.kernel.integration import advance
+from calibration.stages.stick_slip.kernel.wheel_forces import stood
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
@@ -109,11 +112,25 @@ class Links(NamedTuple):
         at, q, push = self.readings
         moving = self.trains.base_acceleration(t, T_lab_base, at)
         loads = self.trains.dynamics.loads("", at, q, moving, push)
-        return motion_load(self.lab, at, self.trains.likely(loads), self.T_lab_0, CUTOFF, push)
+        twist = planar_twist(t, T_lab_base, self.T_lab_0, at)
+        return motion_load(self.lab, at, self.trains.likely(loads), self.T_lab_0, CUTOFF, push, twist)
+
+
+def planar_twist(t: np.ndarray, T_lab_base: np.ndarray, T_lab_0: np.ndarray, at: np.ndarray) -> np.ndarray | None:
+    """Twist (n, 6) [m/s, rad/s, base frame] in the floor's plane at times `at` (n,), of poses (m, 4, 4) at t (m,)."""
+    try:
+        seen = even(t, to_vector(inverse(T_lab_0) @ T_lab_base)[:, PLANE])
+    except NotEnoughData:
+        return None
+    x = low_passed(seen, CUTOFF).x
+    v, c, s = np.gradient(x, 1.0 / RATE, axis=0), np.cos(x[:, 2]), np.sin(x[:, 2])
+    twist = np.zeros((len(v), 6))
+    twist[:, 0], twist[:, 1], twist[:, 5] = c * v[:, 0] + s * v[:, 1], c * v[:, 1] - s * v[:, 0], v[:, 2]
+    return interpolate_columns(at, seen.t, twist)
 
 
 def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | None) -> PlanarForcing:
-    """What drives the base; where inverse dynamics do, of links on a base that moves as their motors move it.
+    """What drives the base: of links on a base that moves as what their motors do moves it.
 
     A plate's moments are about where the base has slid to.
 
@@ -121,20 +138,19 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
         NotEnoughData: The wrench was not recorded.
         NoSuchElement: The model was not fitted from that source.
     """
-    found = model.direction(source)
-    if source == "plate":
-        forcing = planar_forcing(wrenches, model.tilting, source)
-        if not found.slips.any():
-            return forcing
-        far = np.where(found.slips, model.predict(forcing).x - forcing.linear, 0.0)
-        wrenches = replace(wrenches, slid=Signal(forcing.t, far, np.ones(len(far), dtype=bool)))
-        return planar_forcing(wrenches, model.tilting, source)
-    if links is not None and links.trains.trains:
-        forcing = planar_forcing(wrenches, model.tilting, source)
-        x, _ = model.displacement(forcing)
+    slips, known = model.direction(source).slips, links is not None and bool(links.trains.trains)
+    forcing = planar_forcing(wrenches, model.tilting, source)
+    if not known and not slips.any():
+        return forcing
+    x, _ = model.displacement(forcing)
+    if links is not None and known:
         wrenches = replace(wrenches, links=links.load(forcing.t, links.T_lab_0 @ from_vector(x)))
-    if found.slips.any():
-        wrenches = replace(wrenches, slips=bases_of(model.wheels, found.logarithms[None], corrected=False))
+    if slips.any() and source == "plate":
+        far = np.where(slips, x[:, PLANE] - forcing.linear, 0.0)
+        wrenches = replace(wrenches, slid=Signal(forcing.t, far, np.ones(len(far), dtype=bool)))
+    elif slips.any():
+        likely = model.direction(source).logarithms
+        wrenches = replace(wrenches, slips=bases_of(model.wheels, likely[None], corrected=False))
     return planar_forcing(wrenches, model.tilting, source)
 
 
@@ -145,11 +161,13 @@ def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
         return np.zeros((len(forcing.t), len(model.wheels.names)))
     rows, base = model.wheels.rows(found.parameters), bases_of(model.wheels, found.logarithms[None], found.corrected)
     e, load = np.zeros((len(forcing.t), *model.wheels.position.shape)), np.zeros((len(forcing.t), 3))
+    stood(base.wheels[0].reshape(-1), forcing.drive[0], base.lanes[0])
     for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):
         advance(base.state[0], base.wheels[0], drive, forcing.inertia[k], STEP, base.lanes[0])
         e[k], load[k] = base.deflection(0), base.state[0, LOAD : LOAD + 3, 0]
     drive, N = forcing.drive[STEPS - 1 :: STEPS], np.maximum(rows[:, 6] + load @ rows[:, 7:10].T, 0.0)
-    force = rows[:, 2:4] * e + N[..., None] * np.stack([-drive[:, 7], drive[:, 6]], axis=1)[:, None]
+    leans = np.stack([-drive[:, 7], drive[:, 6]], axis=1)[:, None]
+    force = rows[:, 2:4] * e + (N - model.wheels.weight)[..., None] * leans
     used, limit = np.linalg.norm(force, axis=2), rows[:, 5] * N
     return np.minimum(np.divide(used, limit, out=np.ones_like(used), where=limit > 0.0), 1.0)
 

@@ -1,6 +1,6 @@
 """The stick-slip base sample by sample: each member of the ensemble is carried from one sample to the next.
 
-    state_e(t + dt) = advance(state_e(t), sample),     x = mean_e (x_e + STEP v_e),    V as in `band`
+    state_e(t + dt) = advance(state_e(t), sample),     x = mean_e x_e,    V as in `band`
 
 The first second is the rest the forces count from. Between two samples they are linear; nothing after a sample is
 used. A recording's sample ends with a step of STEP = 5 ms after its time, see `forcing`: here the velocity takes its
@@ -16,15 +16,16 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.band import banded
-from calibration.stages.stick_slip.forcing import STEP, UNMOVED
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, PLATE, STEPS, VELOCITY, Bases, at_rest
+from calibration.stages.stick_slip.forcing import UNMOVED, Tilting
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, PLATE, STEPS, Bases, X, at_rest
 from calibration.stages.stick_slip.kernel.integration import advance
+from calibration.stages.stick_slip.kernel.wheel_forces import stood
 from calibration.stages.stick_slip.likelihood import bodies
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, WheelSet, preloads
 
 UNDRIVEN = np.array([0.0] * 3 + [UNMOVED, 0.0, 0.0, UNMOVED, 0.0, UNMOVED])
-_NO_REST = np.zeros(6)
+_NO_REST = np.zeros(8)
 _LOADS = np.array([0.0] * 3 + [1.0] * 3 + [0.0] * 5)  # of a sample at rest: the vertical load alone
 
 
@@ -71,7 +72,8 @@ class SlipState(NamedTuple):
     Attributes:
         start: Time of the first sample [s].
         t: Of the last one.
-        rest: (6,) mean of the plate's (Fx, Fy, Mz) and of those of inverse dynamics in the first second.
+        rest: (8,) mean of the plate's (Fx, Fy, Mz) and of those of inverse dynamics in the first second, and how the
+            base leans then (rx, ry).
         n: Samples in that mean.
         before: (11,) the last sample as the kernel takes it.
         bases: The members, then the preloaded optimum.
@@ -105,6 +107,7 @@ class SlipStream:
         wheels: (e, m, 10) of the members, then of the optimum, once for each preload.
         bodies: (e, 4) as the kernel takes them.
         fitted: What was fitted.
+        tilting: Compliance of heave and tilt.
     """
 
     direction: Direction
@@ -112,6 +115,7 @@ class SlipStream:
     wheels: np.ndarray
     bodies: np.ndarray
     fitted: Fitted
+    tilting: Tilting
 
     def stepped(self, sample: Sample, before: SlipState | None) -> SlipState:
         """The base one sample on; without a state before, this sample is the first at rest."""
@@ -119,11 +123,13 @@ class SlipStream:
         if before is None or sample.t <= before.start + REST:
             row = np.empty(COLUMNS)
             sample_row(sample.wrench, sample.heave, driving, _NO_REST, self.fitted.off, row)
-            planar, row = np.concatenate([row[PLATE:], row[:3]]), row * _LOADS
+            leans = self.tilting.leans(row[3:6]) if before is None else before.rest[6:]
+            rest, row = np.concatenate([row[PLATE:], row[:3], leans]), row * _LOADS
+            row[6:PLATE] = leans
             if before is None:
-                return self._first(sample.t, row, planar)
+                return self._first(sample.t, row, rest)
             n = before.n + 1
-            return before._replace(t=sample.t, rest=before.rest + (planar - before.rest) / n, n=n, before=row)
+            return before._replace(t=sample.t, rest=before.rest + (rest - before.rest) / n, n=n, before=row)
         was = before.bases
         bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes)
         row, found = np.empty(COLUMNS), np.empty_like(before.found)
@@ -131,13 +137,16 @@ class SlipStream:
         step_members(bases, readings, self.fitted, before.band, (sample.t - before.t) / STEPS, row, found)
         return before._replace(t=sample.t, before=row, bases=bases, found=found, x=found[1] * self.fitted.moves)
 
-    def _first(self, t: float, row: np.ndarray, planar: np.ndarray) -> SlipState:
+    def _first(self, t: float, row: np.ndarray, rest: np.ndarray) -> SlipState:
         of, none = self.direction.band.begun(row[3:6]), np.zeros((5, 3))
         none[2] = of.floor**2
         band = np.array([of.floor, of.spread, of.start, of.slip])
         e = np.zeros((*self.wheels.shape[:2], 2))
         e[len(self.direction.ensemble) :] = preloads(self.wheel_set, self.direction.parameters, row[3:6])
-        return SlipState(t, t, planar, 1, row * _LOADS, at_rest(self.wheels, self.bodies, e), none, band, none[1])
+        bases = at_rest(self.wheels, self.bodies, e)
+        for wheels, lanes in zip(bases.wheels, bases.lanes, strict=True):
+            stood(wheels.reshape(-1), row, lanes)
+        return SlipState(t, t, rest, 1, row, bases, none, band, none[1])
 
 
 def slip_stream(model: StickSlip) -> SlipStream:
@@ -153,7 +162,17 @@ def slip_stream(model: StickSlip) -> SlipStream:
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
     linear, off = np.asarray(found.linear, dtype=bool), model.tilting.off
     fitted = Fitted(len(found.ensemble), len(own), compliance, found.slips, linear, off)
-    return SlipStream(found, model.wheels, wheels, own, fitted)
+    return SlipStream(found, model.wheels, wheels, own, fitted, model.tilting)
+
+
+@njit(cache=True, error_model="numpy")
+def mean_of(state: np.ndarray, row: int, members: int) -> np.ndarray:
+    """(3,) of the members, from a row of their states on."""
+    mean = np.zeros(3)
+    for k in range(3):
+        for e in range(members):
+            mean[k] += state[e // LANES, row + k, e % LANES] / members
+    return mean
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,17 +190,15 @@ def advance_members(
         k: Of all.
 
     Returns:
-        Mean and variance (3,) of the members STEP later, mean square (3,) of the preloaded about the first.
+        Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first.
     """
-    mean, variance, preloaded, x = np.zeros(3), np.zeros(3), np.zeros(3), np.empty(k)
+    variance, preloaded, x = np.zeros(3), np.zeros(3), np.empty(k)
     for g in range(len(bases.lanes)):
         advance(bases.state[g], bases.wheels[g], drive, inertia, h, bases.lanes[g])
+    mean = mean_of(bases.state, X, members)
     for a in range(3):
         for i in range(k):
-            state, lane = bases.state[i // LANES], i % LANES
-            x[i] = state[a, lane] + STEP * state[VELOCITY + a, lane]
-        for i in range(members):
-            mean[a] += x[i] / members
+            x[i] = bases.state[i // LANES, X + a, i % LANES]
         for i in range(members):
             variance[a] += (x[i] - mean[a]) ** 2 / members
         for i in range(members, k):
@@ -193,11 +210,11 @@ def advance_members(
 def sample_row(
     wrench: np.ndarray, heave: np.ndarray, driving: np.ndarray, rest: np.ndarray, off: np.ndarray, row: np.ndarray
 ) -> None:
-    """A sample as `advance` takes it (11,), less what rests (6,): the plate's (Fx, Fy, Mz), inverse dynamics'."""
+    """A sample as `advance` takes it (11,), by what rests (8,), see `SlipState`."""
     for a in range(3):
         row[a] = driving[a] - rest[3 + a]
     row[3], row[4], row[5] = -wrench[2], wrench[4] + wrench[2] * off[0], -wrench[3] + wrench[2] * off[1]
-    row[6], row[7] = heave[1], heave[2]
+    row[6], row[7] = heave[1] + rest[6], heave[2] + rest[7]
     row[8], row[9], row[10] = wrench[0] - rest[0], wrench[1] - rest[1], wrench[5] - rest[2]
 
 

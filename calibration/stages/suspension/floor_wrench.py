@@ -73,12 +73,19 @@ def motion_load(
     T_lab_0: np.ndarray,
     cutoff: float,
     push: Push | None = None,
+    twist: np.ndarray | None = None,
 ) -> Load:
-    """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock], and what pushes the hand."""
+    """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock], and what pushes the hand.
+
+    On a base that moves evenly with `twist` (n, 6) [m/s, rad/s, base frame]: then about its origin, in its axes.
+    """
     description = lab.description
     q = low_passed(even(t, q_motor), cutoff)
     spline, T_0_root = CubicSpline(q.t, q.x), root_in_base(lab.floating, description)
     root = root_at_rest(lab, T_lab_0)
+    if twist is not None:
+        moving = interpolate_columns(q.t, t, twist) @ T_0_root.inverse().action.T
+        root = np.concatenate([moving, np.broadcast_to(root[:, 6:], moving.shape)], axis=1)
     if push is not None:
         pushed = interpolate_columns(q.t, t, push.wrench)
         root = np.concatenate([np.broadcast_to(root, (len(pushed), 12)), pushed], axis=1)

@@ -39,7 +39,8 @@ def test_heave_and_tilt_push_the_base_by_its_composite_inertia():
     actions = np.array(T.dualAction, order="C"), np.array(T.inverse().action, order="C")
     moving = np.array([np.linspace(-0.5, 0.5, k), np.ones(k), -np.ones(k)])
     a, found = np.array([0.7, -0.4, 0.9]), room(1, len(tree.column))
-    still, heaving = (driven(tree, actions, GRAVITY, x, moving, scratch(tree), found) for x in (np.zeros(3), a))
+    level, base = np.zeros((2, 3)), np.array([np.zeros(3), a])
+    still, heaving = (driven(tree, actions, GRAVITY, x, moving, scratch(tree), found) for x in (level, base))
     M = actions[0] @ found.composite[0] @ actions[1]
     np.testing.assert_allclose(heaving[:3] - still[:3], -(M[np.ix_(PLANE, HEAVE)] @ a), atol=1e-9)
     np.testing.assert_array_equal(heaving[3:], still[3:])

@@ -14,7 +14,7 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, STEPS, F, W
 from calibration.stages.stick_slip.kernel.integration import advance
-from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels
+from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels, stood
 
 _REPEATS, _SETTLED = 20, 1e-3  # [N, N.m]
 _UPPER = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # of a symmetric matrix, in its six elements
@@ -29,6 +29,7 @@ class Springs(NamedTuple):
         tangent: (3, 3) K and the weight's, see `suspension.base_response.Forcing`.
         rest: (3,) Fz, Mx, My at rest [N, N.m].
         standing: (m, 10) see `WheelSet.standing`.
+        leans: (2,) rx, ry from the vertical at rest [rad].
     """
 
     K: np.ndarray
@@ -36,6 +37,7 @@ class Springs(NamedTuple):
     tangent: np.ndarray
     rest: np.ndarray
     standing: np.ndarray
+    leans: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
@@ -156,6 +158,9 @@ def heaving(  # noqa: PLR0913
     """
     out, h, c, drive = np.zeros((len(w), 3)), np.zeros((3, 3)), np.zeros(3), np.zeros((1, COLUMNS))
     before, floor, left, carried = np.zeros(3), np.zeros(3), np.zeros(3), moving_wheels(wheels.reshape(-1))
+    drive[0, 3], drive[0, 4], drive[0, 5] = -of.rest[0], of.rest[2], -of.rest[1]
+    drive[0, 6], drive[0, 7] = of.leans[0], of.leans[1]
+    stood(wheels.reshape(-1), drive[0], lanes)
     S, ph, hh, inverse = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(w)):
         if k % STEPS == 0:
@@ -173,6 +178,6 @@ def heaving(  # noqa: PLR0913
             drive[0, i], left[i] = w[k, i] - shared[i], of.rest[i] + w[k, 3 + i] - own[i]
             out[k, i] = h[0, i]
         drive[0, 3], drive[0, 4], drive[0, 5] = -left[0], left[2], -left[1]
-        drive[0, 6], drive[0, 7] = h[0, 1], h[0, 2]
+        drive[0, 6], drive[0, 7] = of.leans[0] + h[0, 1], of.leans[1] + h[0, 2]
         advance(state, wheels, drive, rows[k // STEPS], step, lanes)
     return out

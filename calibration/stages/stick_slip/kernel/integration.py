@@ -1,14 +1,16 @@
 """Integration of a rigid base that sticks and slips on its wheels, in the floor's plane.
 
-    M(t) dv/dt + sum_i A_i' g_i + B v = w(t),     dx/dt = v,     x = (x, y, yaw),   A_i = [1 0 -y_i; 0 1 x_i]
-    g_i = K_i e_i + C_i de_i/dt + N_i (-ry, rx),    m_i du_i/dt = g_i - f_i,   |f_i| <= mu_i N_i
-    e_i = A_i x - s_i,    ds_i/dt = u_i, 0 where it sticks          s_i, u_i how far and how fast wheel i has slid
-    N_i = n_i + G_i (-Fz, My, -Mx)                                  shares of the load about the wheels
+    M(t) dv/dt + sum_i A_i' g_i + B v = w(t),     dx/dt = R(yaw) v,     x = (x, y, yaw)
+    g_i = K_i e_i + C_i de_i/dt + (N_i - m_i G) (-ry, rx),    m_i du_i/dt = g_i - f_i,   |f_i| <= mu_i N_i
+    de_i/dt = A_i v - u_i,    A_i = [1 0 -(y_i - e_iy); 0 1 x_i - e_ix]       u_i how fast wheel i slides, 0: it sticks
+    N_i = n_i + G_i (-Fz, My, -Mx)                                            shares of the load about the wheels
 
-f_i is wheel i's action on the floor and g_i the base's on the wheel [N, frame 0]; M is of the robot without wheels. The
-bushings turn with the tilt (rx, ry), which brings a share of N_i into the floor's plane. A wheel whose force would
-exceed mu_i N_i slides: the force is cut to that length, and u_i is what that leaves, implicit in time. The rest is
-explicit, velocity first (symplectic Euler).
+Velocities, forces and deflections are in the axes of the base, which turn with yaw, x is in frame 0. f_i is wheel i's
+action on the floor and g_i the base's on the wheel [N]; M is of the robot without wheels. The bushings lean with the
+base, by (rx, ry) from the vertical, which brings a share of what they carry into the floor's plane: N_i less the weight
+m_i G of the wheel. At rest no wheel pushes the floor sideways. A wheel whose force would exceed mu_i N_i slides: the
+force is cut to that length, and u_i is what that leaves, implicit in time. The rest is explicit, velocity first
+(symplectic Euler): a step's position is that of the time of its load.
 
 A wheel bears where it touches the floor, e_i behind its place under the base, by the forces of the step before:
 
@@ -48,7 +50,7 @@ from calibration.stages.stick_slip.kernel.bases import (
 )
 from calibration.stages.stick_slip.kernel.corrector import cofactors, corrector
 from calibration.stages.stick_slip.kernel.lifted import lifted
-from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels, on_wheels, yielding
+from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels, on_wheels, stood, yielding
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,12 +93,13 @@ def _changed(s: np.ndarray, n: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int) -> None:
-    """The correction of the next step, by P and the plate's force."""
+    """The correction of the next step, by P and the plate's force, turned into the base's axes about its origin."""
     for l in range(n):
-        gain = s[(BODY + 2) * LANES + l] * h
-        r0 = gain * (fx - s[F * LANES + l])
-        r1 = gain * (fy - s[(F + 1) * LANES + l])
-        r2 = gain * (mz - s[(F + 2) * LANES + l])
+        gain, yaw = s[(BODY + 2) * LANES + l] * h, s[(X + 2) * LANES + l]
+        c, across = 1.0 - 0.5 * yaw * yaw, s[X * LANES + l] * fy - s[(X + 1) * LANES + l] * fx
+        r0 = gain * (c * fx + yaw * fy - s[F * LANES + l])
+        r1 = gain * (c * fy - yaw * fx - s[(F + 1) * LANES + l])
+        r2 = gain * (mz - across - s[(F + 2) * LANES + l])
         p0, p1, p2 = s[P * LANES + l], s[(P + 1) * LANES + l], s[(P + 2) * LANES + l]
         p3, p4, p5 = s[(P + 3) * LANES + l], s[(P + 4) * LANES + l], s[(P + 5) * LANES + l]
         s[DX * LANES + l] = p0 * r0 + p1 * r1 + p2 * r2
@@ -117,9 +120,13 @@ def _ended(s: np.ndarray, u: np.ndarray, M: np.ndarray, h: float, n: int) -> Non
         a1 = (c01 * b0 + c11 * b1 + c12 * b2) * i
         a2 = (c02 * b0 + c12 * b1 + c22 * b2) * i
         s[ACCELERATION * LANES + l], s[(ACCELERATION + 1) * LANES + l], s[(ACCELERATION + 2) * LANES + l] = a0, a1, a2
-        s[X * LANES + l] += s[D * LANES + l]
-        s[(X + 1) * LANES + l] += s[(D + 1) * LANES + l]
-        s[(X + 2) * LANES + l] += s[(D + 2) * LANES + l]
+        dx, dy, turn = s[D * LANES + l], s[(D + 1) * LANES + l], s[(D + 2) * LANES + l]
+        yaw = s[(X + 2) * LANES + l] + 0.5 * turn
+        q = yaw * yaw
+        c, sine = 1.0 - 0.5 * q * (1.0 - q / 12.0), yaw * (1.0 - q / 6.0)
+        s[X * LANES + l] += c * dx - sine * dy
+        s[(X + 1) * LANES + l] += c * dy + sine * dx
+        s[(X + 2) * LANES + l] += turn
         s[V * LANES + l] += h * a0
         s[(V + 1) * LANES + l] += h * a1
         s[(V + 2) * LANES + l] += h * a2
@@ -209,6 +216,7 @@ def _simulated(  # noqa: PLR0913
         lanes = bases.lanes[g]
         state, wheels = bases.state[g].copy().reshape(-1), bases.wheels[g].copy().reshape(-1)
         yielding(wheels, h, lanes)
+        stood(wheels, drive[a * steps], lanes)
         own = moving_wheels(wheels)
         for t in range(a, b):
             _advance(state, wheels, own, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)

@@ -1,6 +1,6 @@
 """Forces of wheels side by side: as if all stuck, then those are let slide whose friction does not bear them.
 
-    g = K e + C de/dt + N (-ry, rx),   f' = g + m / h u,   f = f' min(mu N / |f'|, 1)
+    g = K e + C de/dt + (N - m G) (-ry, rx),   f' = g + m / h u,   f = f' min(mu N / |f'|, 1)
     u <- (f' - f) / (K h + C + m / h),    e <- e - h u,    W <- W + A' m / h (u - u_before)
 
 of one wheel, see `integration`: f' bears what a wheel that slid loses when it stops; K in the denominator is what the
@@ -30,6 +30,7 @@ from calibration.stages.stick_slip.kernel.bases import (
 )
 
 _NONE = 1e-30  # [N2]
+_G = 9.80665  # [m/s2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -45,10 +46,11 @@ def on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float,
             N = max(load, 0.0)
             turn, spin = s[(D + 2) * LANES + l], s[(V + 2) * LANES + l]
             mass, ux, uy = w[MASS * LANES + l] * rate, w[U * LANES + l], w[(U + 1) * LANES + l]
-            ex = w[E * LANES + l] + s[D * LANES + l] - turn * py
-            ey = w[(E + 1) * LANES + l] + s[(D + 1) * LANES + l] + turn * px
-            fx = w[2 * LANES + l] * ex + c * (s[V * LANES + l] - spin * py) - N * ry + mass * ux
-            fy = w[3 * LANES + l] * ey + c * (s[(V + 1) * LANES + l] + spin * px) + N * rx + mass * uy
+            qx, qy, hangs = px - w[E * LANES + l], py - w[(E + 1) * LANES + l], N - _G * w[MASS * LANES + l]
+            ex = w[E * LANES + l] + s[D * LANES + l] - turn * qy
+            ey = w[(E + 1) * LANES + l] + s[(D + 1) * LANES + l] + turn * qx
+            fx = w[2 * LANES + l] * ex + c * (s[V * LANES + l] - spin * qy) - hangs * ry + mass * ux
+            fy = w[3 * LANES + l] * ey + c * (s[(V + 1) * LANES + l] + spin * qx) + hangs * rx + mass * uy
             w[E * LANES + l], w[(E + 1) * LANES + l] = ex, ey
             s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l], s[(STUCK + 2) * LANES + l] = fx, fy, N
             s[LEANS * LANES + l] += N * ex
@@ -56,7 +58,7 @@ def on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float,
             s[PULL * LANES + l] += min(load, 0.0)
             s[F * LANES + l] += fx
             s[(F + 1) * LANES + l] += fy
-            s[(F + 2) * LANES + l] += px * fy - py * fx
+            s[(F + 2) * LANES + l] += (px - ex) * fy - (py - ey) * fx
             s[BITS * LANES + l] += bit
             limit = w[5 * LANES + l] * N
             slide += 1 if (fx * fx + fy * fy > limit * limit) | (ux != 0.0) | (uy != 0.0) else 0
@@ -68,7 +70,7 @@ def on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float,
 def _sliding(w: np.ndarray, s: np.ndarray, bit: float, h: float, n: int) -> None:
     """Let a wheel slide in those of n lanes in which it bears more than friction: as it was left, it sticks."""
     for l in range(n):
-        px, py, N = w[l], w[LANES + l], s[(STUCK + 2) * LANES + l]
+        px, py, N = w[l] - w[E * LANES + l], w[LANES + l] - w[(E + 1) * LANES + l], s[(STUCK + 2) * LANES + l]
         fx, fy = s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l]
         cut = min(w[5 * LANES + l] * N / np.sqrt(fx * fx + fy * fy + _NONE), 1.0)
         fx, fy = fx * (1.0 - cut), fy * (1.0 - cut)
@@ -88,6 +90,18 @@ def _sliding(w: np.ndarray, s: np.ndarray, bit: float, h: float, n: int) -> None
         s[(F + 2) * LANES + l] -= px * fy - py * fx
         s[SLID * LANES + l] += 1.0 if cut < 1.0 else 0.0
         s[BITS * LANES + l] -= bit if cut < 1.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def stood(wheels: np.ndarray, u: np.ndarray, n: int) -> None:
+    """Deflect flat wheels of n lanes so that none pushes the floor sideways under the drive u (11,) at rest."""
+    for i in range(len(wheels) // (WHEEL * LANES)):
+        w = wheels[i * WHEEL * LANES : (i + 1) * WHEEL * LANES]
+        for l in range(n):
+            load = w[6 * LANES + l] + w[7 * LANES + l] * u[3] + w[8 * LANES + l] * u[4] + w[9 * LANES + l] * u[5]
+            hangs = max(load, 0.0) - _G * w[MASS * LANES + l]
+            w[E * LANES + l] += hangs * u[7] / w[2 * LANES + l]
+            w[(E + 1) * LANES + l] -= hangs * u[6] / w[3 * LANES + l]
 
 
 @njit(cache=True, error_model="numpy")

@@ -42,34 +42,44 @@ def about(x: np.ndarray, load: np.ndarray) -> np.ndarray:
     return np.array([load[0], c * first + s * second, c * second - s * first])
 
 
+def across(q: np.ndarray) -> np.ndarray:
+    """A (2, 3) of a place q (2,): its velocity by that of the base."""
+    return np.array([[1.0, 0.0, -q[1]], [0.0, 1.0, q[0]]])
+
+
+def leaning(rx: float, ry: float) -> np.ndarray:
+    """What a force of 1 N upwards is in the floor's plane of a base that leans."""
+    return np.array([-ry, rx])
+
+
 def literal(
     w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.ndarray | None = None, plate: bool = False
 ) -> Motion:
     """The equations of `integration` by its docstring, under w (n, 3); a plate reads the load, corrects nothing."""
-    rows = WHEELS.rows(p)
-    at = [np.array([[1.0, 0.0, -py], [0.0, 1.0, px]]) for px, py in WHEELS.position]
-    M = MASS - sum(m * A.T @ A for m, A in zip(WHEELS.mass, at, strict=True))
-    x, v, more, e, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((len(rows), 2)), np.zeros((len(rows), 2))
-    out = []
+    rows, tilt = WHEELS.rows(p), np.zeros((len(w), 2)) if tilt is None else tilt
+    M = MASS - sum(m * across(q).T @ across(q) for m, q in zip(WHEELS.mass, WHEELS.position, strict=True))
+    x, v, more, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
+    e, out = -(rows[:, 6] + rows[:, 7:10] @ WEIGHT - WHEELS.weight)[:, None] * leaning(*tilt[0]) / rows[:, 2:4], []
     for k, force in enumerate(w):
         load, more = (about(x, WEIGHT) if plate else WEIGHT) + more, np.zeros(3)
         assert np.all(rows[:, 6] + rows[:, 7:10] @ load > 0.0)
         floor, on_base = np.array([p.body_c, p.body_c, p.body_cr]) * v, np.zeros(3)
-        rx, ry = (0.0, 0.0) if tilt is None else tilt[k]
         slides = np.zeros(len(rows), dtype=bool)
         for i, (kx, ky, c, mu, n, *G, m) in enumerate(rows[:, 2:]):
-            N, K, q = n + np.dot(G, load), np.array([kx, ky]), np.array([-ry, rx])
-            f = K * (e[i] + at[i] @ v * h) + c * (at[i] @ v) + N * q + m / h * u[i]
-            faster = np.zeros(2)
+            N, K, speed, faster = n + np.dot(G, load), np.array([kx, ky]), across(rows[i, :2] - e[i]) @ v, np.zeros(2)
+            stuck = e[i] + speed * h
+            f = K * stuck + c * speed + (N - WHEELS.weight[i]) * leaning(*tilt[k]) + m / h * u[i]
+            at = across(rows[i, :2] - stuck)
             if np.linalg.norm(f) > mu * N:
                 left = f * (1.0 - mu * N / np.linalg.norm(f))
                 f, slides[i], faster = f - left, True, left / (m / h + c + K * h)
             g = f + m * (faster - u[i]) / h
-            e[i] += (at[i] @ v - faster) * h
+            e[i] = stuck - faster * h
             u[i] = faster
             more[1:] += N * e[i]
-            floor, on_base = floor + at[i].T @ f, on_base + at[i].T @ (g - f)
-        x = x + h * v
+            floor, on_base = floor + at.T @ f, on_base + at.T @ (g - f)
+        yaw = x[2] + 0.5 * h * v[2]
+        x = x + h * np.array([np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1], v[2]])
         out.append((x, v, floor, e.copy(), slides))
         v = v + h * np.linalg.solve(M, force - floor - on_base)
     return Motion(*(np.array(column) for column in zip(*out, strict=True)))

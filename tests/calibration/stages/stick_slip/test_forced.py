@@ -1,23 +1,26 @@
-"""What drives the base in use: links and heave where inverse dynamics move it, nothing else by a plate."""
+"""What drives the base in use: links on a base that moves, and heave by a base that slips, or by a plate."""
 
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from scipy.interpolate import CubicSpline
 
 import mjcf
-from calibration.numerics.signals import Signal
+from calibration.numerics.signals import Signal, even, low_passed
 from calibration.recording.clock import Clock
 from calibration.stages.drive_trains import DriveTrain, DriveTrains
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import wrenches_of
 from calibration.stages.stick_slip.band import Band
-from calibration.stages.stick_slip.forcing import Tilting, planar_forcing, readings_of
+from calibration.stages.stick_slip.forcing import CUTOFF, Tilting, planar_forcing, readings_of
 from calibration.stages.stick_slip.model import Direction, StickSlip
-from calibration.stages.stick_slip.poses import Links, forced
+from calibration.stages.stick_slip.poses import Links, forced, planar_twist
 from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
+from calibration.stages.suspension.floor_wrench import motion_load, root_in_base
 from tests.calibration.stages.stick_slip.slipping import TRUTH
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import T_LAB_BASE, WHEELS
@@ -53,10 +56,39 @@ def links(trial, half_gap):
     return Links(SOURCES.lab, of, readings_of(SOURCES.lab, ROBOT, trial), T_LAB_BASE)
 
 
-def test_a_plate_moves_the_base_whatever_the_links_do(trial):
+def test_a_plate_says_what_wheels_bear_whatever_the_links_do(trial):
+    """Links say what accelerates the base in between."""
     wrenches, of = wrenches_of(SOURCES, trial, T_LAB_BASE), model()
-    one, other = (forced(of, wrenches, "plate", behind) for behind in (links(trial, 3e-3), None))
-    np.testing.assert_array_equal(one.drive, other.drive)
+    one, other = (forced(of, wrenches, "plate", behind).drive for behind in (links(trial, 3e-3), None))
+    np.testing.assert_array_equal(one[:, 3:], other[:, 3:])
+    assert np.abs(one[:, 2] - other[:, 2]).max() > 0.1 * np.abs(other[:, 2]).max()
+
+
+def test_a_base_that_turns_feels_what_the_arm_does_by_turning(trial):
+    t, q, lab = trial.t_robot, trial.q_motor, SOURCES.lab
+    twist = np.array([0.03, -0.02, 0.0, 0.0, 0.0, 0.4])
+    still = motion_load(lab, t, q, T_LAB_BASE, CUTOFF).signal
+    turning = motion_load(lab, t, q, T_LAB_BASE, CUTOFF, twist=np.tile(twist, (len(t), 1))).signal
+    model, T_0_root = lab.floating, root_in_base(lab.floating, DESCRIPTION)
+    data, columns = model.createData(), [model.idx_vs[model.getJointId(n)] for n in DESCRIPTION.joint_names]
+    smooth = low_passed(even(t, q), CUTOFF)
+    along = CubicSpline(smooth.t, smooth.x)
+    for k in range(100, 400, 60):
+        move, v, a = np.zeros((3, model.nv))
+        move[columns], v[columns], a[columns] = (along(turning.t[k], d) for d in range(3))
+        v[:6] = T_0_root.inverse().action @ twist
+        root = pin.rnea(model, data, pin.integrate(model, pin.neutral(model), move), v, a)[:6]
+        np.testing.assert_allclose(turning.x[k], -T_0_root.dualAction @ root, atol=1e-6)
+    assert np.abs(turning.x - still.x).max(axis=0)[[0, 1, 5]].min() > 0.3
+
+
+def test_a_twist_is_that_of_the_base_in_its_own_axes():
+    t, rate = np.arange(300) / 100.0, 0.3
+    T = np.tile(T_LAB_BASE, (len(t), 1, 1))
+    T[:, :3, :3] = [T_LAB_BASE[:3, :3] @ pin.exp3(np.array([0.0, 0.0, rate * s])) for s in t]
+    T[:, :3, 3] += T[:, :3, :3] @ [1.0, 0.0, 0.0]  # 1 m before the axis it turns about
+    found = planar_twist(t, T, T_LAB_BASE, t)[50:250]
+    np.testing.assert_allclose(found, np.tile([0.0, rate, 0.0, 0.0, 0.0, rate], (200, 1)), atol=2e-3 * rate)
 
 
 def test_a_base_that_slides_away_from_the_plates_centre_tilts(trial):

@@ -24,6 +24,7 @@ M[:3, 3:] = M[3:, :3].T
 TANGENT = K + np.diag([0.0, -730.0 * HIGH, -730.0 * HIGH])
 BARE = replace(WHEELS, weight=np.zeros(6))  # wheels without mass
 TIMES = np.arange(600) * STEP
+LEVEL = np.zeros(2)
 
 
 def swung(size):
@@ -47,7 +48,7 @@ def found(p, w, springs, on=BARE):
 
 def springs():
     rest = WEIGHT[[0, 2, 1]] * [-1.0, -1.0, 1.0]
-    return Springs(K, 0.01 * K, TANGENT, rest, BARE.standing(np.array([TRUTH.drive_load, TRUTH.back_load])))
+    return Springs(K, 0.01 * K, TANGENT, rest, BARE.standing(np.array([TRUTH.drive_load, TRUTH.back_load])), LEVEL)
 
 
 def solved(M, C, K, w):

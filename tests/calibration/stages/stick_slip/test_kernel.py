@@ -27,7 +27,7 @@ def test_the_kernel_is_the_equations_of_its_docstring():
     true, one = slipping.literal(w, tilt=tilt), slipping.forcing(w)
     one.drive[:, 6:8] = tilt
     x, share = run(one)
-    np.testing.assert_allclose(x, true.x[STEPS - 1 :: STEPS], atol=1e-12)
+    np.testing.assert_allclose(x, true.x[STEPS - 1 :: STEPS], atol=2e-9)  # sine and cosine are series
     np.testing.assert_allclose(share, true.slides.reshape(-1, STEPS * 6).mean(axis=1))
     assert 0.01 < share.mean() < 0.9
 
@@ -74,7 +74,7 @@ def test_a_wheel_bears_where_it_touches_the_floor():
 
 
 def test_wheels_that_stick_answer_a_steady_force_by_their_stiffness():
-    force = np.array([5.0, -8.0, 3.0])
+    force = 1e-3 * np.array([5.0, -8.0, 3.0])  # so little that where wheels touch the floor stays
     w = np.repeat(force[None], round(6.0 / STEP), axis=0)
     x, share = run(slipping.forcing(w), STUCK)
     np.testing.assert_allclose(x[-1], np.linalg.solve(WHEELS.stiffness(TRUTH), force), rtol=1e-6)
@@ -99,15 +99,16 @@ def test_wheels_that_slide_leave_a_constant_friction():
 
 def test_a_sprung_base_keeps_its_energy_without_dampers():
     p = replace(STUCK, drive_c=1e-9, caster_c=1e-9, body_c=1e-9, body_cr=1e-9)
-    ((state,), (wheels,), (lanes,)), K = bases_of(WHEELS, p.logarithms[None], False), WHEELS.stiffness(p)
+    ((state,), (wheels,), (lanes,)), rows = bases_of(WHEELS, p.logarithms[None], False), WHEELS.rows(p)
     state[3:6] = np.array([[0.05], [-0.03], [0.2]])
-    A = np.array([[[1.0, 0.0, -y], [0.0, 1.0, x]] for x, y in POSITION])
+    A = np.array([slipping.across(q) for q in POSITION])
     M = MASS - np.einsum("i,iab,iac->bc", WHEELS.mass, A, A)  # wheels that stick do not move
     one, energy = slipping.forcing(np.zeros((2000, 3))), []
     for k in range(1000):
         advance(state, wheels, one.drive[2 * k : 2 * k + 2], one.inertia[k], STEP, lanes)
-        x, v = state[:3, 0] + 0.5 * STEP * state[3:6, 0], state[3:6, 0]  # half a step on, where both are of one time
-        energy.append(0.5 * v @ M @ v + 0.5 * x @ K @ x)
+        v, e = state[3:6, 0], wheels[:, E : E + 2, 0]
+        e = e + 0.5 * STEP * np.array([slipping.across(q) @ v for q in POSITION - e])  # half a step on, as v is
+        energy.append(0.5 * v @ M @ v + 0.5 * (rows[:, 2:4] * e**2).sum())
     np.testing.assert_allclose(energy, energy[0], rtol=0.05)
     assert abs(np.mean(energy[-100:]) / np.mean(energy[:100]) - 1.0) < 0.005
 

@@ -189,9 +189,9 @@ def test_what_is_missing_is_named(recorded, suspension):
 
 
 def test_trials_that_contradict_the_wheels_are_named(recorded, suspension):
-    """Forces along the floor and the moment about the vertical have the wrong sign: they correct nothing."""
-    signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, -1.0])
-    trials = [replace(r[0], plate_wrench=signs * r[0].plate_wrench) for r in recorded]
+    """Forces along the floor and the moment about the vertical have the wrong sign and size: they correct nothing."""
+    gains = np.array([-2.0, -2.0, 1.0, 1.0, 1.0, -2.0])
+    trials = [replace(r[0], plate_wrench=gains * r[0].plate_wrench) for r in recorded]
     model, said = fit(trials, suspension)
     assert [d.source for d in model.directions] == ["plate", "dynamics"]
     assert said[0].verdict == "warning" and "plate's axes" in said[0].message
