@@ -27,7 +27,7 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.stick_slip.forcing import PlanarForcing, Readings, Tilting, planar_forcing, wrenches_along
 from calibration.stages.stick_slip.likelihood import joined
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, blocks
-from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, WheelSet, wheel_set
+from calibration.stages.stick_slip.wheels import LOGARITHMS, NAMES, PRIOR, PRIOR_SIGMA, WheelSet, wheel_set
 
 SECONDS, RAMP = 10.0, 0.12
 _CANDIDATES = 400  # a tenth of them shows less than the campaign's swings, by the draw
@@ -141,7 +141,7 @@ def base_motions(urdf: str, description: Description, n: int, rng: np.random.Gen
     chosen, total = chosen_in_turn(H, n)
     sigma = np.sqrt(np.mean([np.diag(np.linalg.inv(each)) for each in total], axis=0))
     picked = tuple(BaseMotion(*motions[k], shown[k][1]) for k in chosen)
-    return BasePlan(tuple(description.joint_names), picked, NAMES, sigma)
+    return BasePlan(tuple(description.joint_names), picked, NAMES[:LOGARITHMS], sigma[:LOGARITHMS])
 
 
 def chosen_in_turn(H: np.ndarray, n: int) -> tuple[list[int], np.ndarray]:

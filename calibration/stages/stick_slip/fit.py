@@ -35,9 +35,9 @@ class Fitted:
     """Parameters by one source of the wrench.
 
     Attributes:
-        logarithms: (13,) see `wheels.NAMES`.
-        covariance: (13, 13).
-        others: (k, 13) without each of the trials.
+        logarithms: (15,) see `wheels.NAMES`.
+        covariance: (15, 15).
+        others: (k, 15) without each of the trials.
         cost: -2 log of the posterior.
         starts: Costs to which the starts of the search came.
     """
@@ -55,7 +55,7 @@ class Fitted:
 
 
 def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
-    """The parameters that predict the trials best; from a known start (13,), where there is one, without a search."""
+    """The parameters that predict the trials best; from a known start (15,), where there is one, without a search."""
     best, starts = searched(trials) if start is None else (warmed(trials, start), ())
     best, (H_k, g_k) = settled(trials, best)
     prior = trials.prior.information
@@ -76,7 +76,7 @@ def _scatter(H_k: np.ndarray, g_k: np.ndarray, prior: np.ndarray) -> float:
 
 
 def _one_sided(trials: Trials, best: Point) -> np.ndarray:
-    """Standard deviations (13,) by the side on which a friction goes farther alone; 0 of all but frictions."""
+    """Standard deviations (15,) by the side on which a friction goes farther alone; 0 of all but frictions."""
     sigma, directions = np.zeros(len(best.logarithms)), np.eye(len(best.logarithms))[list(FRICTIONS)]
     steps = np.concatenate([-_REACH[1:], _REACH[1:]])
     points = tried(trials, best.logarithms + np.concatenate([np.outer(steps, axis) for axis in directions]))
@@ -93,7 +93,7 @@ def _without(H: np.ndarray, H_k: np.ndarray, g_k: np.ndarray, longest: np.ndarra
 
 
 def _others(trials: Trials, best: Point, steps: np.ndarray) -> np.ndarray:
-    """Parameters (k, 13) without each trial: as much of its step (k, 13) as the other trials bear best."""
+    """Parameters (k, 15) without each trial: as much of its step (k, 15) as the other trials bear best."""
     at = best.logarithms + np.multiply.outer([0.0, *_PARTS], steps)
     costs = np.empty(at.shape[:2])
     costs[0] = best.cost - trials.costs(best.errors)
@@ -146,7 +146,7 @@ def _preloaded(trials: Trials, p: SlipParameters, x: np.ndarray) -> np.ndarray:
 
 
 def left_out(trials: Trials, others: np.ndarray) -> np.ndarray:
-    """Positions (n, 3) of each trial by the parameters (k, 13) of the others."""
+    """Positions (n, 3) of each trial by the parameters (k, 15) of the others."""
     return np.concatenate([trials.alone(k).simulated(own[None])[0][0] for k, own in enumerate(others)])
 
 

@@ -21,7 +21,7 @@ from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, pl
 from calibration.stages.stick_slip.kernel.bases import Bases, at_rest
 from calibration.stages.stick_slip.kernel.integration import simulated
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, pooled_noise
-from calibration.stages.stick_slip.wheels import NAMES, WIDE, Prior, WheelSet
+from calibration.stages.stick_slip.wheels import NAMES, WIDE, Prior, WheelSet, values_of
 from calibration.stages.suspension.model import Source
 
 CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel.corrector`
@@ -189,7 +189,7 @@ def _by_window(e: np.ndarray, index: np.ndarray, counts: np.ndarray) -> np.ndarr
 
 
 def bodies(values: np.ndarray, corrected: bool) -> np.ndarray:
-    """(k, 4) as the kernel takes them, by parameters (k, 13) in the order of NAMES."""
+    """(k, 4) as the kernel takes them, by parameters (k, 15) in the order of NAMES."""
     found = np.empty((len(values), 4))
     found[:, :2] = values[:, [NAMES.index("body_c"), NAMES.index("body_cr")]]
     found[:, 2:] = CORRECTION[0] if corrected else 0.0, CORRECTION[1]
@@ -204,7 +204,7 @@ def bases_of(
     places: np.ndarray | None = None,
 ) -> Bases:
     """Bases of parameters (k, p), preloaded by deflections (k, m, 2), on wheels at other places (k, m, 2)."""
-    values = np.exp(logarithms)
+    values = values_of(logarithms)
     return at_rest(wheels.each(values, places), bodies(values, corrected), preload)
 
 

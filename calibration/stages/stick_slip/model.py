@@ -40,9 +40,9 @@ class Direction:
 
     Attributes:
         source: Of the wrench.
-        logarithms: (13,) of the parameters, see `wheels.NAMES`.
-        covariance: (13, 13).
-        ensemble: (e, 13) draws of the posterior, the optimum first.
+        logarithms: (15,) of the parameters, see `wheels.NAMES`.
+        covariance: (15, 15).
+        ensemble: (e, 15) draws of the posterior, the optimum first.
         band: Of the prediction.
         held_out: Trials left out, (k, 3) for x, y, yaw.
         linear: (3,) axes that the compliance predicts better.

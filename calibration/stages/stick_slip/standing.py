@@ -58,9 +58,9 @@ def tilting_of(
     sources: WrenchSources, read: Sequence[Read], wheels: WheelSet, suspension: Suspension
 ) -> tuple[Tilting, Prior]:
     """Heave and tilt by calibration trials, and the prior of how wheels share the load, by the tilt where it shows."""
-    off = plate_place(sources, read)
+    off, place = plate_place(sources, read)
     tilts = any(suspension.moves(source)[[*HEAVE[1:]]].all() for source in SOURCES)
-    prior = _prior(wheels, suspension.K) if tilts else WIDE
+    prior = _prior(wheels, suspension.K, place) if tilts else WIDE
     tilting = Tilting(suspension.K, suspension.C, off, prior.shares)
     loads = [(one, sources.plate_load(one.trial, one.rest.T_lab_0)) for one in read if one.wrenches.plate is not None]
     for _ in range(_ROUNDS if tilts else 0):
@@ -69,15 +69,15 @@ def tilting_of(
         if found is None:
             break
         change = np.abs(np.diag(found[0]) / np.diag(tilting.K) - 1.0)[[*HEAVE[1:]]].max()
-        prior = _prior(wheels, found[0])
+        prior = _prior(wheels, found[0], place)
         tilting = Tilting(*found, off, prior.shares)
         if change < _SAME:
             break
     return tilting, prior
 
 
-def _prior(wheels: WheelSet, K: np.ndarray) -> Prior:
-    return prior_by_tilt(wheels, K[np.ix_(HEAVE, HEAVE)])
+def _prior(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
+    return prior_by_tilt(wheels, K[np.ix_(HEAVE, HEAVE)], place)
 
 
 def _lifted(standing: np.ndarray, load: Load) -> float:
@@ -112,8 +112,8 @@ def _lifting_compliance(
     return K, C
 
 
-def plate_place(sources: WrenchSources, read: Sequence[Read]) -> np.ndarray:
-    """How far (2,) [m] the plate seems from its declared place under the base, 0 without joint readings.
+def plate_place(sources: WrenchSources, read: Sequence[Read]) -> tuple[np.ndarray, np.ndarray]:
+    """How far (2,) [m] the plate seems from its declared place under the base, and sigma (2,); 0 without readings.
 
     Args:
         sources: The nominal robot and the clock of its readings.
@@ -124,14 +124,15 @@ def plate_place(sources: WrenchSources, read: Sequence[Read]) -> np.ndarray:
         own = lab.of_trial(one.trial.id)
         rows += [(*weighed(own, q, v), v - u) for q, v, u in _seconds(sources, one.trial, one.wrenches)]
     if not rows:
-        return np.zeros(2)
+        return np.zeros(2), np.full(2, lab.description.tolerances.body_translation)
     A, b = (np.concatenate(column) for column in ([np.hstack(row[:2]) for row in rows], [row[2] for row in rows]))
     weight = np.mean([row[1][1, 0] for row in rows])
     noise = np.tile([_FORCE, _LEVER * weight, _LEVER * weight], len(rows))
     sigma = _tolerances(lab.floating.njoints - 1, lab.description.tolerances)
     A = A * sigma / noise[:, None]
-    found = sigma * np.linalg.solve(A.T @ A + np.eye(len(sigma)), A.T @ (b / noise))
-    return np.asarray(found[-2:])
+    covariance = np.linalg.inv(A.T @ A + np.eye(len(sigma)))
+    found, left = sigma * (covariance @ A.T @ (b / noise)), sigma * np.sqrt(np.diag(covariance))
+    return found[-2:], left[-2:]
 
 
 def weighed(lab: Laboratory, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.kernel.wheel_forces import stood
 from calibration.stages.stick_slip.likelihood import bodies
 from calibration.stages.stick_slip.model import Direction, StickSlip
-from calibration.stages.stick_slip.wheels import PRELOADS, WheelSet, preloads
+from calibration.stages.stick_slip.wheels import PRELOADS, WheelSet, preloads, values_of
 
 UNDRIVEN = np.array([0.0] * 3 + [UNMOVED, 0.0, 0.0, UNMOVED, 0.0, UNMOVED])
 _NO_REST = np.zeros(8)
@@ -157,7 +157,7 @@ def slip_stream(model: StickSlip) -> SlipStream:
     """
     found = model.direction("plate")
     optimum = found.parameters
-    values = np.array([*np.exp(found.ensemble), *[optimum.values] * PRELOADS])
+    values = np.array([*values_of(found.ensemble), *[optimum.values] * PRELOADS])
     wheels, own = model.wheels.each(values), bodies(values, found.corrected)
     compliance = np.linalg.inv(model.wheels.stiffness(optimum))
     linear, off = np.asarray(found.linear, dtype=bool), model.tilting.off

@@ -1,7 +1,7 @@
 """Wheels of the stick-slip base: stiffness, damping, friction and share of the vertical load, tied by type.
 
     k = (kx, ky) of a drive, (k, k) of a front or back caster       c of drives, of casters      mu of the three types
-    N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i, y_i) = (-Fz, My, -Mx)        k_i 1 of a front caster
+    N_i = n_i + k_i (a + b x_i + c y_i),   sum_i N_i (1, x_i - l_x, y_i - l_y) = (-Fz, My, -Mx)   k_i 1 of front casters
 
 The base's weight is shared as by vertical springs under a rigid base. A wheel carries n_i of its own weight m_i g, of
 the nominal robot: it stands on a tyre in series with its spring, n_i = m_i g (1 - k / k_tyre), k of both; the rest goes
@@ -23,10 +23,12 @@ from calibration.recording.schema import Wheel
 NAMES = (
     "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
     "drive_c", "caster_c", "body_c", "body_cr", "drive_load",
-    "back_load",
+    "back_load", "load_x", "load_y",
 )  # fmt: skip
-PRIOR = np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0])
-PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5])
+LOGARITHMS = NAMES.index("load_x")  # of the coordinates; the others are places
+LENGTH = 0.01  # [m] that counts as 1 beside logarithms
+PRIOR = np.append(np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0]), [0.0, 0.0])
+PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5, 0.2, 0.2])
 DRIVES = 0.1  # of the logarithm of the drives' friction: a drive slides for hundredths of a second, seldom
 _OWN = 0.8  # 1 - k / k_tyre
 PRELOADS = 8  # ways in which a base may stand before a trial
@@ -42,18 +44,18 @@ _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal 
 
 @dataclass(frozen=True)
 class Prior:
-    """Normal one of the logarithms: mean and sigma (13,)."""
+    """Normal one of the coordinates: mean and sigma (15,)."""
 
     mean: np.ndarray
     sigma: np.ndarray
 
-    def cost(self, logarithms: np.ndarray) -> float:
+    def cost(self, at: np.ndarray) -> float:
         """-2 log of it."""
-        return float((((logarithms - self.mean) / self.sigma) ** 2).sum())
+        return float((((at - self.mean) / self.sigma) ** 2).sum())
 
-    def bounded(self, logarithms: np.ndarray) -> np.ndarray:
-        """Logarithms (..., 13) within three sigmas."""
-        return np.clip(logarithms, self.mean - 3.0 * self.sigma, self.mean + 3.0 * self.sigma)
+    def bounded(self, at: np.ndarray) -> np.ndarray:
+        """Coordinates (..., 15) within three sigmas."""
+        return np.clip(at, self.mean - 3.0 * self.sigma, self.mean + 3.0 * self.sigma)
 
     @property
     def shares(self) -> np.ndarray:
@@ -62,7 +64,7 @@ class Prior:
 
     @cached_property
     def information(self) -> np.ndarray:
-        """(13, 13)."""
+        """(15, 15)."""
         return np.diag(self.sigma**-2.0)
 
 
@@ -71,7 +73,7 @@ WIDE = Prior(PRIOR, PRIOR_SIGMA)
 
 @dataclass(frozen=True)
 class SlipParameters:
-    """Parameters by wheel type, all positive.
+    """Parameters by wheel type, all positive, and where the load is.
 
     Attributes:
         drive_kx: Stiffness along x of a drive wheel [N/m].
@@ -87,6 +89,8 @@ class SlipParameters:
         body_cr: The same about the vertical [N.m.s/rad].
         drive_load: Share of the base's weight on a drive wheel, over what a front caster in its place would bear [-].
         back_load: The same of a back caster [-].
+        load_x: How far ahead of where it is counted the load is [m].
+        load_y: How far to the left.
     """
 
     drive_kx: float
@@ -102,21 +106,31 @@ class SlipParameters:
     body_cr: float
     drive_load: float
     back_load: float
+    load_x: float = 0.0
+    load_y: float = 0.0
 
     @classmethod
     def of(cls, logarithms: np.ndarray) -> "SlipParameters":
-        """From logarithms (13,) in the order of NAMES."""
-        return cls(*(float(v) for v in np.exp(logarithms)))
+        """From coordinates (15,), see `values_of`."""
+        return cls(*(float(v) for v in values_of(logarithms)))
 
     @property
     def values(self) -> np.ndarray:
-        """(13,) in the order of NAMES."""
+        """(15,) in the order of NAMES."""
         return np.array([getattr(self, name) for name in NAMES])
 
     @property
     def logarithms(self) -> np.ndarray:
-        """(13,) of the values."""
-        return np.log(self.values)
+        """(15,) the coordinates of the values."""
+        values = self.values
+        return np.append(np.log(values[:LOGARITHMS]), values[LOGARITHMS:] / LENGTH)
+
+
+def values_of(logarithms: np.ndarray) -> np.ndarray:
+    """Values (..., 15) in the order of NAMES by coordinates: logarithms, and places of the load in LENGTH."""
+    values = np.exp(logarithms)
+    values[..., LOGARITHMS:] = LENGTH * logarithms[..., LOGARITHMS:]
+    return np.asarray(values)
 
 
 @dataclass(frozen=True)
@@ -149,13 +163,14 @@ class WheelSet:
         return self.each(p.values[None])[0]
 
     def each(self, values: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
-        """Rows (k, m, 11) by parameters (k, 13) in the order of NAMES; the wheels at places (k, m, 2) if given."""
+        """Rows (k, m, 11) by parameters (k, 15) in the order of NAMES; the wheels at places (k, m, 2) if given."""
         of = dict(zip(NAMES, values.T, strict=True))
         kx, ky = (self._typed(of[drive], of["front_k"], of["back_k"]) for drive in ("drive_kx", "drive_ky"))
         c = self._typed(of["drive_c"], of["caster_c"], of["caster_c"])
         mu = self._typed(of["drive_mu"], of["front_mu"], of["back_mu"])
         position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
         n, G = self._loads(position, of["drive_load"], of["back_load"])
+        G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
         mass = np.broadcast_to(self.mass, n.shape)
         parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, mass[..., None])
         return np.concatenate([position, *parts], axis=2)
@@ -201,7 +216,7 @@ class WheelSet:
         return K
 
 
-def prior_by_tilt(wheels: WheelSet, K: np.ndarray) -> Prior:
+def prior_by_tilt(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
     """The wide prior, its shares of the load by the stiffness K (3, 3) of z, rx, ry [N/m, N, N.m/rad].
 
         K = sum_i k_i a_i a_i',   a_i = (1, y_i, -x_i)
@@ -209,6 +224,11 @@ def prior_by_tilt(wheels: WheelSet, K: np.ndarray) -> Prior:
     Wheels share the load as their vertical springs do. The logarithms of the three types' k are fitted to K_zz, K_rx,
     K_ry and K_z,ry each relative to sqrt(K_ii K_jj); ratios to front casters have the wide prior too, which decides
     where a type is missing.
+
+    Args:
+        wheels: Of the robot.
+        K: Stiffness.
+        place: (2,) sigma of where the load is [m].
     """
     a = np.column_stack([np.ones(len(wheels.position)), wheels.position[:, 1], -wheels.position[:, 0]])
     rows, columns = np.transpose(_ELEMENTS)
@@ -231,6 +251,7 @@ def prior_by_tilt(wheels: WheelSet, K: np.ndarray) -> Prior:
     covariance = ratios @ np.linalg.pinv(found.jac.T @ found.jac) @ ratios.T
     mean, sigma = PRIOR.copy(), PRIOR_SIGMA.copy()
     mean[_LOADS], sigma[_LOADS] = ratios @ found.x, np.sqrt(np.diag(covariance) + _MODEL**2)
+    sigma[LOGARITHMS:] = place / LENGTH
     return Prior(mean, sigma)
 
 

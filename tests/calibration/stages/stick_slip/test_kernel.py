@@ -164,7 +164,7 @@ def test_bases_side_by_side_do_not_know_of_each_other():
     rng = np.random.default_rng(5)
     w = slipping.push(rng, seconds=3.0)
     one, k = slipping.forcing(w, w), LANES + 3
-    p, e = TRUTH.logarithms + 0.2 * rng.normal(size=(k, 13)), 1e-4 * rng.normal(size=(k, 6, 2))
+    p, e = TRUTH.logarithms + 0.2 * rng.normal(size=(k, len(TRUTH.logarithms))), 1e-4 * rng.normal(size=(k, 6, 2))
     starts = np.array([0, len(one.inertia)])
     x, share = simulated(starts, one.drive, one.inertia, bases_of(WHEELS, p, True, e), STEP, k)
     for i in range(k):

@@ -86,18 +86,20 @@ def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     postures = rigid_robot.random_angles(rng, 12)
     trial, wrench = stood(postures, masses, OFF)
-    many = plate_place(sources, [Read(trial, REST, wrench)])
+    many, known = plate_place(sources, [Read(trial, REST, wrench)])
     trial, wrench = stood(np.repeat(postures[:1], 12, axis=0), masses, OFF)
-    one = plate_place(sources, [Read(trial, REST, wrench)])
+    one, unknown = plate_place(sources, [Read(trial, REST, wrench)])
     assert np.linalg.norm(many - OFF) < 0.7e-3
     assert np.linalg.norm(one - OFF) > 2e-3
+    assert np.all(np.abs(many - OFF) < 2.0 * known) and np.all(known < unknown)
+    assert np.all(np.abs(one - OFF) < 3.0 * unknown)
 
 
 def test_a_plate_in_its_place_and_nominal_links_leave_nothing():
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     trial, wrench = stood(rigid_robot.random_angles(np.random.default_rng(3), 4), None, np.zeros(2))
-    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)]), 0.0, atol=1e-6)
-    np.testing.assert_array_equal(plate_place(sources, [Read(trial, REST, replace(wrench, dynamics=None))]), 0.0)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)])[0], 0.0, atol=1e-6)
+    np.testing.assert_array_equal(plate_place(sources, [Read(trial, REST, replace(wrench, dynamics=None))])[0], 0.0)
 
 
 def test_seconds_in_which_a_joint_moves_do_not_count():
@@ -111,7 +113,7 @@ def test_seconds_in_which_a_joint_moves_do_not_count():
     loads = signal(t, u + moves[:, None] * [5.0, 20.0, -20.0]), signal(t, u)
     wrench = Wrenches("a", 0.0, *loads, np.zeros(0), none, wheels)
     assert 0.3 < moves.mean() < 0.95
-    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)]), 0.0, atol=1e-5)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)])[0], 0.0, atol=1e-5)
 
 
 PLANE = 1e5  # [N/m, N.m/rad]

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,12 +19,15 @@ from tests.calibration.stages.stick_slip.slipping import POSITION, TRUTH, WEIGHT
 from tests.doubles.moving_base import WHEELS as DECLARED
 
 SPRINGS = {"drive": 200e3, "front": 110e3, "back": 160e3}
+PLACE = np.array([1e-3, 2e-3])  # [m] sigma of where the load is
 
 
 def test_parameters_are_their_logarithms():
     assert SlipParameters.of(TRUTH.logarithms) == SlipParameters.of(SlipParameters.of(TRUTH.logarithms).logarithms)
     np.testing.assert_allclose(SlipParameters.of(PRIOR).logarithms, PRIOR)
-    assert len(NAMES) == len(PRIOR) == 13
+    assert len(NAMES) == len(PRIOR) == 15
+    ahead = replace(TRUTH, load_x=-2e-3, load_y=1e-3)
+    assert SlipParameters.of(ahead.logarithms).load_x == pytest.approx(-2e-3)
 
 
 def test_the_wheels_bear_the_weight_where_it_is():
@@ -32,6 +37,14 @@ def test_the_wheels_bear_the_weight_where_it_is():
     equal, drives, backs = (n + G @ WEIGHT for n, G in (WHEELS.loads(*s) for s in ((1.0, 1.0), (1.2, 1.0), (1.0, 1.2))))
     assert np.all(drives[:2] > equal[:2]) and np.all(drives[2:] < equal[2:])
     assert np.all(backs[4:] > equal[4:]) and np.all(backs[:2] < equal[:2])
+
+
+def test_a_load_that_is_elsewhere_is_borne_there():
+    """As if its moments were counted from a place 2 mm ahead of where they are, and 3 mm to the right."""
+    x, y = 2e-3, -3e-3
+    rows, other = WHEELS.rows(replace(TRUTH, load_x=x, load_y=y)), WHEELS.rows(TRUTH)
+    N = rows[:, 6] + rows[:, 7:10] @ WEIGHT
+    np.testing.assert_allclose(N, other[:, 6] + other[:, 7:10] @ (WEIGHT + WEIGHT[0] * np.array([0.0, x, y])))
 
 
 def test_stiffness_is_the_sum_over_wheels():
@@ -106,11 +119,12 @@ def tilt_stiffness(wheels=WHEELS):
 
 
 def test_shares_of_the_load_are_ratios_of_the_springs_that_tilt_shows():
-    prior = prior_by_tilt(WHEELS, tilt_stiffness())
-    np.testing.assert_allclose(np.exp(prior.mean[11:]), [200 / 110, 160 / 110], rtol=0.06)  # the wide prior pulls
-    assert np.all((prior.sigma[11:] < 0.2) & (prior.sigma[11:] >= 0.05))
+    prior = prior_by_tilt(WHEELS, tilt_stiffness(), PLACE)
+    np.testing.assert_allclose(np.exp(prior.mean[11:13]), [200 / 110, 160 / 110], rtol=0.06)  # the wide prior pulls
+    assert np.all((prior.sigma[11:13] < 0.2) & (prior.sigma[11:13] >= 0.05))
     np.testing.assert_array_equal(prior.mean[:11], WIDE.mean[:11])
     np.testing.assert_array_equal(prior.sigma[:11], WIDE.sigma[:11])
+    np.testing.assert_allclose(prior.sigma[13:], [0.1, 0.2])
 
 
 @pytest.mark.parametrize("off", [0.7, 1.3])
@@ -118,15 +132,16 @@ def test_heave_that_is_off_by_a_third_moves_shares_by_less_than_their_sigma(off)
     K = tilt_stiffness()
     K[0, 0] *= off
     assert np.all(
-        np.abs(prior_by_tilt(WHEELS, K).mean - prior_by_tilt(WHEELS, tilt_stiffness()).mean) < 0.7 * WIDE.sigma
+        np.abs(prior_by_tilt(WHEELS, K, PLACE).mean - prior_by_tilt(WHEELS, tilt_stiffness(), PLACE).mean)
+        < 0.7 * WIDE.sigma
     )
     right = np.log([200 / 110, 160 / 110])
-    found = prior_by_tilt(WHEELS, K)
-    assert np.all(np.abs(found.mean[11:] - right) < 1.5 * found.sigma[11:])
+    found = prior_by_tilt(WHEELS, K, PLACE)
+    assert np.all(np.abs(found.mean[11:13] - right) < 1.5 * found.sigma[11:13])
 
 
 def test_where_there_are_no_back_casters_their_share_keeps_the_wide_prior():
     wheels = WheelSet(WHEELS.names[:4], WHEELS.types[:4], POSITION[:4], WHEELS.weight[:4])
-    prior = prior_by_tilt(wheels, tilt_stiffness(wheels))
+    prior = prior_by_tilt(wheels, tilt_stiffness(wheels), PLACE)
     assert prior.sigma[12] == pytest.approx(WIDE.sigma[12], rel=0.01)
     assert prior.mean[12] == pytest.approx(WIDE.mean[12], abs=1e-3)
