@@ -229,14 +229,15 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     if estimate.main != "full":
         assert off.max() <= 5e-5
         return
-    # a gear that is about to cross its gap may stay: then the arm is elsewhere until it crosses, the base is not
+    # a gear that is about to cross its gap may stay: then the arm is elsewhere until it crosses, and moves the base less
     assert np.quantile(off, 0.98) <= 5e-5
     at, read = (
         loaded_base(compensator.suspension, compensator.laboratory, start),
         (own, compensator.clocks, t_wrench, w),
     )
     by_clocks, by_mocap = (compensator.slipping.moved(at, *x)[0] for x in ((own, q, at_readings(*read)), (t, q, w)))
-    assert np.abs(by_clocks - by_mocap).max() <= 1e-5
+    apart = np.abs(by_clocks - by_mocap).max(axis=(1, 2))
+    assert np.quantile(apart, 0.98) <= 1e-5 and apart.max() <= 5e-5
 
 
 def test_without_a_plate_it_is_the_row_with_the_base_from_dynamics(result, compensator, swing):

@@ -112,8 +112,11 @@ class Links(NamedTuple):
         at, q, push = self.readings
         moving = self.trains.base_acceleration(t, T_lab_base, at)
         loads = self.trains.dynamics.loads("", at, q, moving, push)
-        twist = planar_twist(t, T_lab_base, self.T_lab_0, at)
-        return motion_load(self.lab, at, self.trains.likely(loads), self.T_lab_0, CUTOFF, push, twist)
+        angles, twist = (
+            self.trains.likely(loads) - self.trains.dynamics.offset,
+            planar_twist(t, T_lab_base, self.T_lab_0, at),
+        )
+        return motion_load(self.lab, at, angles, self.T_lab_0, CUTOFF, push, twist)
 
 
 def planar_twist(t: np.ndarray, T_lab_base: np.ndarray, T_lab_0: np.ndarray, at: np.ndarray) -> np.ndarray | None:

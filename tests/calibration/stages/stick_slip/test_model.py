@@ -126,7 +126,8 @@ def test_parameters_have_the_names_of_the_contract(model):
     found = {p.name: p for p in wheel_parameters(WHEELS, model.directions[0])}
     assert found["suspension.front_left.kx"].value == found["suspension.front_right.ky"].value
     assert found["suspension.front_left.kx"].status == "estimated"
-    assert found["contact.left.mu"].status == found["suspension.left.cx"].status == "not_identifiable"
+    assert found["contact.left.mu"].status == found["suspension.front_left.cx"].status == "not_identifiable"
+    assert found["suspension.left.cx"].status == "estimated"
     assert found["contact.back_left.mu"].unit == "-" and found["slip.body_cr"].unit == "N.m.s/rad"
     C = covariance_of(WHEELS, model.directions[0])
     np.testing.assert_allclose(np.sqrt(np.diag(C)), [p.sigma for p in found.values()])
