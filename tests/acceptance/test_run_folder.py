@@ -229,7 +229,7 @@ def test_it_is_the_ladder_s_row_with_the_base_from_the_plate(estimate, compensat
     if estimate.main != "full":
         assert off.max() <= 5e-5
         return
-    # a gear that is about to cross its gap may stay: then the arm is elsewhere until it crosses, and moves the base less
+    # a gear that is about to cross its gap may stay: then the arm is elsewhere until it crosses, the base hardly
     assert np.quantile(off, 0.98) <= 5e-5
     at, read = (
         loaded_base(compensator.suspension, compensator.laboratory, start),

@@ -14,7 +14,7 @@ from calibration.stages.drive_trains import DriveTrain, DriveTrains
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import wrenches_of
 from calibration.stages.stick_slip.band import Band
-from calibration.stages.stick_slip.forcing import CUTOFF, Tilting, planar_forcing, readings_of
+from calibration.stages.stick_slip.forcing import CUTOFF, STEPS, Tilting, planar_forcing, readings_of
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.poses import Links, forced, planar_twist
 from calibration.stages.stick_slip.wheels import wheel_set
@@ -62,6 +62,34 @@ def test_a_plate_says_what_wheels_bear_whatever_the_links_do(trial):
     one, other = (forced(of, wrenches, "plate", behind).drive for behind in (links(trial, 3e-3), None))
     np.testing.assert_array_equal(one[:, 3:], other[:, 3:])
     assert np.abs(one[:, 2] - other[:, 2]).max() > 0.1 * np.abs(other[:, 2]).max()
+
+
+def test_the_last_step_of_a_sample_is_at_its_time(trial):
+    wrenches = wrenches_of(SOURCES, trial, T_LAB_BASE)
+    forcing, w = planar_forcing(wrenches, Tilting(K, 0.01 * K), "plate"), wrenches.plate.signal
+    at_t = CubicSpline(w.t, w.x)(forcing.t)
+    np.testing.assert_allclose(forcing.drive[STEPS - 1 :: STEPS, 3], -at_t[:, 2])
+    np.testing.assert_allclose(np.diff(forcing.drive[:, 3]).std(), np.diff(at_t[:, 2]).std() / STEPS, rtol=0.3)
+
+
+def test_a_base_leans_by_what_stands_on_it(trial):
+    """10 mrad forwards under 200 N.m about y; its tilt counts from there."""
+    stiff = Tilting(K, 0.01 * K)
+    np.testing.assert_allclose(stiff.leans(np.array([700.0, 200.0, -30.0])), [30.0 / K[3, 3], 200.0 / K[4, 4]])
+    forcing = planar_forcing(wrenches_of(SOURCES, trial, T_LAB_BASE), stiff, "plate")
+    leans = stiff.leans(forcing.drive[: STEPS * 100, 3:6].mean(axis=0))
+    np.testing.assert_allclose(forcing.drive[: STEPS * 100, 6:8].mean(axis=0), leans, atol=2e-6)
+    assert np.abs(leans).max() > 1e-4
+
+
+def test_links_weigh_where_they_are_by_the_zeros_of_their_readings(trial):
+    behind, zeros = links(trial, 0.0), 0.1 * np.eye(8)[4]
+    off = behind._replace(trains=behind.trains.with_offset(zeros))
+    poses = np.tile(T_LAB_BASE, (len(trial.t_mocap), 1, 1))
+    found, read = (x.load(trial.t_mocap, poses).signal.x for x in (off, behind))
+    expected = motion_load(SOURCES.lab, trial.t_robot, trial.q_motor - zeros, T_LAB_BASE, CUTOFF).signal.x
+    np.testing.assert_allclose(found[:, 4].mean(), expected[:, 4].mean(), atol=0.02)
+    assert abs(read[:, 4].mean() - expected[:, 4].mean()) > 0.5
 
 
 def test_a_base_that_turns_feels_what_the_arm_does_by_turning(trial):
