@@ -6,19 +6,15 @@ from tests.acceptance.base.base_lines import lines
 from tests.acceptance.series import SAMPLED, kept_series
 
 pytestmark = pytest.mark.slow
-OPEN = {  # as docs/limits.md says; bounds are the default robot's
-    "sampled": {"share in the 95 % band, swing"},
-    "jolts": {"share in the 95 % band, swing"},  # too wide
-}
 ROBOTS = {"fixed": ("humanoids2024", ()), "sampled": ("humanoids2024", SAMPLED), "jolts": ("jolts", ())}
 
 
 @pytest.mark.parametrize("robots", ROBOTS)
-def test_every_line_but_the_open_ones_holds(robots, tmp_path_factory, claim):
+def test_every_line_holds(robots, tmp_path_factory, claim):
     scenario, overrides = ROBOTS[robots]
     broken = []
     for line in lines(kept_series(robots, tmp_path_factory.mktemp, overrides, scenario).scores):
         claim(f"slip/{robots}/{line.name}", line.figures or (line.value,))
-        if not line.holds and line.name not in OPEN.get(robots, ()):
+        if not line.holds:
             broken.append(line)
     assert not broken
