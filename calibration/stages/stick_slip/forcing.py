@@ -35,7 +35,7 @@ CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
+UNMOVED, LEANS = 1e12, 0.02  # [kg, kg.m2]: an inertia that no force moves; [rad]: no base leans farther
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Tilting:
     def leans(self, load: np.ndarray) -> np.ndarray:
         """(rx, ry) [rad] from the vertical under a load (-Fz, My, -Mx) at rest, by springs of the same length."""
         h = np.linalg.solve(self.K[np.ix_(HEAVE, HEAVE)], load[[0, 2, 1]] * (-1.0, -1.0, 1.0))
-        return np.asarray(h[1:])
+        return np.asarray(np.clip(h[1:], -LEANS, LEANS))
 
     def standing(self, wheels: WheelSet, source: Source) -> np.ndarray:
         """Rows (m, 10) of wheels, see `WheelSet.standing`, as the source's wrench counts their places."""
@@ -199,10 +199,10 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     first, last = max(linear.x[0], heave.x[0]), min(linear.x[-1], heave.x[-1])
     if dynamics is not None:
         first, last = max(first, dynamics.signal.t[0]), min(last, dynamics.signal.t[-1])
-    n = int((last - first) * RATE + 1e-6)
-    fine = first + np.arange(n * STEPS) * STEP
+    fine = first + np.arange(int((last - first) * RATE + 1e-6) * STEPS) * STEP
     t, rest = fine[STEPS - 1 :: STEPS], fine <= wrenches.start + REST
-    tilt, load, rows, drive = heave(fine), _at(main.signal, fine), np.zeros((n, 15)), np.zeros((len(fine), COLUMNS))
+    tilt, load = heave(fine), _at(main.signal, fine)
+    rows, drive = np.zeros((len(t), 15)), np.zeros((len(fine), COLUMNS))
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
         M = _resampled(wrenches.t, wrenches.M, t)
