@@ -35,7 +35,8 @@ CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-UNMOVED, LEANS = 1e12, 0.02  # [kg, kg.m2]: an inertia that no force moves; [rad]: no base leans farther
+UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
+FARTHEST = 0.02  # [rad] that a base leans
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Tilting:
     def leans(self, load: np.ndarray) -> np.ndarray:
         """(rx, ry) [rad] from the vertical under a load (-Fz, My, -Mx) at rest, by springs of the same length."""
         h = np.linalg.solve(self.K[np.ix_(HEAVE, HEAVE)], load[[0, 2, 1]] * (-1.0, -1.0, 1.0))
-        return np.asarray(np.clip(h[1:], -LEANS, LEANS))
+        return np.asarray(np.clip(h[1:], -FARTHEST, FARTHEST))
 
     def standing(self, wheels: WheelSet, source: Source) -> np.ndarray:
         """Rows (m, 10) of wheels, see `WheelSet.standing`, as the source's wrench counts their places."""
@@ -112,8 +113,7 @@ class Wrenches:
         t: (k,) times of the inertia; empty without.
         M: (k, 6, 6) composite inertia.
         wheels: Of the robot.
-        links: By inverse dynamics of link angles on a base that turns and moves, where they are known: links strike in
-            their gaps as motors do not.
+        links: By inverse dynamics of link angles, where known, on a base that moves: they strike in their gaps.
         slips: A base of the most likely parameters, for heave and tilt while it slips; None: as if it stuck.
         slid: How far the base has slid (k, 3), on which the plate stands still, where that is known: predicted, or in
             a calibration trial as its markers show it. Then the plate shows heave and tilt, whatever is to move it.
@@ -131,7 +131,7 @@ class Wrenches:
     slid: Signal | None = None
 
     @property
-    def inner(self) -> Load | None:
+    def inverse_dynamics(self) -> Load | None:
         """By inverse dynamics of what is known best."""
         return self.links or self.dynamics
 
@@ -191,7 +191,7 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     Raises:
         NotEnoughData: The wrench asked for was not recorded.
     """
-    main, dynamics = wrenches.plate if source == "plate" else wrenches.inner, wrenches.inner
+    main, dynamics = wrenches.plate if source == "plate" else wrenches.inverse_dynamics, wrenches.inverse_dynamics
     if main is None:
         what = "force plate" if source == "plate" else "encoder readings"
         raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")
@@ -260,7 +260,7 @@ def _swayed(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) ->
 
 def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases | None) -> np.ndarray | None:
     """Mean squares (2, 3) of z, rx, ry by dynamics less the plate's, and of what these reach; None without either."""
-    load = wrenches.inner
+    load = wrenches.inverse_dynamics
     if load is None or wrenches.plate is None:
         return None
     found, _ = _swayed(replace(wrenches, slid=None, slips=slips), tilting, "dynamics", load)

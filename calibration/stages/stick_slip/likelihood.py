@@ -4,7 +4,7 @@
 
 Windows of 4 s overlap by half, each relative to its own mean: what slipped before a window is no error of it, so that
 errors of a hundred slips do not add up along a trial, and a window that slips as nobody could know counts little. s is
-the noise of the markers. Parameters are logarithms, p with a normal prior.
+the noise of the markers. Parameters are logarithms and the load's place, p with a normal prior.
 """
 
 from collections.abc import Sequence

@@ -29,7 +29,7 @@ from calibration.stages.stick_slip.forcing import (
 )
 from calibration.stages.stick_slip.kernel.bases import LOAD
 from calibration.stages.stick_slip.kernel.integration import advance
-from calibration.stages.stick_slip.kernel.wheel_forces import stood
+from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
@@ -133,7 +133,7 @@ def planar_twist(t: np.ndarray, T_lab_base: np.ndarray, T_lab_0: np.ndarray, at:
 
 
 def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | None) -> PlanarForcing:
-    """What drives the base: of links on a base that moves as what their motors do moves it.
+    """What drives the base; inverse dynamics are of the links, on the base that a first prediction has.
 
     A plate's moments are about where the base has slid to.
 
@@ -141,12 +141,12 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
         NotEnoughData: The wrench was not recorded.
         NoSuchElement: The model was not fitted from that source.
     """
-    slips, known = model.direction(source).slips, links is not None and bool(links.trains.trains)
+    slips, links = model.direction(source).slips, links if links is not None and links.trains.trains else None
     forcing = planar_forcing(wrenches, model.tilting, source)
-    if not known and not slips.any():
+    if links is None and not slips.any():
         return forcing
     x, _ = model.displacement(forcing)
-    if links is not None and known:
+    if links is not None:
         wrenches = replace(wrenches, links=links.load(forcing.t, links.T_lab_0 @ from_vector(x)))
     if slips.any() and source == "plate":
         far = np.where(slips, x[:, PLANE] - forcing.linear, 0.0)
@@ -164,7 +164,7 @@ def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
         return np.zeros((len(forcing.t), len(model.wheels.names)))
     rows, base = model.wheels.rows(found.parameters), bases_of(model.wheels, found.logarithms[None], found.corrected)
     e, load = np.zeros((len(forcing.t), *model.wheels.position.shape)), np.zeros((len(forcing.t), 3))
-    stood(base.wheels[0].reshape(-1), forcing.drive[0], base.lanes[0])
+    deflect_at_rest(base.wheels[0].reshape(-1), forcing.drive[0], base.lanes[0])
     for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):
         advance(base.state[0], base.wheels[0], drive, forcing.inertia[k], STEP, base.lanes[0])
         e[k], load[k] = base.deflection(0), base.state[0, LOAD : LOAD + 3, 0]

@@ -164,12 +164,12 @@ def _seconds(
     sources: WrenchSources, trial: Trial, wrench: Wrenches
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Readings (k,), v and u (3,) of the seconds of a trial in which no joint moves."""
-    inner = wrench.inner
-    if sources.robot is None or wrench.plate is None or inner is None:
+    inverse = wrench.inverse_dynamics
+    if sources.robot is None or wrench.plate is None or inverse is None:
         return
     known = np.isfinite(trial.q_motor).all(axis=1)
     t, q = sources.robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
-    plate, dynamics = wrench.plate.signal, inner.signal
+    plate, dynamics = wrench.plate.signal, inverse.signal
     grids = t, plate.t, dynamics.t
     starts = np.arange(max(g[0] for g in grids), min(g[-1] for g in grids) - 1.0, 1.0)
     ends = [np.searchsorted(g, [starts, starts + 1.0]) for g in grids]

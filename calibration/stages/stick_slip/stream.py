@@ -3,9 +3,8 @@
     state_e(t + dt) = advance(state_e(t), sample),     x = mean_e x_e,    V as in `band`
 
 The first second is the rest the forces count from. Between two samples they are linear; nothing after a sample is
-used. A recording's sample ends with a step of STEP = 5 ms after its time, see `forcing`: here the velocity takes its
-place. Without the wrench of inverse dynamics, which needs accelerations, the base has no inertia, and the plate alone
-moves it.
+used. Inverse dynamics are of the motors here, of the links in a recording. Without them, which need accelerations, the
+base has no inertia, and the plate alone moves it.
 """
 
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from calibration.stages.stick_slip.band import banded
 from calibration.stages.stick_slip.forcing import UNMOVED, Tilting
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, PLATE, STEPS, Bases, X, at_rest
 from calibration.stages.stick_slip.kernel.integration import advance
-from calibration.stages.stick_slip.kernel.wheel_forces import stood
+from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bodies
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.wheels import PRELOADS, WheelSet, preloads, values_of
@@ -145,7 +144,7 @@ class SlipStream:
         e[len(self.direction.ensemble) :] = preloads(self.wheel_set, self.direction.parameters, row[3:6])
         bases = at_rest(self.wheels, self.bodies, e)
         for wheels, lanes in zip(bases.wheels, bases.lanes, strict=True):
-            stood(wheels.reshape(-1), row, lanes)
+            deflect_at_rest(wheels.reshape(-1), row, lanes)
         return SlipState(t, t, rest, 1, row, bases, none, band, none[1])
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, STEPS, F, W
 from calibration.stages.stick_slip.kernel.integration import advance
-from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels, stood
+from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest, moving_wheels
 
 _REPEATS, _SETTLED = 20, 1e-3  # [N, N.m]
 _UPPER = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # of a symmetric matrix, in its six elements
@@ -160,7 +160,7 @@ def heaving(  # noqa: PLR0913
     before, floor, left, carried = np.zeros(3), np.zeros(3), np.zeros(3), moving_wheels(wheels.reshape(-1))
     drive[0, 3], drive[0, 4], drive[0, 5] = -of.rest[0], of.rest[2], -of.rest[1]
     drive[0, 6], drive[0, 7] = of.leans[0], of.leans[1]
-    stood(wheels.reshape(-1), drive[0], lanes)
+    deflect_at_rest(wheels.reshape(-1), drive[0], lanes)
     S, ph, hh, inverse = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(w)):
         if k % STEPS == 0:

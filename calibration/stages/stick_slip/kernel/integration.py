@@ -50,7 +50,7 @@ from calibration.stages.stick_slip.kernel.bases import (
 )
 from calibration.stages.stick_slip.kernel.corrector import cofactors, corrector
 from calibration.stages.stick_slip.kernel.lifted import lifted
-from calibration.stages.stick_slip.kernel.wheel_forces import moving_wheels, on_wheels, stood, yielding
+from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest, moving_wheels, on_wheels, yielding
 
 
 @njit(cache=True, error_model="numpy")
@@ -216,7 +216,7 @@ def _simulated(  # noqa: PLR0913
         lanes = bases.lanes[g]
         state, wheels = bases.state[g].copy().reshape(-1), bases.wheels[g].copy().reshape(-1)
         yielding(wheels, h, lanes)
-        stood(wheels, drive[a * steps], lanes)
+        deflect_at_rest(wheels, drive[a * steps], lanes)
         own = moving_wheels(wheels)
         for t in range(a, b):
             _advance(state, wheels, own, drive[t * steps : (t + 1) * steps], inertia[t], h, lanes)

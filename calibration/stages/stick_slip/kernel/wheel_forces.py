@@ -93,7 +93,7 @@ def _sliding(w: np.ndarray, s: np.ndarray, bit: float, h: float, n: int) -> None
 
 
 @njit(cache=True, error_model="numpy")
-def stood(wheels: np.ndarray, u: np.ndarray, n: int) -> None:
+def deflect_at_rest(wheels: np.ndarray, u: np.ndarray, n: int) -> None:
     """Deflect flat wheels of n lanes so that none pushes the floor sideways under the drive u (11,) at rest."""
     for i in range(len(wheels) // (WHEEL * LANES)):
         w = wheels[i * WHEEL * LANES : (i + 1) * WHEEL * LANES]

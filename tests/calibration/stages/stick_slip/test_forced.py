@@ -14,7 +14,7 @@ from calibration.stages.drive_trains import DriveTrain, DriveTrains
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import wrenches_of
 from calibration.stages.stick_slip.band import Band
-from calibration.stages.stick_slip.forcing import CUTOFF, LEANS, STEPS, Tilting, planar_forcing, readings_of
+from calibration.stages.stick_slip.forcing import CUTOFF, FARTHEST, STEPS, Tilting, planar_forcing, readings_of
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.poses import Links, forced, planar_twist
 from calibration.stages.stick_slip.wheels import wheel_set
@@ -77,7 +77,7 @@ def test_a_base_leans_by_what_stands_on_it(trial):
     stiff = Tilting(K, 0.01 * K)
     np.testing.assert_allclose(stiff.leans(np.array([700.0, 200.0, -30.0])), [30.0 / K[3, 3], 200.0 / K[4, 4]])
     soft = replace(stiff, K=np.diag([1e5, 1e5, 9e5, 1e2, 1e2, 1e4]))  # as where nothing showed the tilt
-    np.testing.assert_array_equal(soft.leans(np.array([700.0, 200.0, -30.0])), [LEANS, LEANS])
+    np.testing.assert_array_equal(soft.leans(np.array([700.0, 200.0, -30.0])), [FARTHEST, FARTHEST])
     forcing = planar_forcing(wrenches_of(SOURCES, trial, T_LAB_BASE), stiff, "plate")
     leans = stiff.leans(forcing.drive[: STEPS * 100, 3:6].mean(axis=0))
     np.testing.assert_allclose(forcing.drive[: STEPS * 100, 6:8].mean(axis=0), leans, atol=2e-6)
