@@ -160,21 +160,27 @@ class BundledArm:
         return hand.poses(positions.q, self.bending.turns(positions.moment))
 
     def variance(self, hand: HandModel, positions: ArmPositions, reading_sigma: np.ndarray) -> np.ndarray:
-        """(n, m) of the chain's joints: random error of the reading where there is no drive train."""
-        plain = [train for train in self.trains.trains if train.form == "dead_zone"]  # of others the residual says it
-        known = {q.name: q.sigma for train in plain for q in train.parameters if np.isfinite(q.sigma)}
-        sigma = np.array([known.get(f"gear.{joint}.compliance", 0.0) for joint in hand.chain.joints])
-        driven = np.isin(hand.chain.joints, [train.joint for train in self.trains.trains])
-        own, torque, rests = (x[:, hand.chain.columns] for x in (positions.variance, positions.torque, positions.rests))
-        own = np.maximum(own, np.where(rests, self.rest_sigma[hand.chain.columns] ** 2, 0.0))
-        return np.asarray(np.where(driven, own + (sigma * torque) ** 2, 0.0) + reading_sigma**2)
+        """(n, m) of the chain's joints: random error of the reading where there is no drive train.
+
+        What parameters of a drive train err by, what it leaves of trials left out says; beyond their loads its
+        compliance's standard deviation.
+        """
+        own = np.maximum(positions.variance, np.where(positions.rests, self.rest_sigma**2, 0.0))
+        found = np.zeros(own.shape)
+        for train in self.trains.trains:
+            j = self.trains.joints.index(train.joint)
+            known = {q.name: q.sigma for q in train.parameters if train.form == "dead_zone" and np.isfinite(q.sigma)}
+            sigma = known.get(f"gear.{train.joint}.compliance", 0.0)
+            found[:, j] = own[:, j] + (sigma * train.beyond(positions.torque[:, j])) ** 2
+        return np.asarray(found[:, hand.chain.columns] + reading_sigma**2)
 
     def column_covariance(self, hand: HandModel, positions: ArmPositions, T_base_hand: np.ndarray) -> np.ndarray:
         """(n, 6, 6) of the local twist of the hand at T_base_hand (n, 4, 4), by the column's compliance."""
         sigma = np.where(np.isfinite(self.bending.sigma), self.bending.sigma, 0.0)
         T_base_column = hand.chain.poses(hand.angles(positions.q), self.bending.joint)
         J = adjoint(inverse(T_base_hand) @ T_base_column)[:, :, 3:5]
-        return np.asarray(J * (sigma * positions.moment)[:, None, :] ** 2 @ np.swapaxes(J, 1, 2))
+        moment = positions.moment - self.bending.mean
+        return np.asarray(J * (sigma * moment)[:, None, :] ** 2 @ np.swapaxes(J, 1, 2))
 
     @cached_property
     def _T_base_root(self) -> np.ndarray:

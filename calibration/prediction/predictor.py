@@ -11,8 +11,8 @@ q, readings the geometry is evaluated at:      motor      q_motor by the robot's
 Row `full` has link angles behind its drive trains, the column bent, and the base that sticks and slips in place of the
 suspension, where those were identified.
 
-The base's motion from the same source loads the drive trains. Of a trial nothing else is read: encoders, plate, wrist
-sensor, base markers of its first second (throughout where the base is `measured`), never hand or shoulder.
+The base's motion from the same source loads the drive trains, predicted where it is `measured`. Of a trial nothing else
+is read: encoders, plate, wrist sensor, base markers of its first second (throughout for `measured`), never the hand.
 """
 
 from collections.abc import Callable, Iterator
@@ -44,6 +44,7 @@ from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
 
 T = TypeVar("T")
+_SLIPS: tuple[Source, ...] = ("plate", "dynamics")
 
 
 @dataclass(frozen=True)
@@ -200,13 +201,15 @@ class TrialPoses:
     def geared(self, source: Base | None = None) -> CorrectedTrial | None:
         """Link angles behind the drive trains, the base moved by a source, by the best where none is named.
 
-        None where no drive train was identified.
+        A base that slips is predicted where it is measured, too: markers do not show how it accelerates. None where no
+        drive train was identified.
         """
         bundled, robot = self.predictor.bundled, self.predictor.robot
         if bundled is None or robot is None or not bundled.trains.trains or not len(self.trial.t_robot):
             return None
         row = next(row for row in LADDER if row.bundle)
-        chosen: Base = next(s for s in ((source,) if source else SOURCES) if self.base(row, s) is not None)
+        slips = [s for s in _SLIPS if source == "measured" and self.slipped(s) is not None]
+        chosen = next(s for s in (*slips, *((source,) if source else SOURCES)) if self.base(row, s) is not None)
         return self._once(("geared", chosen), lambda: bundled.corrected(self.trial, robot, self.base(row, chosen)))
 
     def prepare(self, source: Base) -> None:

@@ -12,7 +12,7 @@ the inertia of what hangs on the sensor. So the link's inertia under the load of
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ from calibration.robot.rigid_tree import RigidTree, dynamics_along
 _CUTOFF = 20.0  # [Hz]
 _AVERAGE = 0.4  # [s]
 _SHARE = 0.75  # of the weight: less is no push [-]
-_STRIDE = 4  # samples from one to the next where a push is looked for
+STRIDE = 4  # samples from one to the next where a push is looked for
 
 
 class Push(NamedTuple):
@@ -93,32 +93,86 @@ class WristSensor:
             wrench: (n, 6) readings.
         """
         try:
-            found = low_passed(even(t, np.hstack([q, wrench])), _CUTOFF)
+            read = smoothed(t, q, wrench)
         except NotEnoughData:
             return None
-        k, limit = q.shape[1], _SHARE * float(self.tree.mass[-1] * np.linalg.norm(self.at_rest[0, 6:9]))
-        v = np.gradient(found.x[:, :k], 1.0 / RATE, axis=0)
-        moving = np.stack([found.x[:, :k], v, np.gradient(v, 1.0 / RATE, axis=0)])
+        limit = _SHARE * float(self.tree.mass[-1] * np.linalg.norm(self.at_rest[0, 6:9]))
 
-        def outside(stride: int) -> Push:
-            f, inertia = self._moved(*moving[:, ::stride])
-            p = f + found.x[::stride, k:]
-            return Push(p - p[found.t[::stride] <= found.t[0] + REST].mean(axis=0), inertia)
+        def outside(at: SmoothReadings) -> Push:
+            f, inertia = self._moved(at)
+            p = f + at.wrench
+            return Push(p - p[at.t <= at.t[0] + REST].mean(axis=0), inertia)
 
-        force = uniform_filter1d(outside(_STRIDE).wrench[:, :3], int(_AVERAGE * RATE / _STRIDE), axis=0)
-        if np.linalg.norm(force, axis=1).max() <= limit:
-            return None
-        p, inertia = outside(1)
-        wrench = interpolate_columns(t, found.t, p @ pin.SE3(self.body).dualAction.T)
-        return Push(wrench, interpolate_columns(t, found.t, inertia))
+        force = uniform_filter1d(outside(read.thinned(STRIDE)).wrench[:, :3], int(_AVERAGE * RATE / STRIDE), axis=0)
+        return None if np.linalg.norm(force, axis=1).max() <= limit else self._on_body(outside(read), read.t, t)
 
-    def _moved(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def load(self, t: np.ndarray, read: "SmoothReadings") -> Push:
+        """What hangs on the sensor as a load at t (n,) [s] of a robot of which it is no part."""
+        f, inertia = self._moved(read)
+        return self._on_body(Push(-f, -inertia), read.t, t)
+
+    def beyond(self, read: "SmoothReadings") -> tuple[np.ndarray, np.ndarray]:
+        """-(w + f) (n, 6), and the regressor (n, 6, 4) of -w by mass and first moment, axes of the last body."""
+        Y = np.stack([self.alone(unit)._moved(read)[0] for unit in np.eye(4)], axis=2)
+        return -(read.wrench + self._moved(read)[0]), Y
+
+    def carrying(self, more: np.ndarray) -> "WristSensor":
+        """The sensor with a further mass and its first moment (4,) on it."""
+        tree = self.tree._replace(mass=self.tree.mass.copy(), moment=self.tree.moment.copy())
+        tree.mass[-1] += more[0]
+        tree.moment[-1] += more[1:]
+        return replace(self, tree=tree)
+
+    def alone(self, what: np.ndarray) -> "WristSensor":
+        """The sensor with a mass and its first moment (4,) on it alone."""
+        bare = {n: np.zeros_like(getattr(self.tree, n)) for n in ("mass", "moment", "inertia")}
+        return replace(self, tree=self.tree._replace(**bare)).carrying(what)
+
+    def _on_body(self, found: Push, t: np.ndarray, at: np.ndarray) -> Push:
+        """With its wrench in the last body's axes, at other times."""
+        wrench = interpolate_columns(at, t, found.wrench @ pin.SE3(self.body).dualAction.T)
+        return Push(wrench, interpolate_columns(at, t, found.inertia))
+
+    def _moved(self, at: "SmoothReadings") -> tuple[np.ndarray, np.ndarray]:
         """f (n, 6) in the sensor's axes about its origin, and I (n, k)."""
-        found = dynamics_along(self.tree, q, v, a, self.at_rest)
-        T = self.root @ self.chain.poses(q[:, self.chain.columns], self.link)
+        found = dynamics_along(self.tree, at.q, at.v, at.a, self.at_rest)
+        T = self.root @ self.chain.poses(at.q[:, self.chain.columns], self.link)
         R, moment = T[:, :3, :3], found.root[:, 3:] - np.cross(T[:, :3, 3], found.root[:, :3])
         f = [(found.root[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]]
         return np.concatenate(f, axis=1), found.inertia
+
+
+class SmoothReadings(NamedTuple):
+    """Readings below 20 Hz, evenly sampled.
+
+    Attributes:
+        t: (n,) [s].
+        q: (n, k) of the motors [rad, m].
+        v: Their velocities.
+        a: Their accelerations.
+        wrench: (n, 6) of the sensor.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    wrench: np.ndarray
+
+    def thinned(self, stride: int) -> "SmoothReadings":
+        """One sample of so many."""
+        return SmoothReadings(*(x[::stride] for x in self))
+
+
+def smoothed(t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> SmoothReadings:
+    """Of motors q (n, k) and the sensor (n, 6).
+
+    Raises:
+        NotEnoughData: Less than a second of samples.
+    """
+    found, k = low_passed(even(t, np.hstack([q, wrench])), _CUTOFF), q.shape[1]
+    v = np.gradient(found.x[:, :k], 1.0 / RATE, axis=0)
+    return SmoothReadings(found.t, found.x[:, :k], v, np.gradient(v, 1.0 / RATE, axis=0), found.x[:, k:])
 
 
 @lru_cache(maxsize=8)

@@ -90,7 +90,7 @@ class Campaign:
         validation_swing: Duration of each validation swing [s]; 0: none.
         pause: Pause between trials, on every clock [s].
         payloads: Further masses [kg] with which the first validation swing is repeated.
-        calibration_payloads: Further masses [kg] with which the calibration swing `around_z` is repeated.
+        calibration_payloads: Further masses [kg] with which calibration swings `around_z` and `around_y` are repeated.
         push: Force [N] with which the hand is pushed in a validation trial; 0: no such trial.
         confirmation: Whether a second session follows, with markers remounted, base moved and encoders homed again.
         driving: Trials in which the base moves.

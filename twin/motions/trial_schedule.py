@@ -16,7 +16,7 @@ from twin.motions.swings import CALIBRATION_SWINGS, FURTHER_SWINGS, JOINTS, VALI
 from twin.random_streams import generator
 
 REGISTRATION = "registration"
-_LOADED = "around_z"  # the calibration swing that brings wheels nearest their friction
+_LOADED = ("around_z", "around_y")  # one brings wheels nearest their friction, one turns the hand against gravity
 _REGISTRATION_POSTURES = 8
 
 
@@ -34,7 +34,7 @@ def schedule(campaign: Campaign, nominal: mujoco.MjModel, seed: int) -> tuple[Mo
         *_loaded("calibration", _LOADED, campaign.calibration_payloads, campaign.calibration_swing, campaign),
         *_swings("validation", campaign.validation_swing, VALIDATION_SWINGS, campaign),
         *_swings("validation", campaign.validation_swing, further, campaign),
-        *_loaded("validation", next(iter(VALIDATION_SWINGS)), campaign.payloads, campaign.validation_swing, campaign),
+        *_loaded("validation", tuple(VALIDATION_SWINGS)[:1], campaign.payloads, campaign.validation_swing, campaign),
         *((motions.pushed("push", "validation", campaign.push, campaign),) if campaign.push else ()),
         *(read_trajectory(m.file, name, m.role, campaign.rest) for name, m in campaign.motions.items()),
         *_statics("postures_validation", "validation", campaign.validation_postures, nominal, seed, campaign),
@@ -104,14 +104,16 @@ def _sweeps(campaign: Campaign) -> tuple[Motion, ...]:
 
 
 def _loaded(
-    role: schema.Role, name: str, masses: tuple[float, ...], duration: float, campaign: Campaign
+    role: schema.Role, names: tuple[str, ...], masses: tuple[float, ...], duration: float, campaign: Campaign
 ) -> tuple[Motion, ...]:
-    """A swing with each of further payloads [kg] in the hand."""
-    path = {**CALIBRATION_SWINGS, **VALIDATION_SWINGS}[name]
-    trials = ((f"{name}_{mass:g}kg".replace(".", "_"), mass) for mass in masses)
-    return tuple(
-        replace(motions.swing(id, role, "swing", path, duration, campaign), name=name, payload=m) for id, m in trials
-    )
+    """Swings with each of further payloads [kg] in the hand."""
+    paths = {**CALIBRATION_SWINGS, **VALIDATION_SWINGS}
+
+    def loaded(name: str, mass: float) -> Motion:
+        id = f"{name}_{mass:g}kg".replace(".", "_")
+        return replace(motions.swing(id, role, "swing", paths[name], duration, campaign), name=name, payload=mass)
+
+    return tuple(loaded(name, mass) for name in names for mass in masses)
 
 
 def _swings(role: schema.Role, duration: float, paths: dict[str, Swing], campaign: Campaign) -> tuple[Motion, ...]:

@@ -19,6 +19,7 @@ from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, corrected_trial, hand_poses
+from calibration.stages.drive_trains.hung_load import HungLoad
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import BasePrediction, slipping_base_poses
@@ -45,6 +46,7 @@ class BundleParts:
     bending: ColumnBending
     stick_slip: StickSlip | None
     at_rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    hung: HungLoad | None = None
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,8 @@ class BundledRobot:
     @classmethod
     def of(cls, hand: HandModel, parts: BundleParts, urdf: str, description: Description) -> "BundledRobot":
         """The robot from what was saved of it."""
-        trains = DriveTrains(dynamics(urdf, description, parts.offset), parts.trains, urdf, description)
+        robot = dynamics(urdf, description, parts.offset, parts.hung)
+        trains = DriveTrains(robot, parts.trains, urdf, description, parts.hung)
         at_rest = trains.by_joint(parts.at_rest) if len(parts.at_rest) else np.zeros(len(parts.offset))
         return cls(hand, trains, parts.bending, parts.stick_slip, at_rest)
 

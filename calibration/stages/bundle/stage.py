@@ -14,7 +14,10 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model, Parameter
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import from_vector
+from calibration.numerics.side_by_side import side_by_side
+from calibration.numerics.signals import even, interpolate_columns, low_passed
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
@@ -25,17 +28,20 @@ from calibration.stages.drive_trains.drive_train import Quantity
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.from_markers import completed
 from calibration.stages.drive_trains.geometry_refit import RefittedGeometry
-from calibration.stages.drive_trains.stage import fit_drive_trains
+from calibration.stages.drive_trains.stage import AS_SEEN, Moved, fit_drive_trains
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
+from calibration.stages.stick_slip.poses import slipping_base_poses
 from calibration.stages.stick_slip.stage import fit_stick_slip
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.rest_frame import rest_of
 from calibration.verdict import Verdict
 
 STAGE = "bundle"
+_SLOWLY = 3.5  # [Hz] below which markers show a base's motion better than a wrench does
 _ERRS = 2e-4  # [rad] random error of readings, in the geometry, that is worth drive trains from markers alone
 
 
@@ -86,10 +92,12 @@ def fit_bundle(
     """
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
-    trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand)
+    sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
+    moved = AS_SEEN if suspension is None else _moved(sources, trials, suspension)
+    trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, moved)
     bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
     geometry = replace(geometry, name="full")
-    refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings)
+    refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings, moved)
     found += more
     if refitted is not None:
         geometry, bending, trains, at_rest = refitted.model, refitted.bending, refitted.trains, refitted.at_rest
@@ -99,14 +107,37 @@ def fit_bundle(
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link), _moment_sigma(lab)))
     base = None
     if suspension is not None:
-        sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
-        base, more = fit_stick_slip(sources, trials, suspension, trains)
+        base, more = fit_stick_slip(replace(sources, T_base_B=from_vector(hand.base)), trials, suspension, trains)
         found += more
-    parts = BundleParts(trains.trains, _offsets(hand), bending, base, at_rest)
+    parts = BundleParts(trains.trains, _offsets(hand), bending, base, at_rest, trains.hung)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
 
 
-def _completed(
+def _moved(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension) -> Moved:
+    """The base that sticks and slips as motors and wrench move it, what it does slowly as its markers show it.
+
+    Markers do not show how it accelerates. Of trials and robots without such a base, nothing.
+    """
+    model, _ = fit_stick_slip(sources, trials, suspension)
+    if model is None:
+        return AS_SEEN
+    source = model.directions[0].source
+
+    def poses(trial: Trial) -> np.ndarray | None:
+        try:
+            x = slipping_base_poses(model, sources, trial, source).motion.x
+            rest = rest_of(sources.lab.description, trial, sources.T_base_B)
+            off = rest.displacement(MeasuredTrial.of(sources.lab.description, trial).base.T) - x
+            slow = low_passed(even(trial.t_mocap, off), _SLOWLY)
+            return rest.poses(x + interpolate_columns(trial.t_mocap, slow.t, slow.x))
+        except NotEnoughData:
+            return None
+
+    found = zip(trials, side_by_side(poses, trials), strict=True)
+    return {trial.id: T_lab_B for trial, T_lab_B in found if T_lab_B is not None}
+
+
+def _completed(  # noqa: PLR0913
     lab: Laboratory,
     trials: Sequence[Trial],
     robot: Clock,
@@ -114,6 +145,7 @@ def _completed(
     trains: DriveTrains,
     loads: Mapping[str, LinkLoads],
     findings: Sequence[Verdict],
+    moved: Moved,
 ) -> tuple[RefittedGeometry | None, tuple[Verdict, ...]]:
     """`completed`; nothing where link readings were rejected, no joint has a drive train or no reading errs."""
     errs = bool((geometry.reading_sigma > _ERRS).any())
@@ -121,7 +153,7 @@ def _completed(
         return None, ()
     hand = hand_of(geometry, lab.chain, lab.nominal_frames)
     try:
-        return completed(lab.chain, lab.description, trials, robot, hand, trains, loads)
+        return completed(lab.chain, trials, robot, hand, trains, loads, moved)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "missing", str(error)),)
 

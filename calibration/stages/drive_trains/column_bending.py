@@ -8,7 +8,7 @@ the base's body B sees it. Where no such body is seen the column is rigid.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -35,11 +35,13 @@ class ColumnBending:
         joint: The first joint of the chain.
         compliance: (2,) about x and y of its frame [rad/(N.m)].
         sigma: (2,) standard deviations.
+        mean: (2,) moments of the postures [N.m]: what the column turns by there, the geometry takes up.
     """
 
     joint: str
     compliance: np.ndarray
     sigma: np.ndarray
+    mean: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def turns(self, moment: np.ndarray) -> np.ndarray:
         """Rotation vectors (n, 3) [rad] of what the column carries, in its frame, under moments (n, 2) [N.m]."""
@@ -85,7 +87,7 @@ def column_bending(
         return rigid(joint)
     turn, M = np.array(rows)[:, :2], np.array(rows)[:, 2:]
     found = [_line(-M[:, k], turn[:, k]) for k in range(2)]
-    return ColumnBending(joint, np.array([c for c, _ in found]), np.array([s for _, s in found]))
+    return ColumnBending(joint, np.array([c for c, _ in found]), np.array([s for _, s in found]), M.mean(axis=0))
 
 
 def bent(hand: HandModel, bending: ColumnBending, q: np.ndarray, moment: np.ndarray) -> np.ndarray:

@@ -76,6 +76,7 @@ class DriveTrain:
         inertials: (p,) masses and first moments, less the nominal ones, that this joint's load identifies, in the order
             of `torques.inertials` [kg, kg.m]; empty: nominal.
         parameters: What is reported, with standard deviations.
+        range: (2,) least and largest nominal torque of the trials it was found in [N.m]; NaN where not known.
     """
 
     joint: str
@@ -91,6 +92,7 @@ class DriveTrain:
     doubt: float = 1.0
     inertials: np.ndarray = field(default_factory=lambda: np.zeros(0))
     parameters: tuple[Quantity, ...] = ()
+    range: np.ndarray = field(default_factory=lambda: np.full(2, np.nan))
 
     @property
     def gap(self) -> float:
@@ -116,6 +118,11 @@ class DriveTrain:
     def variance(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Variance (n,) [rad2] of a link in motion that is between low and high (n,) [rad]."""
         return np.asarray(self.doubt**2 * (high - low) ** 2 / 12.0 + self.residual**2)
+
+    def beyond(self, torque: np.ndarray) -> np.ndarray:
+        """By how much nominal torques (...) [N.m] exceed those it was found by; all of them where those are unknown."""
+        low, high = np.nan_to_num(self.range)
+        return np.asarray(torque - np.clip(torque, low, high))
 
     def ends(self, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest delta (m,) [rad] at which friction holds the link under torques (m,) [N.m]."""

@@ -19,13 +19,13 @@ import numpy as np
 
 from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
-from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
-from calibration.robot.wrist_sensor import Push, hand_push
+from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains import link_motion
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
+from calibration.stages.drive_trains.hung_load import HungLoad, hand_load
 from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Drives
-from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, inertials
+from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, dynamics, inertials
 from calibration.stages.suspension.floor_wrench import root_in_base
 
 RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
@@ -57,12 +57,14 @@ class DriveTrains:
         trains: In the order of the measured joints; some joints have none.
         urdf: Text the dynamics were built from.
         description: Of the dataset.
+        hung: What else hangs on the wrist's sensor; None where nothing was weighed.
     """
 
     dynamics: Dynamics
     trains: tuple[DriveTrain, ...]
     urdf: str
     description: Description
+    hung: HungLoad | None = None
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -101,9 +103,7 @@ class DriveTrains:
         loaded = self.description.carrying(mass)
         if loaded is self.description:
             return self
-        model = floating_model(self.urdf, loaded)
-        model.gravity = self.dynamics.model.gravity
-        return replace(self, dynamics=replace(self.dynamics, model=model), description=loaded)
+        return replace(self, dynamics=dynamics(self.urdf, loaded, self.dynamics.offset, self.hung), description=loaded)
 
     def with_offset(self, offset: np.ndarray) -> "DriveTrains":
         """The same with other zeros (k,) of the motor readings."""
@@ -115,8 +115,8 @@ class DriveTrains:
         return base_acceleration(self.dynamics.gravity, t, T_lab_root, at)
 
     def push(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> Push | None:
-        """What pushes the hand, see `hand_push`; None where nothing does."""
-        return hand_push(self.urdf, self.description, t, q, wrist)
+        """What else loads the hand, see `hand_load`; None where nothing does."""
+        return hand_load(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist)
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""

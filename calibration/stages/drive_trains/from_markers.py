@@ -21,7 +21,6 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import inverse, log6
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
@@ -31,7 +30,15 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.fit.identification import identify
 from calibration.stages.drive_trains.geometry_refit import NOTHING, RefittedGeometry, refit_geometry
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
-from calibration.stages.drive_trains.stage import DEFLECTION, STAGE, is_long, loads_of_trial, unidentified
+from calibration.stages.drive_trains.stage import (
+    AS_SEEN,
+    DEFLECTION,
+    STAGE,
+    Moved,
+    is_long,
+    loads_of_trial,
+    unidentified,
+)
 from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances, load_modes
 from calibration.stages.geometry.parameters import reading_sigma
 from calibration.verdict import Verdict
@@ -55,12 +62,12 @@ class SeenJoint:
 
 def completed(
     chain: Chain,
-    description: Description,
     trials: Sequence[Trial],
     robot: Clock,
     hand: HandModel,
     trains: DriveTrains,
     loads: Mapping[str, LinkLoads] = NOTHING,
+    moved: Moved = AS_SEEN,
 ) -> tuple[RefittedGeometry, tuple[Verdict, ...]]:
     """Geometry on link angles, with the drive trains of joints without a link encoder, and which those are.
 
@@ -69,19 +76,19 @@ def completed(
     Raises:
         NotEnoughData: No joint has a drive train: neither link encoders nor the hand's markers show one.
     """
-    found = refit_geometry(chain, description, trials, robot, hand, trains, loads)
+    found = refit_geometry(chain, trials, robot, hand, trains, loads, moved)
     have = [train.joint for train in trains.trains]
     if all(joint in have or chain.is_prismatic(joint) for joint in chain.joints):
         return found, ()
     new: list[str] = []
     for _ in range(1 if have else 3):
-        more = with_hand_markers(found.trains, trials, robot, found.hand(chain), found.bending, new or None)
+        more = with_hand_markers(found.trains, trials, robot, found.hand(chain), found.bending, new or None, moved)
         new = [train.joint for train in more.trains if train.joint not in have]
         if not more.trains:
             raise NotEnoughData("neither link encoders nor the hand's markers show a drive train in motion")
         if not new:
             return found, ()
-        found = refit_geometry(chain, description, trials, robot, found.hand(chain), more)
+        found = refit_geometry(chain, trials, robot, found.hand(chain), more, moved=moved)
     summary = Verdict(STAGE, "ok", f"without a link encoder, from the hand's markers: {', '.join(new)}")
     return found, (summary, *unidentified([train for train in found.trains.trains if train.joint in new]))
 
@@ -93,6 +100,7 @@ def with_hand_markers(
     hand: HandModel,
     bending: ColumnBending,
     joints: Sequence[str] | None = None,
+    moved: Moved = AS_SEEN,
 ) -> DriveTrains:
     """The drive trains with those of further joints (of all revolute ones that have none), by the hand's markers.
 
@@ -104,8 +112,8 @@ def with_hand_markers(
     found = trains
     if not wanted:
         return found
-    loads = [loads_of_trial(trains, trial, robot, hand) for trial in trials if is_long(trial)]
     used = [trial for trial in trials if is_long(trial)]
+    loads = [loads_of_trial(trains, trial, robot, hand, moved.get(trial.id)) for trial in used]
     for joint in wanted:
         try:
             train = identified_by_markers(found, joint, used, loads, robot, hand, bending)
@@ -143,7 +151,7 @@ def identified_by_markers(
     if not own:
         raise NotEnoughData(f"no calibration trial shows base and hand: {joint} has neither link encoder nor markers")
     tolerances = trains.description.tolerances
-    C = inertial_tolerances(trains.dynamics, tolerances.link_mass, tolerances.link_com)
+    C = inertial_tolerances(trains.dynamics, tolerances.link_mass, tolerances.link_com, trains.hung)
     modes = load_modes(own, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
     data, coarse = (_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
     found, _ = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))

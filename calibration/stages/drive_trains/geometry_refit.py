@@ -32,7 +32,7 @@ from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
-from calibration.stages.drive_trains.stage import loads_of_trial
+from calibration.stages.drive_trains.stage import AS_SEEN, Moved, loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.departures import TakenForKnown, shown_by, with_departures, with_gears
 from calibration.stages.geometry.hand_residual import NoiseModel
@@ -87,29 +87,31 @@ class RefittedGeometry:
 
 def refit_geometry(
     chain: Chain,
-    description: Description,
     trials: Sequence[Trial],
     robot: Clock,
     hand: HandModel,
     trains: DriveTrains,
     loads: Mapping[str, LinkLoads] = NOTHING,
+    moved: Moved = AS_SEEN,
 ) -> RefittedGeometry:
     """The geometry on link angles of the calibration trials.
 
     Args:
         chain: The arm.
-        description: Of the dataset.
         trials: Calibration trials.
         robot: The robot's clock.
         hand: Geometry that the drive trains were fitted with.
         trains: The drive trains.
         loads: By the same geometry, of trials whose loads are known.
+        moved: As of `fit_drive_trains`.
 
     Raises:
         NotEnoughData: The trials show no posture and no motion.
     """
+    description = trains.description
     corrected = side_by_side(
-        lambda t: _by_loads(trains, t, loads.get(t.id) or loads_of_trial(trains, t, robot, hand)), trials
+        lambda t: _by_loads(trains, t, loads.get(t.id) or loads_of_trial(trains, t, robot, hand, moved.get(t.id))),
+        trials,
     )
     bending = column_bending(description, trials, [c.loads for c in corrected], robot, hand)
     seen = [seen_by_links(trains, one) for one in corrected]
@@ -143,7 +145,7 @@ def refit_geometry(
     joints = tuple(referred(train, model, trains) for train in trains.trains)
     trains = replace(trains, trains=joints).with_offset(offset)
     resting = [trial for trial in trials if len(trial.dwell_start)]
-    static = side_by_side(lambda trial: corrected_trial(trains, trial, robot, fitted), resting)
+    static = side_by_side(lambda t: corrected_trial(trains, t, robot, fitted, moved.get(t.id)), resting)
     return RefittedGeometry(model, bending, trains, rest_errors(trains, static, robot), departed.shown)
 
 

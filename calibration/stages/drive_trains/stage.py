@@ -4,8 +4,9 @@ Data: motor minus link reading of all calibration trials. Inputs: motor encoders
 zeros, the nominal robot with each trial's payload. Choices are made by trials left out.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,9 +23,9 @@ from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.fit.identification import identify
 from calibration.stages.drive_trains.fit.steady_contact import Slip, slipped_encoder
+from calibration.stages.drive_trains.hung_load import DEPARTS, HungLoad, hung_load
 from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, joint_data
 from calibration.stages.drive_trains.torques import (
-    Dynamics,
     LinkLoads,
     dynamics,
     inertial_tolerances,
@@ -33,13 +34,21 @@ from calibration.stages.drive_trains.torques import (
 from calibration.stages.joints.samples import link_zeros
 from calibration.verdict import Verdict
 
+Moved = Mapping[str, np.ndarray]
+"""T_lab_B (n, 4, 4) of the base's marker body at a trial's mocap times, by the trial's id."""
+AS_SEEN: Moved = {}
 STAGE = "drive_trains"
 DEFLECTION = 1e-2  # [rad] of a drive at its largest torque, prior
 _SHORTEST = 1.5  # [s] of a trial
 
 
-def fit_drive_trains(
-    urdf: str, description: Description, trials: Sequence[Trial], robot: Clock, hand: HandModel
+def fit_drive_trains(  # noqa: PLR0913
+    urdf: str,
+    description: Description,
+    trials: Sequence[Trial],
+    robot: Clock,
+    hand: HandModel,
+    moved: Moved = AS_SEEN,
 ) -> tuple[DriveTrains, tuple[Verdict, ...], dict[str, LinkLoads]]:
     """The drive trains, the verdicts on them and the loads in the trials used; of joints without link encoders, none.
 
@@ -49,23 +58,27 @@ def fit_drive_trains(
         trials: Calibration trials.
         robot: The robot's clock.
         hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
+        moved: How the base moved in trials in which that is not taken from its markers.
     """
-    bare = DriveTrains(_dynamics(urdf, description, hand), (), urdf, description)
+    offset = _offset(hand)
+    weighed = hung_load(urdf, description, offset, trials)
+    hung, unlikely = (None, (_unlikely(weighed),)) if weighed and weighed.departs > DEPARTS else (weighed, ())
+    bare = DriveTrains(dynamics(urdf, description, offset, hung), (), urdf, description, hung)
     try:
         zero = link_zeros(trials, robot)
     except NotEnoughData as error:
-        return bare, (Verdict(STAGE, "missing", str(error)),), {}
+        return bare, (*unlikely, Verdict(STAGE, "missing", str(error))), {}
     refused = tuple(wrong_links(bare.joints, trials, zero))
     if refused:
         return bare, tuple(Verdict(STAGE, v.verdict, v.message) for v in refused), {}
     used = [trial for trial in trials if is_long(trial)]
-    loads = side_by_side(lambda trial: loads_of_trial(bare, trial, robot, hand), used)
+    loads = side_by_side(lambda trial: loads_of_trial(bare, trial, robot, hand, moved.get(trial.id)), used)
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
     tried = _identified(bare, loads, differences, hand)
     trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))
     slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
-    found = DriveTrains(bare.dynamics, trains, urdf, description)
-    return found, (*slips, *_verdicts(found, hand)), {one.trial_id: one for one in loads}
+    found = replace(bare, trains=trains)
+    return found, (*unlikely, *slips, *_verdicts(found, hand)), {one.trial_id: one for one in loads}
 
 
 def loads_of_trial(
@@ -87,10 +100,10 @@ def loads_of_trial(
     return own.dynamics.loads(trial.id, t, q, base, own.push(t, q, trial.wrist_wrench[rows]))
 
 
-def _dynamics(urdf: str, description: Description, hand: HandModel) -> Dynamics:
+def _offset(hand: HandModel) -> np.ndarray:
     offset = np.zeros(len(hand.chain.measured))
     offset[hand.chain.columns] = hand.offset
-    return dynamics(urdf, description, offset)
+    return offset
 
 
 def _complete(trial: Trial) -> np.ndarray:
@@ -107,7 +120,7 @@ def _identified(
     bare: DriveTrains, loads: Sequence[LinkLoads], differences: Sequence[np.ndarray], hand: HandModel
 ) -> dict[str, DriveTrain | Slip]:
     tolerances = bare.description.tolerances
-    C = inertial_tolerances(bare.dynamics, tolerances.link_mass, tolerances.link_com)
+    C = inertial_tolerances(bare.dynamics, tolerances.link_mass, tolerances.link_com, bare.hung)
     root = np.linalg.cholesky(C + 1e-12 * np.eye(len(C)))
 
     def found(joint: str) -> DriveTrain | Slip | None:
@@ -124,6 +137,14 @@ def _identified(
 
     joints = hand.chain.joints
     return {joint: x for joint, x in zip(joints, side_by_side(found, joints), strict=True) if x is not None}
+
+
+def _unlikely(weighed: HungLoad) -> Verdict:
+    message = (
+        f"the wrist's sensor carries {weighed.links[0]:+.3f} kg beside nominal links and declared payload, more than "
+        "their tolerances let expect: not used; declare what is in the hand, or check the sensor's units and gain"
+    )
+    return Verdict(STAGE, "warning", message)
 
 
 def _slipped(joint: str, slip: Slip) -> Verdict:

@@ -28,6 +28,7 @@ from calibration.recording.schema import Description
 from calibration.robot.laboratory import floating_model
 from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
 from calibration.robot.wrist_sensor import Push
+from calibration.stages.drive_trains.hung_load import HungLoad, inertial_tolerance
 
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second
 _SLOW, _FAST = 5.0, 12.0  # [Hz] of the base's, from markers: at all times, and where it is jolted
@@ -131,10 +132,12 @@ class Dynamics:
         return found
 
 
-def dynamics(urdf: str, description: Description, offset: np.ndarray) -> Dynamics:
-    """The nominal robot of a dataset with its declared payload and the zeros (k,) of its motor readings."""
+def dynamics(urdf: str, description: Description, offset: np.ndarray, hung: HungLoad | None = None) -> Dynamics:
+    """The robot of a dataset with its declared payload, what else hangs there, and the zeros (k,) of its readings."""
     model = floating_model(urdf, description)
     model.gravity = pin.Motion.Zero()
+    if hung is not None:
+        hung.on(model, 0.0 if description.payload is None else description.payload.mass)
     return Dynamics(model, description.joint_names, offset, np.array(description.gravity))
 
 
@@ -144,14 +147,14 @@ def inertials(robot: Dynamics) -> tuple[tuple[str, str], ...]:
     return (*bodies, ("base", "tilt_x"), ("base", "tilt_y"), (robot.model.names[2], "bending"))
 
 
-def inertial_tolerances(robot: Dynamics, mass: float, centre: float) -> np.ndarray:
-    """Covariance (p, p) of dphi: masses to a share `mass` [-], centres of mass to `centre` [m]."""
-    blocks = []
-    for body in robot.model.inertias[2:]:
-        J = np.append(1.0, body.lever)[:, None]
-        C = (mass * body.mass) ** 2 * (J @ J.T)
-        C[1:, 1:] += (centre * body.mass) ** 2 * np.eye(3)
-        blocks.append(C)
+def inertial_tolerances(robot: Dynamics, mass: float, centre: float, hung: HungLoad | None = None) -> np.ndarray:
+    """Covariance (p, p) of dphi: masses to a share `mass`, centres of mass to `centre` [m], but what was weighed."""
+    bodies = [np.append(body.mass, body.mass * body.lever) for body in robot.model.inertias[2:]]
+    if hung is not None:
+        bodies[-1] = bodies[-1] - hung.nominal - hung.added(hung.payload)
+    blocks = [inertial_tolerance(body, mass, centre) for body in bodies]
+    if hung is not None:
+        blocks[-1] = blocks[-1] + hung.uncertain
     return np.asarray(block_diag(*blocks, np.diag([_TILT**2, _TILT**2, _BENDING**2])))
 
 

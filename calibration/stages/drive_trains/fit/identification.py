@@ -94,8 +94,13 @@ def identify(
         doubt=doubt,
         inertials=modes @ fit.problem.modes(fit.theta),
         torque_sigma=torque_sigma(float(fit.problem.train(fit.theta).values[COULOMB])),
+        range=_range(data.means(data.motion.torque)[data.known]),
     )
     return reported(train, fit, chosen.covariance, motor_offset), fit
+
+
+def _range(torque: np.ndarray) -> np.ndarray:
+    return np.array([torque.min(), torque.max()])
 
 
 def torque_sigma(coulomb: float) -> float:

@@ -68,4 +68,4 @@ def test_joints_whose_drive_trains_are_known_are_no_noise_for_others(trains, tri
 
 def test_recordings_without_motion_show_no_drive_train(trains, hand):
     with pytest.raises(NotEnoughData):
-        completed(hand.chain, trains.description, [], shared_clock("robot"), hand, trains)
+        completed(hand.chain, [], shared_clock("robot"), hand, trains)
