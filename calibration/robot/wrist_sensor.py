@@ -7,6 +7,8 @@ and the declared payload, of weight W, along the readings; w_0: mean of f + w in
 nothing pushes. Zeros of encoders, tolerances of masses and a base that shakes left up to 0.39 W on twenty robots that
 nothing pushed: the hand is pushed in trials in which p's force, averaged over 0.4 s, exceeds 0.75 W.
 
+Or else it shows what hangs there besides: linear in a mass and its first moment, see `drive_trains.hung_load`.
+
 f is along the motors. Where joint i's link moves otherwise, p misses I_i times that acceleration about the joint, I_i
 the inertia of what hangs on the sensor. So the link's inertia under the load of p is M_ii - I_i.
 """

@@ -347,3 +347,15 @@ def test_what_is_missing_is_reported(compensator, swing):
     with pytest.raises(NotEnoughData, match="no plate"):
         no_plate.predict(t, q, w, start)
     assert np.isfinite(no_plate.predict(t, q, w).T).all()
+
+
+def test_a_base_that_slips_loads_the_links_as_predicted_where_it_is_measured(result):
+    """Its markers do where it was not identified."""
+    dataset = calibration.load(result.folder / "dataset")
+    entry = dataset.entries("validation", "swing")[0]
+    trial, predict = dataset.read(entry), predictor(result.estimate, dataset)
+    poses = predict.poses(entry, trial)
+    assert poses.geared("measured") is poses.geared("plate")
+    still = replace(predict, bundled=replace(predict.bundled, stick_slip=None)).poses(entry, trial)
+    torques = [still.geared(source).loads.torque for source in ("measured", "fixed")]
+    assert np.abs(np.subtract(*torques)).max() > 0.1

@@ -93,7 +93,7 @@ def fit_bundle(
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
     sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
-    moved = AS_SEEN if suspension is None else _moved(sources, trials, suspension)
+    moved = AS_SEEN if suspension is None else moved_as_predicted(sources, trials, suspension)
     trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, moved)
     bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
     geometry = replace(geometry, name="full")
@@ -113,7 +113,7 @@ def fit_bundle(
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
 
 
-def _moved(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension) -> Moved:
+def moved_as_predicted(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension) -> Moved:
     """The base that sticks and slips as motors and wrench move it, what it does slowly as its markers show it.
 
     Markers do not show how it accelerates. Of trials and robots without such a base, nothing.

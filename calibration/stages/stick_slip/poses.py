@@ -12,6 +12,7 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.numerics.lie import from_vector, inverse, to_vector
 from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
+from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.drive_trains import DriveTrains
@@ -82,8 +83,7 @@ def slipping_base_poses(
     rest = rest_of(sources.lab.description, trial, sources.T_base_B)
     wrenches, links = wrenches_of(sources, trial, rest.T_lab_0), None
     if trains is not None and sources.robot is not None and len(trial.t_robot):
-        lab = sources.lab.of_trial(trial.id)
-        links = Links(lab, trains.of_trial(trial.id), readings_of(lab, sources.robot, trial), rest.T_lab_0)
+        links = links_of(sources.lab, trains, sources.robot, trial, rest.T_lab_0)
     forcing = forced(model, wrenches, source, links)
     moment = forcing.force[:, 2:]
     found = (*model.displacement(forcing), moment, friction_use(model, forcing))
@@ -117,6 +117,14 @@ class Links(NamedTuple):
             planar_twist(t, T_lab_base, self.T_lab_0, at),
         )
         return motion_load(self.lab, at, angles, self.T_lab_0, CUTOFF, push, twist)
+
+
+def links_of(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, T_lab_0: np.ndarray) -> Links:
+    """The links in a whole trial with its payload, and what else loads the hand."""
+    lab, trains = lab.of_trial(trial.id), trains.of_trial(trial.id)
+    readings, known = readings_of(lab, robot, trial), np.isfinite(trial.q_motor).all(axis=1)
+    push = trains.push(readings.t, readings.q, trial.wrist_wrench[known])
+    return Links(lab, trains, readings._replace(push=push), T_lab_0)
 
 
 def planar_twist(t: np.ndarray, T_lab_base: np.ndarray, T_lab_0: np.ndarray, at: np.ndarray) -> np.ndarray | None:

@@ -29,13 +29,12 @@ from calibration.stages.stick_slip.forcing import (
     Tilting,
     heave_apart,
     planar_forcing,
-    readings_of,
     wrenches_of,
 )
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
-from calibration.stages.stick_slip.poses import Links
+from calibration.stages.stick_slip.poses import links_of
 from calibration.stages.stick_slip.search import descended, displaced, tried
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
@@ -114,8 +113,7 @@ def _read(
 
 def _linked(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, rest: Rest) -> Load:
     """Inverse dynamics of links that move with the base as its markers show it."""
-    own = lab.of_trial(trial.id)
-    links = Links(own, trains.of_trial(trial.id), readings_of(own, robot, trial), rest.T_lab_0)
+    links = links_of(lab, trains, robot, trial, rest.T_lab_0)
     T_lab_B = MeasuredTrial.of(lab.description, trial).base.T
     return links.load(trial.t_mocap, T_lab_B @ inverse(rest.T_0_B))
 

@@ -7,6 +7,8 @@ import pytest
 import mjcf
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
+from calibration.robot.laboratory import Laboratory
+from calibration.stages.bundle.stage import moved_as_predicted
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
 from calibration.stages.stick_slip.stage import _behind, _linear, _misplaced
@@ -15,6 +17,7 @@ from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.modal_response import modes_of
 from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.rest_frame import rest_of
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved
 
@@ -207,3 +210,25 @@ def test_a_wheel_that_seems_elsewhere_is_named_with_its_shift():
     assert not list(_misplaced(("left", "right", "front"), shift, 0.05 * gain))
     (found,) = _misplaced(("left", "right", "front"), shift, np.array([30.0, 40.0, 3.0]))
     assert "y, or left stood +12 mm along x" in found.message and "front" not in found.message
+
+
+def test_a_base_moves_slowly_as_its_markers_show_it_and_fast_as_its_wrench_does(recorded, suspension):
+    """What loads the links: 9 Hz that only the markers show are noise, a fifth of a hertz is motion."""
+    shaken, slow, fast = [], 1e-3, 3e-4
+    for trial, _, _ in recorded[:3]:
+        t = trial.t_mocap
+        more = np.zeros((len(t), 6))
+        more[:, 0] = fast * np.sin(2.0 * np.pi * 9.0 * t)
+        more[:, 1] = slow * np.sin(2.0 * np.pi * 0.2 * t) * (t > t[0] + 1.0)
+        shaken.append(moved(trial, more, t))
+    sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
+    found, (trial, x, t) = moved_as_predicted(sources, shaken, suspension), recorded[0]
+    rest = rest_of(DESCRIPTION, shaken[0], sources.T_base_B)
+    at, true = rest.displacement(found[trial.id]), np.interp(trial.t_mocap, t, x[:, 0])
+    middle = (trial.t_mocap > t[0] + 1.5) & (trial.t_mocap < t[-1] - 0.5)
+    assert np.std((at[:, 0] - true)[middle]) < 0.3 * fast / np.sqrt(2.0)
+    drift = at[:, 1] - np.interp(trial.t_mocap, t, x[:, 1])
+    wave = slow * np.sin(2.0 * np.pi * 0.2 * trial.t_mocap)
+    assert np.std((drift - wave)[middle]) < 0.15 * slow / np.sqrt(2.0)
+    none = replace(sources, lab=Laboratory(mjcf.urdf(), rigid_robot.described()))
+    assert moved_as_predicted(none, shaken, suspension) == {}
