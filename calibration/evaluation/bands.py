@@ -5,9 +5,9 @@
     |e| <= radius of 95 %           inside; of |e|^2 as a gamma variable about b, see `hand_uncertainty`
 
 S is the covariance of the hand's local twist in the base: parameters, readings, drive trains, column; V (6,) variances
-of the base's displacement in frame 0, or of its markers' pose where it is measured; a base on wheels that is taken to
-stay has no band without a suspension. Noise of a reference is added. b is from the same source of the base's motion; of
-a base that is taken to stay, from the best that predicts it.
+of the base's displacement in frame 0, or of its markers' pose where it is measured, a mean over a dwell having no white
+noise; a base on wheels that is taken to stay has no band without a suspension. Noise of a reference is added. b is from
+the same source of the base's motion; of a base that is taken to stay, from the best that predicts it.
 """
 
 from collections.abc import Mapping
@@ -50,7 +50,8 @@ class Bands:
         S = {name: np.full((len(q), 6, 6), np.nan) for name in ({self._delivered} & wanted or wanted)}
         for name in S:
             S[name][known] = self._robot(name, entry.payload).predict(trial.t_mocap[known], q[known]).covariance
-        base = poses_of(self.description.base_body, trial).covariance * self.description.sigmas.marker**2
+        noise = 0.0 if entry.kind == "static" else self.description.sigmas.marker**2  # none in the mean of a dwell
+        base = poses_of(self.description.base_body, trial).covariance * noise
         rows = tuple(
             replace(row, covariance=_in_lab(row, S[row.model], base, predicted))
             if row.model in S and row.encoder == "motor" and not self._unknown(row, predicted)

@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter1d
 import calibration
 from calibration import Compensator, load_estimate
 from calibration.errors import InputError, NotEnoughData, ShapeError
+from calibration.evaluation.bands import Bands
 from calibration.mocap.cluster_pose import poses_of
 from calibration.mocap.postures import readings_at
 from calibration.numerics.lie import from_vector, inverse, mean, to_vector
@@ -359,3 +360,17 @@ def test_a_base_that_slips_loads_the_links_as_predicted_where_it_is_measured(res
     still = replace(predict, bundled=replace(predict.bundled, stick_slip=None)).poses(entry, trial)
     torques = [still.geared(source).loads.torque for source in ("measured", "fixed")]
     assert np.abs(np.subtract(*torques)).max() > 0.1
+
+
+def test_white_noise_of_the_base_s_markers_is_not_in_the_band_of_a_dwell(result):
+    dataset = calibration.load(result.folder / "dataset")
+    entry = dataset.entries("validation", "swing")[0]
+    trial, predict = dataset.read(entry), predictor(result.estimate, dataset)
+    bands, predicted = Bands(result.estimate, dataset.description, predict.robot), predict(entry, trial)
+    rows = [
+        {(p.model, p.base): p.covariance for p in bands.on(predicted, e, trial).rows if p.encoder == "motor"}
+        for e in (entry, entry.model_copy(update={"kind": "static"}))
+    ]
+    moving, still = (np.trace(of["full", "measured"], axis1=1, axis2=2) for of in rows)
+    assert np.nanmedian(np.sqrt((moving - still) / 3.0)) == pytest.approx(2e-4, rel=0.5)  # 0.1 mm of a marker, at 0.8 m
+    np.testing.assert_array_equal(*(of["full", "plate"] for of in rows))
