@@ -178,6 +178,7 @@ def test_what_was_weighed_is_no_longer_as_wide_as_the_links_tolerance(weighed):
         np.delete(narrow, range(28, 32), 0)[:, :28], np.delete(wide, range(28, 32), 0)[:, :28]
     )
     assert np.linalg.eigvalsh(narrow).min() > -1e-15
+    assert np.linalg.eigvalsh(narrow[last, last] - weighed.uncertain).min() > -1e-12
 
 
 def test_what_is_added_is_linear_in_the_payload():
