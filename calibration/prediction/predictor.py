@@ -12,7 +12,7 @@ Row `full` has link angles behind its drive trains, the column bent, and the bas
 suspension, where those were identified.
 
 The base's motion from the same source loads the drive trains, predicted where it is `measured`. Of a trial nothing else
-is read: encoders, plate, wrist sensor, base markers of its first second (throughout for `measured`), never the hand.
+is read: encoders, plate, wrist, base markers of its first second (throughout for `measured`), never hand or shoulder.
 """
 
 from collections.abc import Callable, Iterator

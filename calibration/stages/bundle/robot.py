@@ -39,6 +39,7 @@ class BundleParts:
         bending: Of the column.
         stick_slip: The base; None where it was not identified.
         at_rest: (m,) rms error of each train's angle in dwells, by link encoders [rad]; 0 where not known, or empty.
+        hung: What the wrist's sensor weighed beside nominal links and payload; None where nothing was.
     """
 
     trains: tuple[DriveTrain, ...]

@@ -20,7 +20,6 @@ from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import even, interpolate_columns, low_passed
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
-from calibration.robot.hand import HandModel
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.drive_trains.column_bending import rigid
@@ -28,7 +27,7 @@ from calibration.stages.drive_trains.drive_train import Quantity
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.from_markers import completed
 from calibration.stages.drive_trains.geometry_refit import RefittedGeometry
-from calibration.stages.drive_trains.stage import AS_SEEN, Moved, fit_drive_trains
+from calibration.stages.drive_trains.stage import AS_SEEN, Moved, fit_drive_trains, motor_zeros
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
@@ -109,7 +108,7 @@ def fit_bundle(
     if suspension is not None:
         base, more = fit_stick_slip(replace(sources, T_base_B=from_vector(hand.base)), trials, suspension, trains)
         found += more
-    parts = BundleParts(trains.trains, _offsets(hand), bending, base, at_rest, trains.hung)
+    parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, trains.hung)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
 
 
@@ -156,13 +155,6 @@ def _completed(  # noqa: PLR0913
         return completed(lab.chain, trials, robot, hand, trains, loads, moved)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "missing", str(error)),)
-
-
-def _offsets(hand: HandModel) -> np.ndarray:
-    """(k,) zeros of the measured joints [rad, m]."""
-    offset = np.zeros(len(hand.chain.measured))
-    offset[hand.chain.columns] = hand.offset
-    return offset
 
 
 def _moment_sigma(lab: Laboratory) -> float:

@@ -5,8 +5,8 @@
 Y (6, 4): regressor of a mass and its first moment, linear; dphi (4,) of links, the same in all trials; d (3,) how far
 the payload's centre is from where it is declared, m_p its mass in the trial; z the sensor's zero in the trial. Means of
 a second: what links do behind their gears is faster. Each trial's forces and moments weigh by what is left of them; a
-normal prior by the tolerances. Trials in which the hand is pushed are left out. With one payload alone dphi and d are
-told apart by the prior only, their sum is known.
+normal prior by the tolerances. Trials in which the hand is pushed are left out. With one payload alone
+only the sum is known; how it divides into dphi and d is the prior's.
 """
 
 from collections.abc import Sequence

@@ -60,7 +60,7 @@ def fit_drive_trains(  # noqa: PLR0913
         hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
         moved: How the base moved in trials in which that is not taken from its markers.
     """
-    offset = _offset(hand)
+    offset = motor_zeros(hand)
     weighed = hung_load(urdf, description, offset, trials)
     hung, unlikely = (None, (_unlikely(weighed),)) if weighed and weighed.departs > DEPARTS else (weighed, ())
     bare = DriveTrains(dynamics(urdf, description, offset, hung), (), urdf, description, hung)
@@ -100,7 +100,8 @@ def loads_of_trial(
     return own.dynamics.loads(trial.id, t, q, base, own.push(t, q, trial.wrist_wrench[rows]))
 
 
-def _offset(hand: HandModel) -> np.ndarray:
+def motor_zeros(hand: HandModel) -> np.ndarray:
+    """(k,) of the measured joints' readings [rad, m]; 0 of joints that are not on the way to the hand."""
     offset = np.zeros(len(hand.chain.measured))
     offset[hand.chain.columns] = hand.offset
     return offset
