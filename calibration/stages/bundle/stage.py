@@ -14,13 +14,11 @@ import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model, Parameter
-from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import from_vector
-from calibration.numerics.side_by_side import side_by_side
-from calibration.numerics.signals import even, interpolate_columns, low_passed
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
+from calibration.stages.bundle.moved_base import moved_as_predicted
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.drive_trains.column_bending import rigid
 from calibration.stages.drive_trains.drive_train import Quantity
@@ -32,15 +30,12 @@ from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
-from calibration.stages.stick_slip.poses import slipping_base_poses
 from calibration.stages.stick_slip.stage import fit_stick_slip
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Suspension
-from calibration.stages.suspension.rest_frame import rest_of
 from calibration.verdict import Verdict
 
 STAGE = "bundle"
-_SLOWLY = 3.5  # [Hz] below which markers show a base's motion better than a wrench does
 _ERRS = 2e-4  # [rad] random error of readings, in the geometry, that is worth drive trains from markers alone
 
 
@@ -110,30 +105,6 @@ def fit_bundle(
         found += more
     parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, trains.hung)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
-
-
-def moved_as_predicted(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension) -> Moved:
-    """The base that sticks and slips as motors and wrench move it, what it does slowly as its markers show it.
-
-    Markers do not show how it accelerates. Of trials and robots without such a base, nothing.
-    """
-    model, _ = fit_stick_slip(sources, trials, suspension)
-    if model is None:
-        return AS_SEEN
-    source = model.directions[0].source
-
-    def poses(trial: Trial) -> np.ndarray | None:
-        try:
-            x = slipping_base_poses(model, sources, trial, source).motion.x
-            rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-            off = rest.displacement(MeasuredTrial.of(sources.lab.description, trial).base.T) - x
-            slow = low_passed(even(trial.t_mocap, off), _SLOWLY)
-            return rest.poses(x + interpolate_columns(trial.t_mocap, slow.t, slow.x))
-        except NotEnoughData:
-            return None
-
-    found = zip(trials, side_by_side(poses, trials), strict=True)
-    return {trial.id: T_lab_B for trial, T_lab_B in found if T_lab_B is not None}
 
 
 def _completed(  # noqa: PLR0913

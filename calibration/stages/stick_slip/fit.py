@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.stages.stick_slip.band import LeftOut, block_means, ensemble_of, fitted_band, reached
+from calibration.stages.stick_slip.band import Band, LeftOut, block_means, ensemble_of, fitted_band, reached
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.model import Direction
-from calibration.stages.stick_slip.search import FRICTIONS, Point, searched, settled, tried, warmed
+from calibration.stages.stick_slip.search import FRICTIONS, Point, searched, settled, sketched, tried, warmed
 from calibration.stages.stick_slip.wheels import SlipParameters, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source
@@ -127,6 +127,24 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
         found.covariance,
         ensemble,
         band,
+        held_out,
+        by_plate=trials.corrected or source != "plate",
+    )
+
+
+def rough_direction(source: Source, trials: Trials) -> Direction:
+    """Parameters by a shorter search, without their covariance or a band; judged by the trials they are fitted to."""
+    best, _ = sketched(trials)
+    (x,), _ = trials.simulated(best.logarithms[None])
+    seen = np.concatenate([m.valid for m in trials.motions])
+    error = np.where(seen[:, None], trials.measured - block_means(trials, x), np.nan)
+    p, held_out = len(best.logarithms), _held_out(trials, error)
+    return Direction(
+        source,
+        best.logarithms,
+        np.zeros((p, p)),
+        best.logarithms[None],
+        Band(*np.zeros((4, 3))),
         held_out,
         by_plate=trials.corrected or source != "plate",
     )

@@ -87,7 +87,7 @@ def slipping_base_poses(
     forcing = forced(model, wrenches, source, links)
     moment = forcing.force[:, 2:]
     found = (*model.displacement(forcing), moment, friction_use(model, forcing))
-    x, variance, moment, use = (_at(trial.t_mocap, forcing.t, columns) for columns in found)
+    x, variance, moment, use = (interpolate_columns(trial.t_mocap, forcing.t, columns) for columns in found)
     motion = SlippingMotion(x, variance, moment[:, 0], use, model.wheels.names)
     return BasePrediction(rest.poses(x), motion)
 
@@ -181,7 +181,3 @@ def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
     force = rows[:, 2:4] * e + (N - model.wheels.weight)[..., None] * leans
     used, limit = np.linalg.norm(force, axis=2), rows[:, 5] * N
     return np.minimum(np.divide(used, limit, out=np.ones_like(used), where=limit > 0.0), 1.0)
-
-
-def _at(t: np.ndarray, grid: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(t, grid, c) for c in columns.T], axis=1)

@@ -26,7 +26,10 @@ from itertools import combinations, product
 
 import numpy as np
 
-from calibration.stages.stick_slip.likelihood import DIFFERENCE, Trials
+from calibration.stages.stick_slip.forcing import PlanarForcing
+from calibration.stages.stick_slip.likelihood import DIFFERENCE, Trials, joined
+from calibration.stages.stick_slip.measured import PlanarMotion
+from calibration.stages.stick_slip.model import Direction
 from calibration.stages.stick_slip.wheels import NAMES
 
 _LONGEST = 0.7  # step of a logarithm, at most
@@ -38,6 +41,7 @@ _WIDER = np.repeat([1.0, 3.0, 10.0], 16)  # draws about an end, times their sigm
 _VALLEY = 3.0  # by which the cost of another valley is less
 _FIRST, _MOST = 2, 20  # steps of every start, and of the best
 PLACE = 0.05  # [m] standard deviation of a wheel's declared place
+_ELSEWHERE, _SHOWN = 0.009, 3.0  # [m] a wheel may seem off its place; chi-square of two degrees of freedom
 _PLACE_STEP = 0.003  # [m] for derivatives
 _SPREAD = (0.0, -0.5, 1.5)  # of the frictions' logarithms between starts: at the last one hardly a wheel slips
 _SCAN = tuple(np.log([0.6, 0.8, 0.92, 1.15, 1.5]))
@@ -72,12 +76,18 @@ class Point:
 
 def searched(trials: Trials) -> tuple[Point, tuple[float, ...]]:
     """The best point, and the costs to which the starts came."""
+    best, costs = sketched(trials)
+    return shaken(trials, best), costs
+
+
+def sketched(trials: Trials) -> tuple[Point, tuple[float, ...]]:
+    """The same without draws for other valleys."""
     frictions = np.array([float(i in FRICTIONS) for i in range(len(NAMES))])
     points = tried(trials, [trials.prior.mean + s * frictions for s in _SPREAD])
     for _ in range(_FIRST):
         points = [p if p.ended else stepped(trials, p) for p in points]
     best = descended(trials, scanned(trials, min(points, key=lambda p: p.cost)))
-    return shaken(trials, best), tuple(p.cost for p in points)
+    return best, tuple(p.cost for p in points)
 
 
 def warmed(trials: Trials, start: np.ndarray) -> Point:
@@ -206,3 +216,24 @@ def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         shift[w] = -(covariance @ g[own])[n:]
         chi2[w] = shift[w] @ np.linalg.solve(covariance[n:, n:], shift[w])
     return shift, chi2
+
+
+def shifts_of_wheels(
+    campaign: Trials, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], fit: Direction
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shifts (m, 2) [m] and chi-squares (m,) of wheels by the trials that are not wild.
+
+    About the parameters of all trials and of these alone: the less significant one, as one of some trials is chance.
+    """
+    wild = fit.held_out.wild
+    calm = joined(campaign.wheels, [row for row, far in zip(rows, wild, strict=True) if not far], campaign.prior)
+    shift, chi2 = displaced(calm, fit.logarithms)
+    if wild.any() and elsewhere(shift, chi2).any():
+        other, own = displaced(calm, descended(calm, tried(calm, [fit.logarithms])[0]).logarithms)
+        shift, chi2 = np.where((own < chi2)[:, None], other, shift), np.minimum(own, chi2)
+    return shift, chi2
+
+
+def elsewhere(shift: np.ndarray, chi2: np.ndarray) -> np.ndarray:
+    """Whether wheels (m,) seem off their declared places, by shifts (m, 2) [m] and chi-squares (m,)."""
+    return np.asarray((np.abs(shift).max(axis=1) > _ELSEWHERE) & (chi2 > _SHOWN))

@@ -8,7 +8,7 @@
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,7 +35,7 @@ from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.poses import links_of
-from calibration.stages.stick_slip.search import descended, displaced, tried
+from calibration.stages.stick_slip.search import elsewhere, shifts_of_wheels
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
@@ -49,10 +49,26 @@ _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _BETTER = 0.8  # mean square over another's, below which a prediction takes its place: the compliance's of an axis
 _LESS = 0.1  # by which R2 of the plate may be less
-_ELSEWHERE, _SHOWN = 0.009, 3.0  # [m] a wheel may seem off its place; chi-square of two degrees of freedom
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What calibration trials show of the base.
+
+    Attributes:
+        wheels: Of the robot.
+        read: The trials.
+        tilting: Compliance of heave and tilt.
+        by_source: Sources of the wrench that two trials show, the trials by each, and the likelihood of its parameters.
+    """
+
+    wheels: WheelSet
+    read: list[Read]
+    tilting: Tilting
+    by_source: list[tuple[Source, list[tuple[PlanarForcing, PlanarMotion]], Trials]]
 
 
 def fit_stick_slip(
@@ -62,32 +78,47 @@ def fit_stick_slip(
 
     By inverse dynamics of link angles, where drive trains are known.
     """
+    try:
+        campaign = campaign_of(sources, trials, suspension, trains)
+    except NotEnoughData as error:
+        return None, (Verdict(STAGE, "missing", str(error)),)
+    wheels, read, usable = campaign.wheels, campaign.read, campaign.by_source
+    fits: list[Direction] = []
+    for source, _, of_source in usable:
+        fits.append(fit_direction(source, of_source, fits[0].logarithms if fits else None))
+    shift, chi2 = shifts_of_wheels(usable[0][2], usable[0][1], fits[0])
+    if _behind(fits):
+        fits[0] = _uncorrected(fits, usable[0][2])
+    directions = [linear_where(fit, suspension) for fit in fits]
+    directions = [_banded(d, wheels, rows) for d, (_, rows, _) in zip(directions, usable, strict=True)]
+    if len(directions) == len(SOURCES):
+        directions[1] = _heaved(directions[1], wheels, campaign.tilting, read)
+    model = StickSlip(wheels, campaign.tilting, tuple(directions))
+    misplaced = _misplaced(wheels.names, shift, chi2) if directions[0].is_of_wheels else ()
+    names = [one.trial.id for one in read]
+    findings = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
+    return model, findings
+
+
+def campaign_of(
+    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, trains: DriveTrains | None = None
+) -> Campaign:
+    """The trials by their wrenches.
+
+    Raises:
+        NotEnoughData: Too few wheels are declared, or too few trials show the base and its wrench.
+    """
     description = sources.lab.description
     if len(description.wheels) < _LEAST_WHEELS:
-        return None, (Verdict(STAGE, "missing", "no stick-slip base: dataset.json declares no wheels"),)
+        raise NotEnoughData("no stick-slip base: dataset.json declares no wheels")
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials, suspension, trains)
     tilting, prior = tilting_of(sources, read, wheels, suspension)
     by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
     usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
     if not usable:
-        message = "no stick-slip base: it takes two trials that show the base and its wrench"
-        return None, (Verdict(STAGE, "missing", message),)
-    fits: list[Direction] = []
-    for source, _, campaign in usable:
-        fits.append(fit_direction(source, campaign, fits[0].logarithms if fits else None))
-    shift, chi2 = _shifts(usable[0][2], usable[0][1], fits[0])
-    if _behind(fits):
-        fits[0] = _uncorrected(fits, usable[0][2])
-    directions = [_linear(fit, suspension) for fit in fits]
-    directions = [_banded(d, wheels, rows) for d, (_, rows, _) in zip(directions, usable, strict=True)]
-    if len(directions) == len(SOURCES):
-        directions[1] = _heaved(directions[1], wheels, tilting, read)
-    model = StickSlip(wheels, tilting, tuple(directions))
-    misplaced = _misplaced(wheels.names, shift, chi2) if directions[0].is_of_wheels else ()
-    names = [one.trial.id for one in read]
-    findings = (*(_judged(d) for d in directions), *misplaced, *_doubted(directions), *_moved(directions[0], names))
-    return model, findings
+        raise NotEnoughData("no stick-slip base: it takes two trials that show the base and its wrench")
+    return Campaign(wheels, read, tilting, usable)
 
 
 def _read(
@@ -132,7 +163,7 @@ def _rows(
     return [found for found in side_by_side(row, read) if found is not None]
 
 
-def _linear(direction: Direction, suspension: Suspension) -> Direction:
+def linear_where(direction: Direction, suspension: Suspension) -> Direction:
     """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off.
 
     With trials that slipped too far to be predicted and without: what one of them shows is chance, that one slipped is
@@ -184,29 +215,9 @@ def _banded(direction: Direction, wheels: WheelSet, rows: Sequence[tuple[PlanarF
     return replace(direction, plain=plain, heave=heave)
 
 
-def _shifts(
-    campaign: Trials, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], fit: Direction
-) -> tuple[np.ndarray, np.ndarray]:
-    """Shifts (m, 2) [m] and chi-squares (m,) of wheels by the trials that are not wild.
-
-    About the parameters of all trials and of these alone: the less significant one, as one of some trials is chance.
-    """
-    wild = fit.held_out.wild
-    calm = joined(campaign.wheels, [row for row, far in zip(rows, wild, strict=True) if not far], campaign.prior)
-    shift, chi2 = displaced(calm, fit.logarithms)
-    if wild.any() and _elsewhere(shift, chi2).any():
-        other, own = displaced(calm, descended(calm, tried(calm, [fit.logarithms])[0]).logarithms)
-        shift, chi2 = np.where((own < chi2)[:, None], other, shift), np.minimum(own, chi2)
-    return shift, chi2
-
-
-def _elsewhere(shift: np.ndarray, chi2: np.ndarray) -> np.ndarray:
-    return np.asarray((np.abs(shift).max(axis=1) > _ELSEWHERE) & (chi2 > _SHOWN))
-
-
 def _misplaced(names: Sequence[str], shift: np.ndarray, chi2: np.ndarray) -> Iterator[Verdict]:
     """The wheel that the trials put elsewhere, by shifts (m, 2) [m] and their chi-squares (m,); others like it."""
-    far = np.where(_elsewhere(shift, chi2), chi2, 0.0)
+    far = np.where(elsewhere(shift, chi2), chi2, 0.0)
     if far.any():
         likely = [k for k in np.argsort(-far) if far[k] > _ALIKE * far.max()]
         places = (

@@ -8,10 +8,10 @@ import mjcf
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.bundle.stage import moved_as_predicted
+from calibration.stages.bundle.moved_base import moved_as_predicted
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
-from calibration.stages.stick_slip.stage import _behind, _linear, _misplaced
+from calibration.stages.stick_slip.stage import _behind, _misplaced, linear_where
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -125,7 +125,7 @@ def test_a_base_that_was_moved_is_named(recorded, suspension):
     assert [v.message.split(":")[0] for v in said if "was it moved" in v.message] == ["b"]
 
 
-def test_axes_that_the_compliance_predicts_better_are_linear(recorded, suspension):
+def test_axes_that_the_compliance_predicts_better_arelinear_where(recorded, suspension):
     sums = np.ones((3, 6))
     better = (("plate", HeldOut(1e-14 * sums, 1e-6 * sums, 0.0 * sums, np.ones(3))),)
     model, said = fit([r[0] for r in recorded[:3]], replace(suspension, held_out=better), robot=None)
@@ -138,7 +138,7 @@ def test_where_slip_does_not_explain_yaw_the_compliance_need_not_be_better(recor
     as_good = replace(suspension, held_out=(("plate", HeldOut(0.4e-6 * sums, 1e-6 * sums, 0.0 * sums, np.ones(8))),))
     for error, linear in ((0.4e-6, True), (0.1e-6, False)):
         own = HeldOut(error * sums[:, :3], 1e-6 * sums[:, :3], 0.0 * sums[:, :3], np.ones(8))
-        assert np.all(_linear(replace(direction, held_out=own), as_good).linear == linear)
+        assert np.all(linear_where(replace(direction, held_out=own), as_good).linear == linear)
 
 
 def test_an_axis_that_is_linear_from_dynamics_alone_speaks_against_no_plate(recorded, suspension):
@@ -157,7 +157,7 @@ def test_where_yaw_is_linear_no_wheel_slides_along_x_or_y(recorded, suspension):
     own = np.concatenate([np.repeat([[0.1e-6, 0.1e-6, 1e-7]], 7, axis=0), np.full((1, 3), 1e-5)])
     found = replace(direction, held_out=HeldOut(own, 1e-6 * sums[:, :3], 1e-10 * sums[:, :3], count))
     assert found.held_out.wild.tolist() == [False] * 7 + [True]
-    assert _linear(found, tried).linear.all()
+    assert linear_where(found, tried).linear.all()
 
 
 def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
@@ -178,7 +178,7 @@ def test_trials_that_slipped_too_far_decide_where_slip_explains_none(recorded, s
     for left, linear in ((0.5e-6, True), (0.1e-6, False)):  # of the others: they are explained by half, or well
         error = np.concatenate([left * sums[:7, :3], 1e-4 * sums[:1, :3]])
         own = HeldOut(error, 1e-6 * sums[:, :3], 1e-10 * sums[:, :3], count)
-        assert np.all(_linear(replace(direction, held_out=own), fair).linear == linear)
+        assert np.all(linear_where(replace(direction, held_out=own), fair).linear == linear)
 
 
 def test_what_is_missing_is_named(recorded, suspension):
