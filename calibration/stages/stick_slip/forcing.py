@@ -16,14 +16,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calibration.errors import NotEnoughData
-from calibration.numerics.signals import RATE, Signal, interpolate_columns
+from calibration.numerics.signals import RATE, Signal
 from calibration.recording.clock import Clock
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.wrist_sensor import Push, hand_push
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
 from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
-from calibration.stages.stick_slip.kernel.lifted import borne
+from calibration.stages.stick_slip.kernel.lifted import on_wheels, vertical
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import Forcing, WrenchSources, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, composite_inertia, motion_load, plate_load
@@ -84,12 +84,20 @@ class Tilting:
         C: (6, 6) damping.
         off: (2,) how far the plate seems from its declared place under the base [m], see `standing.plate_place`.
         shares: (2,) of the load that drives and back casters bear, relative to front casters [-].
+        over: (2,) the same as `off` of where inverse dynamics have the weight [m].
     """
 
     K: np.ndarray
     C: np.ndarray
     off: np.ndarray = field(default_factory=lambda: np.zeros(2))
     shares: np.ndarray = field(default_factory=lambda: np.ones(2))
+    over: np.ndarray = field(default_factory=lambda: np.zeros(2))
+
+    def placed(self, load: Load) -> Load:
+        """A load of inverse dynamics with the weight where the wheels bear it: moments are less by `over` -Fz."""
+        x = load.signal.x.copy()
+        x[:, 4], x[:, 3] = x[:, 4] + x[:, 2] * self.over[0], x[:, 3] - x[:, 2] * self.over[1]
+        return replace(load, signal=replace(load.signal, x=x))
 
     def leans(self, load: np.ndarray) -> np.ndarray:
         """(rx, ry) [rad] from the vertical under a load (-Fz, My, -Mx) at rest, by springs of the same length."""
@@ -180,18 +188,14 @@ def wheels_of(lab: Laboratory) -> WheelSet:
     return wheel_set(lab.urdf, lab.description.wheels, float(np.linalg.norm(lab.description.gravity)))
 
 
-def vertical(wrench: np.ndarray) -> np.ndarray:
-    """(-Fz, My, -Mx) (n, 3) of wrenches (n, 6)."""
-    return np.asarray(wrench[:, (2, 4, 3)] * (-1.0, 1.0, -1.0))
-
-
 def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> PlanarForcing:
     """The forcing by the plate with inverse dynamics, or by inverse dynamics alone.
 
     Raises:
         NotEnoughData: The wrench asked for was not recorded.
     """
-    main, dynamics = wrenches.plate if source == "plate" else wrenches.inverse_dynamics, wrenches.inverse_dynamics
+    dynamics = None if wrenches.inverse_dynamics is None else tilting.placed(wrenches.inverse_dynamics)
+    main = wrenches.plate if source == "plate" else dynamics
     if main is None:
         what = "force plate" if source == "plate" else "encoder readings"
         raise NotEnoughData(f"{wrenches.trial_id}: no {what} on a known clock")
@@ -221,13 +225,6 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:] + tilting.leans(drive[rest, 3:6].mean(axis=0))
     own = slice(STEPS - 1, None, STEPS)
     return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[own], rest[own], linear(t))
-
-
-def on_wheels(load: Load, standing: np.ndarray, slid: Signal | None) -> Load:
-    """A plate's load as the wheels bear it, rows (m, 10), of a base that has slid."""
-    t, x = load.signal.t, load.signal.x
-    moved = None if slid is None else interpolate_columns(t, slid.t, slid.x)
-    return replace(load, signal=replace(load.signal, x=borne(standing, x, moved)))
 
 
 def _compliant(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) -> tuple[np.ndarray, np.ndarray]:
@@ -263,7 +260,7 @@ def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases | None) -> np
     load = wrenches.inverse_dynamics
     if load is None or wrenches.plate is None:
         return None
-    found, _ = _swayed(replace(wrenches, slid=None, slips=slips), tilting, "dynamics", load)
+    found, _ = _swayed(replace(wrenches, slid=None, slips=slips), tilting, "dynamics", tilting.placed(load))
     t, compliant = _compliant(wrenches, tilting, "plate", wrenches.plate)
     inside = (t >= found.x[0]) & (t <= found.x[-1])
     h = compliant[inside][:, HEAVE]

@@ -9,30 +9,38 @@ seems from its declared place; body i has its nominal mass m_i and centre of mas
 dm_i and dc_i. All of them normal: o as a marker body is on its link, links as `Tolerances` has them; the centre of mass
 of the root, which stands as it was built, to 2 mm. Postures tell the links' masses from the plate's place.
 
-The suspension's compliance has springs that pull. Where wheels lift off in calibration trials, z, rx, ry are fitted
-again under the wrench that is as if they could (`kernel.lifted`), by rounds until K stays: it says how wheels share the
-load, and so when one lifts off.
+The suspension's compliance has springs that pull. Where wheels lift off in calibration trials, z, rx, ry follow the
+wrench that is as if they could (`kernel.lifted`), on vertical springs k of three types of wheels. When one lifts off
+depends on the plate's place, too: 2 mm of 730 N lift a caster, or do not. So both are found together,
+
+    min sum_t (h(k, o) - h)' S^-2 (h(k, o) - h) / c + prior        K = sum_i k_i a_i a_i',  a_i = (1, y_i, -x_i)
+
+h are heave and tilt, S the markers' noise; c samples hang together.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import least_squares
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.side_by_side import side_by_side
-from calibration.recording.schema import Tolerances
+from calibration.numerics.signals import interpolate_columns
+from calibration.recording.schema import Description, Tolerances
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.stick_slip.forcing import HEAVE, Tilting, Wrenches, on_wheels, vertical
-from calibration.stages.stick_slip.wheels import WIDE, Prior, WheelSet, prior_by_tilt
-from calibration.stages.suspension.base_response import BaseResponse, WrenchSources, base_response_of
-from calibration.stages.suspension.compliance_fit import fit_compliance
+from calibration.stages.stick_slip.forcing import HEAVE, Tilting, Wrenches
+from calibration.stages.stick_slip.kernel.lifted import on_wheels, vertical
+from calibration.stages.stick_slip.wheels import LENGTH, LOADS, PRIOR_SIGMA, WIDE, Prior, WheelSet, prior_by_tilt
+from calibration.stages.suspension.base_response import BaseResponse, WrenchSources, base_response_of, forcing_of
 from calibration.stages.suspension.floor_wrench import Load, root_in_base
+from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
-from calibration.stages.suspension.wheels import wheel_model
 
 SOURCES: tuple[Source, ...] = ("plate", "dynamics")
 
@@ -42,7 +50,9 @@ _FEWEST = 20  # readings in it
 _FEWEST_TRIALS = 2
 _FORCE, _LEVER = 2.0, 3e-4  # [N], [m] of the weight: what a second at rest leaves unexplained
 _LIFTED = 0.01  # share of the samples in which a wheel is off the floor
-_ROUNDS, _SAME = 6, 0.01  # fits at most, and by how much the last one still changes the stiffness in tilt
+_TOGETHER, _LOST = 25, 1e3  # samples that err alike; what a base that does not settle is off [noise]
+_STEP, _SAME = 0.02, 1e-4  # of logarithms and LENGTH, for derivatives; share of them that a last step changes
+_PLACED = 5e-4  # [m] to which the plate's place is known at best
 
 
 @dataclass(frozen=True)
@@ -58,21 +68,17 @@ def tilting_of(
     sources: WrenchSources, read: Sequence[Read], wheels: WheelSet, suspension: Suspension
 ) -> tuple[Tilting, Prior]:
     """Heave and tilt by calibration trials, and the prior of how wheels share the load, by the tilt where it shows."""
-    off, place = plate_place(sources, read)
+    off, place, seems = plate_place(sources, read)
     tilts = any(suspension.moves(source)[[*HEAVE[1:]]].all() for source in SOURCES)
     prior = _prior(wheels, suspension.K, place) if tilts else WIDE
-    tilting = Tilting(suspension.K, suspension.C, off, prior.shares)
-    loads = [(one, sources.plate_load(one.trial, one.rest.T_lab_0)) for one in read if one.wrenches.plate is not None]
-    for _ in range(_ROUNDS if tilts else 0):
+    tilting = Tilting(suspension.K, suspension.C, off, prior.shares, off - seems)
+    if tilts:
         standing = tilting.standing(wheels, "plate")
-        found = _lifting_compliance(sources, loads, standing, tilting)
-        if found is None:
-            break
-        change = np.abs(np.diag(found[0]) / np.diag(tilting.K) - 1.0)[[*HEAVE[1:]]].max()
-        prior = _prior(wheels, found[0], place)
-        tilting = Tilting(*found, off, prior.shares)
-        if change < _SAME:
-            break
+        loads = [
+            (one, sources.plate_load(one.trial, one.rest.T_lab_0)) for one in read if one.wrenches.plate is not None
+        ]
+        if len(loads) >= _FEWEST_TRIALS and np.mean([_lifted(standing, load) for _, load in loads]) > _LIFTED:
+            return _on_springs(sources.lab.description, loads, wheels, tilting, place)
     return tilting, prior
 
 
@@ -86,34 +92,66 @@ def _lifted(standing: np.ndarray, load: Load) -> float:
     return float((N < 0.0).any(axis=1).mean())
 
 
-def _lifting_compliance(
-    sources: WrenchSources, loads: Sequence[tuple[Read, Load]], standing: np.ndarray, before: Tilting
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """K and C (6, 6), those of z, rx, ry fitted to what wheels, rows (m, 10), bear of the plate's loads.
+def _on_springs(
+    description: Description, loads: Sequence[tuple[Read, Load]], wheels: WheelSet, linear: Tilting, place: np.ndarray
+) -> tuple[Tilting, Prior]:
+    """Heave and tilt on springs that do not pull, and the prior of how wheels share the load.
 
-    None where hardly one lifts off.
+    Args:
+        description: Of the dataset.
+        loads: Of the plate, by trial.
+        wheels: Of the robot.
+        linear: On springs that pull.
+        place: (2,) sigma of the plate's place [m].
     """
+    h, K, rocked = np.ix_(HEAVE, HEAVE), linear.K.copy(), []
+    for one, load in loads:
+        with suppress(NotEnoughData):
+            rocked.append(_Rocked(one, load, base_response_of(description, one.trial, one.rest, load)))
 
-    def response(one: Read, load: Load) -> BaseResponse | None:
-        load = on_wheels(load, standing, one.wrenches.slid)
-        try:
-            return base_response_of(sources.lab.description, one.trial, one.rest, load)
-        except NotEnoughData:
-            return None
+    def residuals(theta: np.ndarray) -> np.ndarray:
+        k, off = np.exp(theta[:3]), theta[3:] * LENGTH
+        K[h] = wheels.tilting(k, off)
+        standing = wheels.standing(k[[0, 2]] / k[1], off)
+        left = side_by_side(lambda one: one.left(K, linear.C, standing), rocked)
+        ratios, moved = theta[[0, 2]] - theta[1], off - linear.off
+        return np.concatenate([*left, ratios / PRIOR_SIGMA[LOADS], moved / place])
 
-    if len(loads) < _FEWEST_TRIALS or np.mean([_lifted(standing, load) for _, load in loads]) < _LIFTED:
-        return None
-    responses = [one for one in side_by_side(response, *zip(*loads, strict=True)) if one is not None]
-    if len(responses) < _FEWEST_TRIALS:
-        return None
-    fitted = fit_compliance(responses, wheel_model(sources.lab.description.wheels, "contact").couples)
-    h, K, C = np.ix_(HEAVE, HEAVE), before.K.copy(), before.C.copy()
-    K[h], C[h] = fitted.K[h], fitted.C[h]
-    return K, C
+    def jacobian(theta: np.ndarray) -> np.ndarray:
+        at = residuals(theta)
+        return np.stack([(residuals(theta + own) - at) / _STEP for own in _STEP * np.eye(len(theta))], axis=1)
+
+    k = np.array([linear.shares[0], 1.0, linear.shares[1]])
+    k *= linear.K[3, 3] / wheels.tilting(k)[1, 1]
+    start = np.append(np.log(k), linear.off / LENGTH)
+    found = least_squares(residuals, start, jac=jacobian, method="lm", ftol=1e-3, xtol=_SAME)
+    residuals(found.x)
+    sigma = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[3:] * LENGTH
+    prior = _prior(wheels, K, np.hypot(sigma, _PLACED))
+    off = found.x[3:] * LENGTH
+    return Tilting(K, linear.C, off, prior.shares, off - linear.off + linear.over), prior
 
 
-def plate_place(sources: WrenchSources, read: Sequence[Read]) -> tuple[np.ndarray, np.ndarray]:
+class _Rocked(NamedTuple):
+    """A trial's load, and what its markers show under it."""
+
+    one: Read
+    load: Load
+    seen: BaseResponse
+
+    def left(self, K: np.ndarray, C: np.ndarray, standing: np.ndarray) -> np.ndarray:
+        """Predicted less measured heave and tilt (3 n,) [noise], 0 where not measured."""
+        forcing = forcing_of(on_wheels(self.load, standing, self.one.wrenches.slid), self.one.wrenches.start)
+        x = interpolate_columns(self.seen.forcing.t, forcing.t, predicted(K, C, forcing)[:, HEAVE])
+        noise = np.sqrt(_TOGETHER * self.seen.noise[[*HEAVE]])
+        off = np.where(self.seen.valid[:, None], x - self.seen.x[:, HEAVE], 0.0)
+        return np.asarray(np.nan_to_num(off / noise, posinf=_LOST, neginf=-_LOST).ravel())
+
+
+def plate_place(sources: WrenchSources, read: Sequence[Read]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """How far (2,) [m] the plate seems from its declared place under the base, and sigma (2,); 0 without readings.
+
+    And how far it seems by the nominal robot, were its links what they nominally are.
 
     Args:
         sources: The nominal robot and the clock of its readings.
@@ -124,7 +162,7 @@ def plate_place(sources: WrenchSources, read: Sequence[Read]) -> tuple[np.ndarra
         own = lab.of_trial(one.trial.id)
         rows += [(*weighed(own, q, v), v - u) for q, v, u in _seconds(sources, one.trial, one.wrenches)]
     if not rows:
-        return np.zeros(2), np.full(2, lab.description.tolerances.body_translation)
+        return np.zeros(2), np.full(2, lab.description.tolerances.body_translation), np.zeros(2)
     A, b = (np.concatenate(column) for column in ([np.hstack(row[:2]) for row in rows], [row[2] for row in rows]))
     weight = np.mean([row[1][1, 0] for row in rows])
     noise = np.tile([_FORCE, _LEVER * weight, _LEVER * weight], len(rows))
@@ -132,7 +170,7 @@ def plate_place(sources: WrenchSources, read: Sequence[Read]) -> tuple[np.ndarra
     A = A * sigma / noise[:, None]
     covariance = np.linalg.inv(A.T @ A + np.eye(len(sigma)))
     found, left = sigma * (covariance @ A.T @ (b / noise)), sigma * np.sqrt(np.diag(covariance))
-    return found[-2:], left[-2:]
+    return found[-2:], left[-2:], np.mean([row[2] for row in rows], axis=0)[1:] / weight
 
 
 def weighed(lab: Laboratory, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -37,7 +37,7 @@ _ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 2))
 _KNOWN = np.array([0.3, 0.03, 0.05, 0.04])  # sigmas of the elements: heave hardly moves
 _MODEL = 0.05  # of a logarithm: loads are shared by more than springs
 _TYPES = ("drive", "front", "back")
-_LOADS = [NAMES.index("drive_load"), NAMES.index("back_load")]
+LOADS = [NAMES.index("drive_load"), NAMES.index("back_load")]
 _ALIKE, _IN_PLACE = np.ones(2), np.zeros(2)
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
 
@@ -60,7 +60,7 @@ class Prior:
     @property
     def shares(self) -> np.ndarray:
         """(2,) of the load that drives and back casters bear, relative to front casters [-]."""
-        return np.asarray(np.exp(self.mean[_LOADS]))
+        return np.asarray(np.exp(self.mean[LOADS]))
 
     @cached_property
     def information(self) -> np.ndarray:
@@ -207,6 +207,12 @@ class WheelSet:
         n, G = placed.loads(*shares)
         return np.ascontiguousarray(np.column_stack([placed.position, np.zeros((len(n), 4)), n, G]))
 
+    def tilting(self, k: np.ndarray, off: np.ndarray = _IN_PLACE) -> np.ndarray:
+        """K (3, 3) of z, rx, ry by vertical springs k (3,) of drives, front and back casters [N/m, N, N.m/rad]."""
+        x, y = (self.position + off).T
+        a = np.stack([np.ones(len(x)), y, -x])
+        return np.asarray(a * self._typed(*k[:, None])[0] @ a.T)
+
     def stiffness(self, p: SlipParameters) -> np.ndarray:
         """K_0 (3, 3) of x, y, yaw where every wheel sticks [N/m, N, N.m/rad]."""
         K = np.zeros((3, 3))
@@ -238,7 +244,7 @@ def prior_by_tilt(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
     A = np.stack([(part.T @ part)[rows, columns] for part in own], axis=1) / (size * _KNOWN)[:, None]
     b = K[rows, columns] / (size * _KNOWN)
     ratios = np.array([[1.0, -1.0, 0.0], [0.0, -1.0, 1.0]])
-    weighted = ratios / PRIOR_SIGMA[_LOADS][:, None]
+    weighted = ratios / PRIOR_SIGMA[LOADS][:, None]
 
     def residuals(log_k: np.ndarray) -> np.ndarray:
         return np.concatenate([A @ np.exp(log_k) - b, weighted @ log_k])
@@ -250,7 +256,7 @@ def prior_by_tilt(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
     found = least_squares(residuals, start, jac=jacobian, method="lm")
     covariance = ratios @ np.linalg.pinv(found.jac.T @ found.jac) @ ratios.T
     mean, sigma = PRIOR.copy(), PRIOR_SIGMA.copy()
-    mean[_LOADS], sigma[_LOADS] = ratios @ found.x, np.sqrt(np.diag(covariance) + _MODEL**2)
+    mean[LOADS], sigma[LOADS] = ratios @ found.x, np.sqrt(np.diag(covariance) + _MODEL**2)
     sigma[LOGARITHMS:] = place / LENGTH
     return Prior(mean, sigma)
 

@@ -8,10 +8,14 @@ J is found by trying. Where fewer than three wheels are left, the base tips over
 A force plate stands still: about a base that has slid by (x, y, yaw) its moments are R(yaw)' ((My, -Mx) + Fz (x, y)).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from calibration.numerics.compiled import njit
+from calibration.numerics.signals import Signal, interpolate_columns
 from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, WHEEL, E
+from calibration.stages.suspension.floor_wrench import Load
 
 _LEGS = 3
 
@@ -76,6 +80,18 @@ def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
     c = pulled(rows, p)
     for k in range(3):
         s[at + k * LANES] += c[k]
+
+
+def vertical(wrench: np.ndarray) -> np.ndarray:
+    """(-Fz, My, -Mx) (n, 3) of wrenches (n, 6)."""
+    return np.asarray(wrench[:, (2, 4, 3)] * (-1.0, 1.0, -1.0))
+
+
+def on_wheels(load: Load, standing: np.ndarray, slid: Signal | None) -> Load:
+    """A plate's load as the wheels bear it, rows (m, 10), of a base that has slid."""
+    t, x = load.signal.t, load.signal.x
+    moved = None if slid is None else interpolate_columns(t, slid.t, slid.x)
+    return replace(load, signal=replace(load.signal, x=borne(standing, x, moved)))
 
 
 def borne(standing: np.ndarray, wrench: np.ndarray, slid: np.ndarray | None = None) -> np.ndarray:

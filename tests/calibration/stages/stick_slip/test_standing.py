@@ -6,7 +6,8 @@ import pinocchio as pin
 import mjcf
 from calibration.numerics.signals import Signal
 from calibration.recording.clock import Clock
-from calibration.stages.stick_slip.forcing import Wrenches
+from calibration.stages.stick_slip.forcing import Tilting, Wrenches
+from calibration.stages.stick_slip.kernel.lifted import vertical
 from calibration.stages.stick_slip.measured import slid
 from calibration.stages.stick_slip.standing import Read, plate_place, tilting_of, weighed
 from calibration.stages.stick_slip.wheels import wheel_set
@@ -86,9 +87,9 @@ def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     postures = rigid_robot.random_angles(rng, 12)
     trial, wrench = stood(postures, masses, OFF)
-    many, known = plate_place(sources, [Read(trial, REST, wrench)])
+    many, known, _ = plate_place(sources, [Read(trial, REST, wrench)])
     trial, wrench = stood(np.repeat(postures[:1], 12, axis=0), masses, OFF)
-    one, unknown = plate_place(sources, [Read(trial, REST, wrench)])
+    one, unknown, _ = plate_place(sources, [Read(trial, REST, wrench)])
     assert np.linalg.norm(many - OFF) < 0.7e-3
     assert np.linalg.norm(one - OFF) > 2e-3
     assert np.all(np.abs(many - OFF) < 2.0 * known) and np.all(known < unknown)
@@ -133,8 +134,11 @@ def pressed(wheels, p):
     return np.array(found)
 
 
-def rocked(wheels, amplitude, far, rng):
-    """A trial of a base that rocks on SPRINGS, a share of the seconds with casters off the floor, and slides `far`."""
+def rocked(wheels, amplitude, far, rng, off=(0.0, 0.0)):
+    """A trial of a base that rocks on SPRINGS, a share of the seconds with casters off the floor, and slides `far`.
+
+    The wheels are `off` [m] of where the base's markers have them: loads and heave are about another origin.
+    """
     motor = rigid_robot.swing(np.zeros(8), np.full(8, 0.3), 12.0)
     trial = rigid_robot.record(STILL, motor, 0.0, rng, plate=False)
     t = trial.t_plate
@@ -150,6 +154,8 @@ def rocked(wheels, amplitude, far, rng):
     w[:, (0, 1, 5)], w[:, 2] = 20.0 * swing * amplitude, -p[:, 0]
     w[:, 4] = pitching - yaw * rolling + p[:, 0] * slides[:, 0]
     w[:, 3] = -(rolling + yaw * pitching + p[:, 0] * slides[:, 1])
+    w[:, 4], w[:, 3] = w[:, 4] + p[:, 0] * off[0], w[:, 3] - p[:, 0] * off[1]
+    x[:, 2] += x[:, 4] * off[0] - x[:, 3] * off[1]
     x[:, (0, 1, 5)] = w[:, (0, 1, 5)] / PLANE + slides
     in_lab = w @ pin.SE3(T_LAB_BASE).dualAction.T
     return replace(moved(trial, x, t), plate_wrench=in_lab[:, None])
@@ -159,11 +165,11 @@ def on_springs(K, C, tried):
     return Suspension("compliance", K, C, np.zeros((6, 6)), np.zeros((6, 6)), (("plate", tried),), (), ())
 
 
-def rocking(amplitude, far=(0.0, 0.0, 0.0), seen_to_slide=True):
-    """Tilting, as fitted with springs that pull and as `tilting_of` has it, and the springs' own K."""
+def rocking(amplitude, far=(0.0, 0.0, 0.0), seen_to_slide=True, off=(0.0, 0.0)):
+    """K as fitted with springs that pull, what `tilting_of` has, and the springs' own K."""
     sources, rng = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE), np.random.default_rng(2)
     wheels = wheel_set(mjcf.urdf(), DESCRIPTION.wheels, G)
-    trials = [replace(rocked(wheels, amplitude, np.array(far), rng), id=name) for name in "abcd"]
+    trials = [replace(rocked(wheels, amplitude, np.array(far), rng, off), id=name) for name in "abcd"]
     rests = [rest_of(DESCRIPTION, trial, sources.T_base_B) for trial in trials]
     loads = [sources.plate_load(trial, rest.T_lab_0) for trial, rest in zip(trials, rests, strict=True)]
     seen = [base_response_of(DESCRIPTION, *one) for one in zip(trials, rests, loads, strict=True)]
@@ -177,23 +183,38 @@ def rocking(amplitude, far=(0.0, 0.0, 0.0), seen_to_slide=True):
     wrenches = [Wrenches("a", 0.0, load, None, *none, slid=own) for load, own in zip(loads, slides, strict=True)]
     read = [Read(*one) for one in zip(trials, rests, wrenches, strict=True)]
     a = np.column_stack([np.ones(len(SPRINGS)), wheels.position[:, 1], -wheels.position[:, 0]])
-    return linear.K, tilting_of(sources, read, wheels, suspension)[0].K, a.T @ (SPRINGS[:, None] * a)
+    return linear.K, tilting_of(sources, read, wheels, suspension)[0], a.T @ (SPRINGS[:, None] * a)
 
 
 def test_casters_that_lift_off_do_not_make_the_base_softer():
     linear, found, springs = rocking(0.85)
     assert linear[4, 4] < 0.8 * springs[2, 2]
-    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
-    np.testing.assert_array_equal(found[[0, 1, 5]], linear[[0, 1, 5]])
+    np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.02)
+    np.testing.assert_array_equal(found.K[[0, 1, 5]], linear[[0, 1, 5]])
+
+
+def test_casters_that_lift_off_show_where_the_wheels_are():
+    _, found, springs = rocking(0.85, off=(4e-3, -2e-3))
+    np.testing.assert_allclose(found.off, [4e-3, -2e-3], atol=5e-4)
+    np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.03)
+    np.testing.assert_allclose(found.over - found.off, 0.0, atol=1e-12)  # there is no other robot to compare it with
+
+
+def test_a_load_of_inverse_dynamics_is_where_the_wheels_bear_it():
+    x = np.tile([10.0, 20.0, -700.0, 4.0, -3.0, 2.0], (3, 1))
+    load = Load(Signal(np.arange(3.0), x, np.ones(3, dtype=bool)), np.zeros((6, 6)), 730.0, np.zeros(3), np.eye(4))
+    moved = Tilting(np.eye(6), np.eye(6), over=np.array([2e-3, -1e-3])).placed(load).signal.x
+    np.testing.assert_allclose(vertical(moved)[0], vertical(x)[0] - 700.0 * np.array([0.0, 2e-3, -1e-3]))
+    np.testing.assert_array_equal(moved[:, [0, 1, 2, 5]], x[:, [0, 1, 2, 5]])
 
 
 def test_casters_that_lift_off_a_base_that_slides_do_not_either():
     """A plate stands still: 730 N that are 6 mm from where they were make 4 N.m."""
     far = (6e-3, -4e-3, 0.03)
     _, found, springs = rocking(0.8, far)
-    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
+    np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.02)
     _, other, _ = rocking(0.8, far, seen_to_slide=False)
-    assert np.abs(np.diag(other)[3:5] / np.diag(springs)[1:] - 1.0).max() > 0.1
+    assert np.abs(np.diag(other.K)[3:5] / np.diag(springs)[1:] - 1.0).max() > 0.1
 
 
 def test_markers_show_how_far_a_base_has_slid():
@@ -211,5 +232,5 @@ def test_markers_show_how_far_a_base_has_slid():
 
 def test_where_no_wheel_lifts_off_the_compliance_stays():
     linear, found, springs = rocking(0.2)
-    np.testing.assert_array_equal(found, linear)
-    np.testing.assert_allclose(np.diag(found)[3:5], np.diag(springs)[1:], rtol=0.02)
+    np.testing.assert_array_equal(found.K, linear)
+    np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.02)
