@@ -72,13 +72,13 @@ def tilting_of(
     tilts = any(suspension.moves(source)[[*HEAVE[1:]]].all() for source in SOURCES)
     prior = _prior(wheels, suspension.K, place) if tilts else WIDE
     tilting = Tilting(suspension.K, suspension.C, off, prior.shares, off - seems)
-    if tilts:
-        standing = tilting.standing(wheels, "plate")
-        loads = [
-            (one, sources.plate_load(one.trial, one.rest.T_lab_0)) for one in read if one.wrenches.plate is not None
-        ]
-        if len(loads) >= _FEWEST_TRIALS and np.mean([_lifted(standing, load) for _, load in loads]) > _LIFTED:
-            return _on_springs(sources.lab.description, loads, wheels, tilting, place)
+    standing = tilting.standing(wheels, "plate")
+    shown = [one for one in read if tilts and one.wrenches.plate is not None]
+    loads = [sources.plate_load(one.trial, one.rest.T_lab_0) for one in shown]
+    if loads and np.mean([_lifted(standing, load) for load in loads]) > _LIFTED:
+        rocked = _rocked(sources.lab.description, shown, loads)
+        if len(rocked) >= _FEWEST_TRIALS:
+            return _on_springs(rocked, wheels, tilting, place)
     return tilting, prior
 
 
@@ -90,46 +90,6 @@ def _lifted(standing: np.ndarray, load: Load) -> float:
     """Share of the samples of a plate's load in which a wheel, rows (m, 10), is off the floor."""
     N = standing[:, 6] + vertical(load.signal.x) @ standing[:, 7:10].T
     return float((N < 0.0).any(axis=1).mean())
-
-
-def _on_springs(
-    description: Description, loads: Sequence[tuple[Read, Load]], wheels: WheelSet, linear: Tilting, place: np.ndarray
-) -> tuple[Tilting, Prior]:
-    """Heave and tilt on springs that do not pull, and the prior of how wheels share the load.
-
-    Args:
-        description: Of the dataset.
-        loads: Of the plate, by trial.
-        wheels: Of the robot.
-        linear: On springs that pull.
-        place: (2,) sigma of the plate's place [m].
-    """
-    h, K, rocked = np.ix_(HEAVE, HEAVE), linear.K.copy(), []
-    for one, load in loads:
-        with suppress(NotEnoughData):
-            rocked.append(_Rocked(one, load, base_response_of(description, one.trial, one.rest, load)))
-
-    def residuals(theta: np.ndarray) -> np.ndarray:
-        k, off = np.exp(theta[:3]), theta[3:] * LENGTH
-        K[h] = wheels.tilting(k, off)
-        standing = wheels.standing(k[[0, 2]] / k[1], off)
-        left = side_by_side(lambda one: one.left(K, linear.C, standing), rocked)
-        ratios, moved = theta[[0, 2]] - theta[1], off - linear.off
-        return np.concatenate([*left, ratios / PRIOR_SIGMA[LOADS], moved / place])
-
-    def jacobian(theta: np.ndarray) -> np.ndarray:
-        at = residuals(theta)
-        return np.stack([(residuals(theta + own) - at) / _STEP for own in _STEP * np.eye(len(theta))], axis=1)
-
-    k = np.array([linear.shares[0], 1.0, linear.shares[1]])
-    k *= linear.K[3, 3] / wheels.tilting(k)[1, 1]
-    start = np.append(np.log(k), linear.off / LENGTH)
-    found = least_squares(residuals, start, jac=jacobian, method="lm", ftol=1e-3, xtol=_SAME)
-    residuals(found.x)
-    sigma = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[3:] * LENGTH
-    prior = _prior(wheels, K, np.hypot(sigma, _PLACED))
-    off = found.x[3:] * LENGTH
-    return Tilting(K, linear.C, off, prior.shares, off - linear.off + linear.over), prior
 
 
 class _Rocked(NamedTuple):
@@ -144,8 +104,54 @@ class _Rocked(NamedTuple):
         forcing = forcing_of(on_wheels(self.load, standing, self.one.wrenches.slid), self.one.wrenches.start)
         x = interpolate_columns(self.seen.forcing.t, forcing.t, predicted(K, C, forcing)[:, HEAVE])
         noise = np.sqrt(_TOGETHER * self.seen.noise[[*HEAVE]])
-        off = np.where(self.seen.valid[:, None], x - self.seen.x[:, HEAVE], 0.0)
-        return np.asarray(np.nan_to_num(off / noise, posinf=_LOST, neginf=-_LOST).ravel())
+        off = np.where(self.seen.valid[:, None], (x - self.seen.x[:, HEAVE]) / noise, 0.0)
+        return np.asarray(np.nan_to_num(off, nan=_LOST, posinf=_LOST, neginf=-_LOST).ravel())
+
+
+def _rocked(description: Description, read: Sequence[Read], loads: Sequence[Load]) -> list[_Rocked]:
+    found = []
+    for one, load in zip(read, loads, strict=True):
+        with suppress(NotEnoughData):
+            found.append(_Rocked(one, load, base_response_of(description, one.trial, one.rest, load)))
+    return found
+
+
+def _on_springs(
+    rocked: Sequence[_Rocked], wheels: WheelSet, linear: Tilting, place: np.ndarray
+) -> tuple[Tilting, Prior]:
+    """Heave and tilt on springs that do not pull, and the prior of how wheels share the load.
+
+    Args:
+        rocked: Trials.
+        wheels: Of the robot.
+        linear: On springs that pull.
+        place: (2,) sigma of the plate's place [m].
+    """
+
+    def stiffness(k: np.ndarray, off: np.ndarray) -> np.ndarray:
+        K = linear.K.copy()
+        K[np.ix_(HEAVE, HEAVE)] = wheels.tilting(k, off)
+        return K
+
+    def residuals(theta: np.ndarray) -> np.ndarray:
+        k, off = np.exp(theta[:3]), theta[3:] * LENGTH
+        K, standing = stiffness(k, off), wheels.standing(k[[0, 2]] / k[1], off)
+        left = side_by_side(lambda one: one.left(K, linear.C, standing), rocked)
+        ratios, moved = theta[[0, 2]] - theta[1], off - linear.off
+        return np.concatenate([*left, ratios / PRIOR_SIGMA[LOADS], moved / place])
+
+    def jacobian(theta: np.ndarray) -> np.ndarray:
+        at = residuals(theta)
+        return np.stack([(residuals(theta + own) - at) / _STEP for own in _STEP * np.eye(len(theta))], axis=1)
+
+    k = np.array([linear.shares[0], 1.0, linear.shares[1]])
+    k *= linear.K[3, 3] / wheels.tilting(k)[1, 1]
+    start = np.append(np.log(k), linear.off / LENGTH)
+    found = least_squares(residuals, start, jac=jacobian, method="lm", ftol=1e-3, xtol=_SAME)
+    K, off = stiffness(np.exp(found.x[:3]), found.x[3:] * LENGTH), found.x[3:] * LENGTH
+    sigma = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[3:] * LENGTH
+    prior = _prior(wheels, K, np.hypot(sigma, _PLACED))
+    return Tilting(K, linear.C, off, prior.shares, off - linear.off + linear.over), prior
 
 
 def plate_place(sources: WrenchSources, read: Sequence[Read]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
