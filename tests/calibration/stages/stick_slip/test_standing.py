@@ -101,6 +101,8 @@ def test_a_plate_in_its_place_and_nominal_links_leave_nothing():
     trial, wrench = stood(rigid_robot.random_angles(np.random.default_rng(3), 4), None, np.zeros(2))
     np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)])[0], 0.0, atol=1e-6)
     np.testing.assert_array_equal(plate_place(sources, [Read(trial, REST, replace(wrench, dynamics=None))])[0], 0.0)
+    trial, wrench = stood(rigid_robot.random_angles(np.random.default_rng(3), 4), None, OFF)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)])[2], OFF, atol=1e-6)
 
 
 def test_seconds_in_which_a_joint_moves_do_not_count():
