@@ -50,7 +50,8 @@ _FEWEST = 20  # readings in it
 _FEWEST_TRIALS = 2
 _FORCE, _LEVER = 2.0, 3e-4  # [N], [m] of the weight: what a second at rest leaves unexplained
 _LIFTED = 0.01  # share of the samples in which a wheel is off the floor
-_TOGETHER, _LOST = 25, 1e3  # samples that err alike; what a base that does not settle is off [noise]
+_TOGETHER, _WORTH = 100, 20.0  # samples that err alike; chi-square that springs by type of wheel must gain
+_LOST = 1e3  # what a base that does not settle is off [noise]
 _STEP, _SAME = 0.02, 1e-4  # of logarithms and LENGTH, for derivatives; share of them that a last step changes
 _PLACED = 5e-4  # [m] to which the plate's place is known at best
 
@@ -77,8 +78,8 @@ def tilting_of(
     loads = [sources.plate_load(one.trial, one.rest.T_lab_0) for one in shown]
     if loads and np.mean([_lifted(standing, load) for load in loads]) > _LIFTED:
         rocked = _rocked(sources.lab.description, shown, loads)
-        if len(rocked) >= _FEWEST_TRIALS:
-            return _on_springs(rocked, wheels, tilting, place)
+        found = _on_springs(rocked, wheels, tilting, place) if len(rocked) >= _FEWEST_TRIALS else None
+        return found or (tilting, prior)
     return tilting, prior
 
 
@@ -118,8 +119,8 @@ def _rocked(description: Description, read: Sequence[Read], loads: Sequence[Load
 
 def _on_springs(
     rocked: Sequence[_Rocked], wheels: WheelSet, linear: Tilting, place: np.ndarray
-) -> tuple[Tilting, Prior]:
-    """Heave and tilt on springs that do not pull, and the prior of how wheels share the load.
+) -> tuple[Tilting, Prior] | None:
+    """Heave and tilt on springs that do not pull, and the prior of how wheels share the load; None: no better.
 
     Args:
         rocked: Trials.
@@ -148,6 +149,9 @@ def _on_springs(
     k *= linear.K[3, 3] / wheels.tilting(k)[1, 1]
     start = np.append(np.log(k), linear.off / LENGTH)
     found = least_squares(residuals, start, jac=jacobian, method="lm", ftol=1e-3, xtol=_SAME)
+    pulling = linear.K, linear.C, linear.standing(wheels, "plate")
+    if 2.0 * found.cost > sum(float((one.left(*pulling) ** 2).sum()) for one in rocked) - _WORTH:
+        return None
     K, off = stiffness(np.exp(found.x[:3]), found.x[3:] * LENGTH), found.x[3:] * LENGTH
     sigma = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[3:] * LENGTH
     prior = _prior(wheels, K, np.hypot(sigma, _PLACED))
