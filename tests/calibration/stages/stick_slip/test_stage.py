@@ -125,7 +125,7 @@ def test_a_base_that_was_moved_is_named(recorded, suspension):
     assert [v.message.split(":")[0] for v in said if "was it moved" in v.message] == ["b"]
 
 
-def test_axes_that_the_compliance_predicts_better_arelinear_where(recorded, suspension):
+def test_axes_that_the_compliance_predicts_better_are_linear(recorded, suspension):
     sums = np.ones((3, 6))
     better = (("plate", HeldOut(1e-14 * sums, 1e-6 * sums, 0.0 * sums, np.ones(3))),)
     model, said = fit([r[0] for r in recorded[:3]], replace(suspension, held_out=better), robot=None)
