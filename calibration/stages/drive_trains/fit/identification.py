@@ -202,9 +202,7 @@ def _unexplained(problem: Problem, at: SteadyContact) -> float:
     theta, gamma = at.theta, at.gamma
     difference = problem.data.y - problem.deltas(theta, gamma)
     scales = sizes(problem, difference - problem.data.terms @ gamma, FLOORS[1])
-    count = np.bincount(problem.data.group[problem.data.known], minlength=len(scales))
-    total = cost(problem, theta, difference, gamma, scales)
-    return total + float((count * np.log(scales)).sum()) / problem.correlated
+    return cost(problem, theta, difference, gamma, scales) + problem.of_sizes(scales)
 
 
 def _continued(steady: SteadyContact, problem: Problem, *others: Problem) -> list[Candidate]:

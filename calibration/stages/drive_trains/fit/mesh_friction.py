@@ -35,11 +35,14 @@ def hinted(problem: Problem, richer: Problem, coarse: JointData, theta: np.ndarr
         (problem.data, FLOORS[1:3], _LIKELY, _KEPT),
     ):
         one = data.only(trial)
-        still, of = replace(problem, form="dead_zone", data=one), replace(richer, data=one)
+        plain = fit_train(replace(problem, form="dead_zone", data=one), theta, floors)
+        if plain.cost < plain.problem.of_sizes(np.full(one.n_groups, floors[-1])) + _HINT:
+            return []
+        of = replace(richer, data=one)
         glances = sorted((fit_train(of, x, ()) for x in starts), key=lambda fit: fit.cost)[:tried]
         again = _AGAIN if data is problem.data else 0
         fits = sorted((continued(of, fit.theta, floors, again) for fit in glances), key=lambda fit: fit.cost)
-        if fits[0].cost > fit_train(still, theta, floors).cost - _HINT:
+        if fits[0].cost > plain.cost - _HINT:
             return []
         starts = [fit.theta for fit in fits[:kept]]
     return starts

@@ -103,6 +103,11 @@ class Problem:
         """Window means (k,) of delta [rad]; `off` as `JointData.delta` has it."""
         return self.data.delta(self.train(theta), self.modes(theta), gamma, off)
 
+    def of_sizes(self, scales: np.ndarray) -> float:
+        """1 / c sum_j n_j log s_j of sizes (n_groups,) of residuals: the least ones cost what any fit does, or less."""
+        data = self.data
+        return float(np.bincount(data.group[data.known], minlength=len(scales)) @ np.log(scales)) / self.correlated
+
     def believes(self, information: np.ndarray, i: int) -> bool:
         """Whether of parameter i little more is known than the prior, by information (p + 5, p + 5)."""
         return bool(np.linalg.inv(information)[i, i] > (_OPEN * self.prior.width[i]) ** 2)
@@ -184,10 +189,8 @@ def fit_train(problem: Problem, theta: np.ndarray, floors: Sequence[float] = FLO
             elif before - state.cost < _LESS:
                 break
     scales = sizes(problem, _left(problem, state.difference, state.gamma), floors[-1] if floors else FLOORS[0])
-    count = np.bincount(problem.data.group[problem.data.known], minlength=len(scales))
     total = cost(problem, state.theta, state.difference, state.gamma, scales)
-    total += float((count * np.log(scales)).sum()) / problem.correlated
-    return TrainFit(problem, state.theta, state.gamma, scales, total)
+    return TrainFit(problem, state.theta, state.gamma, scales, total + problem.of_sizes(scales))
 
 
 def evaluated(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> TrainFit:
@@ -199,9 +202,8 @@ def evaluated(problem: Problem, theta: np.ndarray, gamma: np.ndarray) -> TrainFi
 
 def weights(problem: Problem, r: np.ndarray, scales: np.ndarray) -> np.ndarray:
     """Of residuals r (k,) in least squares [1/rad2], 0 where there is none."""
-    data, s = problem.data, scales[problem.data.group] ** 2
-    square = data.weight * np.where(data.known, r, 0.0) ** 2
-    return np.where(data.known, data.weight * (NU + 1.0) / (NU * s + square), 0.0)
+    data, s, r = problem.data, scales[problem.data.group] ** 2, np.where(problem.data.known, r, 0.0)
+    return np.where(data.known, data.weight * (NU + 1.0) / (NU * s + data.weight * r**2), 0.0)
 
 
 def sizes(problem: Problem, r: np.ndarray, floor: float) -> np.ndarray:
@@ -263,11 +265,10 @@ def _left(problem: Problem, difference: np.ndarray, gamma: np.ndarray) -> np.nda
 def _linear(problem: Problem, difference: np.ndarray, floor: float) -> np.ndarray:
     """gamma (5,) by iteratively weighted least squares."""
     A, gamma = problem.data.terms, np.append(np.nanmedian(difference), np.zeros(4))
-    known = np.where(np.isfinite(difference), difference, 0.0)
+    known, believed = np.where(np.isfinite(difference), difference, 0.0), problem.prior.information[-5:, -5:]
     for _ in range(4):
         r = _left(problem, difference, gamma)
         w = weights(problem, r, sizes(problem, r, floor)) / problem.correlated
-        believed = problem.prior.information[-5:, -5:]
         gamma = np.linalg.solve((A.T * w) @ A + believed, A.T @ (w * known) + believed @ problem.prior.gamma)
     return gamma
 

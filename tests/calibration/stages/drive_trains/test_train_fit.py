@@ -301,3 +301,13 @@ def test_friction_in_the_mesh_is_found_from_a_dead_zone_that_it_misled(seed) -> 
     starts = mesh_friction.hinted(problem(of_data), richer, of_data, misled)
     best = min((mesh_friction.continued(richer, x, FLOORS[2:]) for x in starts), key=lambda fit: fit.cost)
     np.testing.assert_allclose(best.theta[[0, 2, 6]], true.values[[0, 2, 6]], rtol=0.12)
+
+
+def test_no_friction_is_looked_for_where_a_dead_zone_leaves_nothing(monkeypatch) -> None:
+    of_data = data(noise=2e-6)
+    richer = Problem("joint", of_data, prior_of(of_data, "friction_held", 8e-3, 1e-2), "friction_held", dynamic=False)
+    fit = fit_train(problem(of_data), START)
+    monkeypatch.setattr(mesh_friction, "continued", lambda *_: pytest.fail("looked for"))
+    assert mesh_friction.hinted(problem(of_data), richer, of_data, fit.theta) == []
+    of = fit.problem
+    assert of.of_sizes(np.full(of_data.n_groups, FLOORS[-1])) <= fit.cost  # which none can be below
