@@ -3,6 +3,8 @@
     minimise sum_m w_m |p_m - (R x_m + t)|^2        p measured [m, lab], x nominal [m, body], w 1 where seen
     R  the rotation nearest to   sum_m w_m (p_m - p0)(x_m - x0)',     t = p0 - R x0
 
+    minimum = sum_m w_m (|p_m - p0|^2 + |x_m - x0|^2) - 2 max_R trace(R' sum_m w_m (p_m - p0)(x_m - x0)')     [m2]
+
 With noise sigma per axis and marker, the local twist (linear, angular) of the pose has covariance
 
     sigma^2 (sum_m A_m' A_m)^-1,   A_m = [I, -[x_m]x]            [m, rad]
@@ -23,6 +25,7 @@ from calibration.recording.trial import Trial
 
 _WHOLE, _MANY = 50, 400  # samples that show a cluster's shape, at least; of which so many are looked at
 _FLAT = 1e-6  # second singular value of a cluster over its first [-] below which it is a line
+_ROUNDING = 1e-14  # of the squares of a cluster's size, below which a sum of squared distances is none [-]
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,19 @@ def body_poses(xyz: np.ndarray, positions: np.ndarray) -> BodyPoses:
     T[~usable] = np.nan
     fitted = (T[:, :3, :3] @ xyz.T + T[:, :3, 3:]).swapaxes(1, 2)
     return BodyPoses(T, np.where(seen[..., None], positions, np.nan) - fitted, covariance)
+
+
+def misfit(xyz: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """rms distance (n,) [m] of markers (n, m, 3) from the rigid cluster xyz (m, 3); 0 where it has no pose."""
+    seen = np.isfinite(positions).all(axis=2)
+    w = (seen & _covariances(xyz, seen)[1][:, None]).astype(float)
+    count = np.maximum(w.sum(axis=1), 1.0)
+    x, p = xyz - xyz.mean(axis=0), np.where(seen[..., None], positions, 0.0)
+    p = w[..., None] * (p - (np.einsum("nmi->ni", p) / count[:, None])[:, None])
+    squares = np.einsum("nmi,nmi->n", p, p) + w @ (x**2).sum(axis=1) - ((w @ x) ** 2).sum(axis=1) / count
+    B = np.tensordot(p, x, axes=(1, 0))
+    left = squares - 2.0 * np.einsum("nij,nij->n", nearest_rotations(B), B)
+    return np.asarray(np.sqrt(np.maximum(left, _ROUNDING * squares) / count))
 
 
 def poses_as_seen(xyz: np.ndarray, positions: np.ndarray, every: np.ndarray) -> BodyPoses:

@@ -10,7 +10,7 @@ ghost but a marker that was moved, which `checks.marker_shapes` names. A mean ov
 
 import numpy as np
 
-from calibration.mocap.cluster_pose import body_poses, shown_shape
+from calibration.mocap.cluster_pose import misfit, shown_shape
 
 _ODD, _RIGID = 5.0, 3.0  # times the median
 _LASTS, _SHARE = 0.5, 0.45  # [s] around a ghost; of samples that may be odd there
@@ -37,13 +37,6 @@ def without_ghosts(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
     out = p.copy()
     out[rows] = np.where((left.min(axis=0) < _RIGID * usual)[:, None, None], rest[best, np.arange(len(rows))], np.nan)
     return out
-
-
-def misfit(xyz: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """rms distance (n,) [m] of markers p (n, m, 3) from the rigid cluster xyz (m, 3); 0 where it has no pose."""
-    r = np.nan_to_num(body_poses(xyz, p).residual)
-    seen = np.maximum(np.isfinite(p).all(axis=2).sum(axis=1), 1)
-    return np.sqrt((r**2).sum(axis=(1, 2)) / seen)
 
 
 def _passing(odd: np.ndarray, not_rigid: np.ndarray, shown: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -31,8 +31,8 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from calibration.mocap.cluster_pose import body_poses
-from calibration.mocap.ghosts import misfit, without_ghosts
+from calibration.mocap.cluster_pose import body_poses, misfit
+from calibration.mocap.ghosts import without_ghosts
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import rotation_vector
 from calibration.numerics.signals import interpolate_columns
@@ -192,6 +192,8 @@ def without_jumps(xyz: np.ndarray, t: np.ndarray, p: np.ndarray) -> np.ndarray:
     whole = _completed(xyz, p[rows])
     before, after = whole[:-1], whole[1:]
     jumped = np.flatnonzero(_apart(after, before) > _JUMP * shortest_edge(xyz))
+    if not len(jumped):
+        return p
     seen = p[rows[jumped]], p[rows[jumped + 1]]
     exchanged = _exchanges(xyz, np.diff(t[rows])[jumped], (before[jumped], after[jumped]), seen)
     if (exchanged == np.arange(len(xyz))).all():

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import make_interp_spline
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.compiled import njit
@@ -52,7 +52,7 @@ def even(t: np.ndarray, x: np.ndarray) -> Signal:
         raise NotEnoughData("less than one second of samples; record the motion with a second of rest on both sides")
     grid = t[0] + np.arange(int((t[-1] - t[0]) * RATE) + 1) / RATE
     right = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
-    found, valid = CubicSpline(t, x)(grid), np.diff(t)[right - 1] <= GAP
+    found, valid = make_interp_spline(t, x)(grid), np.diff(t)[right - 1] <= GAP
     if not valid.all():
         found[~valid] = interpolate_columns(grid[~valid], t, x)
     return Signal(grid, found, valid)

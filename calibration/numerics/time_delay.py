@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import make_interp_spline
 
 from calibration.errors import NotEnoughData
 from calibration.numerics.robust_covariance import long_run_variance
@@ -79,8 +79,9 @@ def fit_lag(pair: Pair, start: float, drift: float = 0.0) -> Lag:
     Raises:
         NotEnoughData: Too little overlap, or the two do not show the same motion.
     """
-    y, x, nuisance = pair.y, pair.x, pair.z
-    columns = CubicSpline(x.t, np.concatenate([x.x[:, None], nuisance], axis=1))
+    y, x = pair.y, pair.x
+    columns = make_interp_spline(x.t, np.concatenate([x.x[..., None], np.swapaxes(pair.z, 1, 2)], axis=2))
+    own = np.swapaxes(pair.u, 1, 2)
     middle = 0.5 * (y.t[0] + y.t[-1])
     lag, step = start, np.inf
     for _ in range(_STEPS):
@@ -89,7 +90,7 @@ def fit_lag(pair: Pair, start: float, drift: float = 0.0) -> Lag:
         keep[keep] &= x.valid[np.round((s[keep] - x.t[0]) * RATE).astype(int)]
         if keep.sum() < 2.0 * RATE:
             raise NotEnoughData("the two records overlap for less than two seconds")
-        r, slope, explained = _design(y.x[keep], columns(s[keep]), columns(s[keep], 1), pair.u[keep])
+        r, slope, explained = _design(y.x[keep], columns(s[keep]), columns(s[keep], 1), own[keep])
         step = float(slope @ r / (slope @ slope))
         lag -= step
         if abs(step) < 1e-7:
@@ -103,25 +104,32 @@ def fit_lag(pair: Pair, start: float, drift: float = 0.0) -> Lag:
 
 
 def _design(y: np.ndarray, m: np.ndarray, m_dot: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Residual of the nuisances, the derivative by -lag orthogonal to them, and the share of y explained."""
-    n, k, c = m.shape
-    own, one = np.einsum("nc,cd->ncd", m[:, 0], np.eye(c)), np.tile(np.eye(c), (n, 1, 1))
-    A = np.concatenate([own, one, np.swapaxes(m[:, 1:], 1, 2), np.swapaxes(u, 1, 2)], axis=2).reshape(n * c, -1)
-    scale = np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
-    A /= scale
-    square, V = np.linalg.eigh(A.T @ A)
-    kept = square > _RANK * square[-1]
-    inverse = V[:, kept] / square[kept] @ V[:, kept].T
+    """Residual of the nuisances, the derivative by -lag orthogonal to them, and the share of y explained.
+
+    m (n, c, 1 + k) are x and z at t - lag, m_dot their rates, u (n, c, k_u) and y (n, c) are at t.
+    """
+    n, c, k = m.shape
+    one = np.broadcast_to(np.eye(c), (n, c, c))
+    A = np.concatenate([m[..., :1] * one, one, m[..., 1:], u], axis=2).reshape(n * c, -1)
+    X = inverse_root(A.T @ A)
 
     def explained(x: np.ndarray) -> np.ndarray:
         """Coefficients of x (n c,), the second time of what rounding left."""
-        found = inverse @ (A.T @ x)
-        return np.asarray(found + inverse @ (A.T @ (x - A @ found)))
+        found = X @ (X.T @ (x @ A))
+        return np.asarray(found + X @ (X.T @ ((x - A @ found) @ A)))
 
     a = explained(y.ravel())
-    r, a = y.ravel() - A @ a, a / scale
-    gains, small = a[:c], a[2 * c : 2 * c + k - 1]
-    slope = (m_dot[:, 0] * gains + np.einsum("nkc,k->nc", m_dot[:, 1:], small)).ravel()
+    r, gains, small = y.ravel() - A @ a, a[:c], a[2 * c : 2 * c + k - 1]
+    slope = (m_dot[..., 0] * gains + m_dot[..., 1:] @ small).ravel()
     slope -= A @ explained(slope)
     total = float(((y - y.mean(axis=0)) ** 2).sum())
     return r, slope, 1.0 - float(r @ r) / max(total, np.finfo(float).tiny)
+
+
+def inverse_root(gram: np.ndarray) -> np.ndarray:
+    """X (p, k) with X' A'A X = 1, where A X spans the columns of A, from A'A (p, p)."""
+    size = np.sqrt(np.diag(gram))
+    size = np.where(size > 0.0, size, 1.0)
+    square, V = np.linalg.eigh(gram / size / size[:, None])
+    kept = square > _RANK * square[-1]
+    return np.asarray(V[:, kept] / np.sqrt(square[kept]) / size[:, None])

@@ -5,6 +5,7 @@ it accelerates.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,12 +26,19 @@ from calibration.stages.suspension.model import Suspension
 _SLOWLY = 3.5  # [Hz] below which markers show a base's motion better than a wrench does
 
 
-def moved_as_predicted(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension) -> Moved:
+class RoughBase(NamedTuple):
+    """How the base moved in each trial that shows it, and parameters (15,) of its wheels, None where none are known."""
+
+    moved: Moved
+    logarithms: np.ndarray | None = None
+
+
+def moved_as_predicted(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension) -> RoughBase:
     """By the plate, or by inverse dynamics where there is none; nothing of trials and robots that do not show it."""
     try:
         campaign = campaign_of(sources, trials, suspension)
     except NotEnoughData:
-        return AS_SEEN
+        return RoughBase(AS_SEEN)
     source, _, of_source = campaign.by_source[0]
     direction = linear_where(rough_direction(source, of_source), suspension)
     model = StickSlip(campaign.wheels, campaign.tilting, (direction,))
@@ -46,4 +54,5 @@ def moved_as_predicted(sources: WrenchSources, trials: Sequence[Trial], suspensi
             return None
 
     found = zip(campaign.read, side_by_side(poses, campaign.read), strict=True)
-    return {read.trial.id: T_lab_B for read, T_lab_B in found if T_lab_B is not None}
+    moved = {read.trial.id: T_lab_B for read, T_lab_B in found if T_lab_B is not None}
+    return RoughBase(moved, direction.logarithms)

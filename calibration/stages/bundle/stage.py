@@ -18,7 +18,7 @@ from calibration.numerics.lie import from_vector
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.bundle.moved_base import moved_as_predicted
+from calibration.stages.bundle.moved_base import RoughBase, moved_as_predicted
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.drive_trains.column_bending import rigid
 from calibration.stages.drive_trains.drive_train import Quantity
@@ -87,11 +87,11 @@ def fit_bundle(
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
     sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
-    moved = AS_SEEN if suspension is None else moved_as_predicted(sources, trials, suspension)
-    trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, moved)
+    rough = RoughBase(AS_SEEN) if suspension is None else moved_as_predicted(sources, trials, suspension)
+    trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, rough.moved)
     bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
     geometry = replace(geometry, name="full")
-    refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings, moved)
+    refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings, rough.moved)
     found += more
     if refitted is not None:
         geometry, bending, trains, at_rest = refitted.model, refitted.bending, refitted.trains, refitted.at_rest
@@ -101,7 +101,8 @@ def fit_bundle(
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link), _moment_sigma(lab)))
     base = None
     if suspension is not None:
-        base, more = fit_stick_slip(replace(sources, T_base_B=from_vector(hand.base)), trials, suspension, trains)
+        sources = replace(sources, T_base_B=from_vector(hand.base))
+        base, more = fit_stick_slip(sources, trials, suspension, trains, rough.logarithms)
         found += more
     parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, trains.hung)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)

@@ -19,11 +19,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from calibration.numerics.robust_covariance import long_run_covariance, widening
+from calibration.numerics.time_delay import inverse_root
 
 _BLOCK = 2.5  # [s] a move, or half a swing
-_RANK = 1e-13  # least eigenvalue of a Gram matrix to its largest
 _LEAST = 1e-3  # [-] share of a block's noise that is left in its residuals, at least
 
 
@@ -34,14 +35,21 @@ class Reduced:
     Attributes:
         r: (6 n + b,) whitened residuals without their part in U.
         S: (6 n + b, 2) their derivatives by lag and drift, likewise.
-        U: (6 n + b, p) orthonormal basis of the nuisances.
+        V: (6 n + b, p + 2) basis of the nuisances, orthonormal but for rounding, and S with its part in U, normalised.
+        M: (n_blocks + 1, p + 2, p + 2) V_g' V_g of each block of samples, then of the coefficients.
         t: (n,) [s, mocap clock].
     """
 
     r: np.ndarray
     S: np.ndarray
-    U: np.ndarray
+    V: np.ndarray
+    M: np.ndarray
     t: np.ndarray
+
+    @property
+    def U(self) -> np.ndarray:  # noqa: N802
+        """(6 n + b, p) orthonormal basis of the nuisances."""
+        return self.V[:, :-2] @ inverse_root(self.M.sum(axis=0)[:-2, :-2])
 
     def coefficients(self, x: np.ndarray) -> np.ndarray:
         """b (b,) where x (2,) are lag and drift."""
@@ -55,26 +63,22 @@ class Reduced:
 
 
 def without_nuisances(A: np.ndarray, B: np.ndarray, r: np.ndarray, S: np.ndarray, t: np.ndarray) -> Reduced:
-    """Eliminate columns A (6 n, a), free, and B (6 n, b), with coefficients N(0, 1), from r (6 n,) and S (6 n, 2)."""
-    size, b = np.linalg.norm(A, axis=0), B.shape[1]
-    A = A[:, size > 0.0]
-    U = _orthonormal(np.block([[A, B], [np.zeros((b, A.shape[1])), np.eye(b)]]))
-    y = np.concatenate([np.column_stack([r, S]), np.zeros((b, 1 + S.shape[1]))])
-    y = y - U @ (U.T @ y)
-    return Reduced(y[:, 0], y[:, 1:], U, t)
+    """Eliminate columns A (6 n, a), free, and B (6 n, b), with coefficients N(0, 1), from r (6 n,) and S (6 n, 2).
 
-
-def _orthonormal(D: np.ndarray) -> np.ndarray:
-    """Basis of the columns of a tall D, by the eigenvectors of D'D: twice, as the square of its condition is lost.
+    The basis of D = [A B; 0 1] is D (D'D)^-1/2, twice, as the square of D's condition is lost; the second time only the
+    Gram matrices, block by block, are formed.
 
     Reference: Fukaya et al., SIAM J. Sci. Comput. 2020 (Cholesky QR twice).
     """
-    U = D / np.linalg.norm(D, axis=0)
-    for _ in range(2):
-        square, V = np.linalg.eigh(U.T @ U)
-        kept = square > _RANK * square[-1]
-        U = U @ (V[:, kept] / np.sqrt(square[kept]))
-    return U
+    a, b = A.shape[1], B.shape[1]
+    y = np.concatenate([np.column_stack([r, S]), np.zeros((b, 3))])
+    D = np.block([[A, B, S], [np.zeros((b, a)), np.eye(b), np.zeros((b, 2))]])
+    square = D.T @ D
+    V = D @ block_diag(inverse_root(square[:-2, :-2]), np.diag(np.diag(square)[-2:] ** -0.5))
+    M = np.array([V[i:j].T @ V[i:j] for i, j in pairwise([*_starts(t), len(r), len(V)])])
+    U, X = V[:, :-2], inverse_root(M.sum(axis=0)[:-2, :-2])
+    y -= U @ (X @ (X.T @ (U.T @ y)))
+    return Reduced(y[:, 0], y[:, 1:], V, M, t)
 
 
 def lag_and_drift(x: Reduced) -> tuple[np.ndarray, np.ndarray]:
@@ -97,14 +101,14 @@ def _starts(t: np.ndarray) -> np.ndarray:
 
 
 def _given_back(x: Reduced, e: np.ndarray) -> np.ndarray:
-    """Residuals e (6 n + b,) times (1 - H_gg)^-1/2, block by block."""
-    m, V = 6 * len(x.t), np.column_stack([x.U, np.linalg.qr(x.S)[0]])
-    left = np.maximum(1.0 - (V**2).sum(axis=1), _LEAST)
-    out = e / np.sqrt(left)  # stays for the rows of the prior
-    for a, b in pairwise([*_starts(x.t), m]):
-        taken, E = np.linalg.eigh(V[a:b].T @ V[a:b])
+    """Residuals e (6 n + b,) times (1 - H_gg)^-1/2, block by block, H = V Z Z' V'."""
+    m, Z = 6 * len(x.t), inverse_root(x.M.sum(axis=0))
+    left = np.maximum(1.0 - ((x.V[m:] @ Z) ** 2).sum(axis=1), _LEAST)
+    out = np.concatenate([e[:m], e[m:] / np.sqrt(left)])
+    for (i, j), M in zip(pairwise([*_starts(x.t), m]), x.M[:-1], strict=True):
+        taken, E = np.linalg.eigh(Z.T @ M @ Z)
         known = taken > 1e-9
-        Y = V[a:b] @ (E[:, known] / np.sqrt(taken[known]))
+        Y = Z @ (E[:, known] / np.sqrt(taken[known]))
         gain = 1.0 / np.sqrt(np.maximum(1.0 - taken[known], _LEAST)) - 1.0
-        out[a:b] = e[a:b] + Y @ (gain * (Y.T @ e[a:b]))
+        out[i:j] += x.V[i:j] @ (Y @ (gain * (Y.T @ (x.V[i:j].T @ e[i:j]))))
     return out

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import make_interp_spline
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
@@ -134,7 +134,7 @@ def _carried(part: Carrier, trial: MeasuredTrial, q: Signal) -> tuple[np.ndarray
         [pin.bodyRegressor(pin.Motion(v), pin.Motion(a)) for v, a in zip(link_turns[rows], at_link, strict=True)]
     )
     found = np.concatenate([np.swapaxes(whole, 1, 2), np.swapaxes(_action(T_lab_link[rows], trial) @ Y, 1, 2)], axis=1)
-    return CubicSpline(rows, found)(np.arange(len(q.t))), valid
+    return make_interp_spline(rows, found)(np.arange(len(q.t))), valid
 
 
 def _action(T_lab_frame: np.ndarray, trial: Trial) -> np.ndarray:

@@ -141,22 +141,26 @@ def _refined(robot: Provisional, x: Samples, trial_id: str, clock: Clock) -> Tri
     moved = at.J_joint * np.where(loaded, robot.reading_sigma, np.maximum(robot.reading_sigma, _FREE))[:, None]
     W = np.linalg.inv(np.linalg.cholesky(x.covariance + moved @ np.swapaxes(moved, 1, 2)))
     J = W @ at.J_joint
-    shapes = (tau > 0.0, tau < 0.0, q - q.mean(axis=0), tau)
-    free = [J * (v * ~speaks)[:, None], *(J * (speaks * shape)[:, None] for shape in shapes)]
-    known = [J * (speaks * lost)[:, None] for lost in np.moveaxis(x.lost[:, columns], 2, 0)]
-    A = np.concatenate(free, axis=2).reshape(6 * len(v), -1)
-    B = np.concatenate([W @ at.J @ robot.root, *known], axis=2).reshape(6 * len(v), -1)
-    slope = (J * (v * speaks)[:, None]).sum(axis=2)
+    shapes = np.stack([v * ~speaks, *(speaks * shape for shape in (tau > 0.0, tau < 0.0, q - q.mean(axis=0), tau))], 1)
+    lost = speaks[:, None] * np.swapaxes(x.lost[:, columns], 1, 2)
+    A, played = _terms(J, shapes), _terms(J, lost)
+    B = np.column_stack([(W @ at.J).reshape(len(played), -1) @ robot.root, played])
+    slope = (J @ (v * speaks)[..., None])[..., 0]
     middle = float(np.average(x.t, weights=(slope**2).sum(axis=1)))
     r = W @ _residuals(x.T, at.T)[..., None]
     S = np.stack([slope, slope * (x.t - middle)[:, None]], axis=2).reshape(-1, 2)
     reduced = without_nuisances(A, B, r.ravel(), S, x.t)
     change, C = lag_and_drift(reduced)
-    played = np.concatenate(known, axis=2).reshape(len(S), -1)
-    wound = played @ reduced.coefficients(change)[-played.shape[1] :]
+    wound = played @ reduced.coefficients(change)[len(robot.names) :]
     late = float(S[:, 0] @ wound / (S[:, 0] @ S[:, 0]))
-    unseen = -reduced.taken_for(known[0].sum(axis=2).ravel())
+    unseen = -reduced.taken_for((J @ lost[:, 0, :, None]).ravel())
     return replace(_estimated(change, C, x.t, middle, trial_id, clock), wound=late, unseen=unseen)
+
+
+def _terms(J: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Columns (6 n, m) J_j w_j of derivatives J (n, 6, k) and weights (n, n_shapes, k), but for those that are zero."""
+    shape, joint = np.nonzero(weights.any(axis=0))
+    return np.asarray((J[..., joint] * weights[:, None, shape, joint]).reshape(6 * len(J), -1))
 
 
 def _median(q: np.ndarray, loaded: np.ndarray) -> np.ndarray:

@@ -16,16 +16,27 @@ from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 
 import numpy as np
+from scipy.linalg.lapack import dtpqrt
 
 from calibration.numerics.robust_covariance import BlockCovariance, block_covariance
 from calibration.options import Terms
 from calibration.stages.joints.model import Basis, Exponent, JointModel, Quality, basis_of, exponents, not_zero
 from calibration.stages.joints.samples import Samples, box, pooled
-from calibration.stages.joints.separable_fit import RANK, RHO, Problem, Projection, limit_of, rho_grid, search
+from calibration.stages.joints.separable_fit import (
+    RANK,
+    RHO,
+    Problem,
+    Projection,
+    best_of_grid,
+    limit_of,
+    rho_grid,
+    search,
+    triangular,
+)
 
 HIGHEST = 5
 _WORTH = 0.95  # a model that leaves more than this share of the mean square is not worth its coefficients [-]
-_CLEAR = 1e3 * RANK  # least over largest of R's diagonal, above which columns are clearly of full rank [-]
+_PANEL = 16  # columns of R that LAPACK turns at once
 _TIE = 1.3  # scores within this factor of the best are as good: a handful of trials shows no difference [-]
 
 
@@ -56,15 +67,15 @@ def candidates(samples: Sequence[Samples], terms: Terms, highest: int = HIGHEST)
         return tuple(found)
     basis = basis_of(kept, box(whole))
     sets = [tuple(p for p in exponents(terms, degree) if p in kept) for degree in range(highest + 1)]
-    factors = [_factors(basis, s) for s in samples]
-    new = (d for d, powers in enumerate(sets) if powers and (d == 0 or powers != sets[d - 1]))
-    degrees = [d for d in new if _is_fixed(basis, sets[d], factors)]
-    order = list(dict.fromkeys(c for d in degrees for c in _columns(basis, sets[d])))  # those of lower degrees first
-    by_rho = [_of_others([F[:, [*order, -1]] for F in of_rho]) for of_rho in zip(*factors, strict=True)]
-    folds = [
-        _left_out(basis, [sets[d] for d in degrees], samples, order, k, of_others)
-        for k, of_others in enumerate(zip(*by_rho, strict=True))
-    ]
+    new = [d for d, powers in enumerate(sets) if powers and (d == 0 or powers != sets[d - 1])]
+    order = list(dict.fromkeys(c for d in new for c in _columns(basis, sets[d])))  # those of lower degrees first
+    middle = triangular(_problem(basis, whole), order, rho_grid()[len(rho_grid()) // 2 :][:1])[0]
+    degrees = [d for d in new if _is_fixed(middle, 2 * len(sets[d]))]
+    ends = [2 * len(sets[d]) for d in degrees]
+    order = order[: max(ends, default=0)]
+    factors = [triangular(_problem(basis, s), order, rho_grid()) for s in samples]
+    of_others = np.array([_of_others(of_rho) for of_rho in zip(*factors, strict=True)]).swapaxes(0, 1)
+    folds = [_left_out(basis, samples, order, ends, k, R) for k, R in enumerate(of_others)]
     for degree, left_out in zip(degrees, zip(*folds, strict=True), strict=True):
         missed = sum(float(((s.y - p) ** 2).sum()) for s, p in zip(samples, left_out, strict=True))
         found.append(Candidate(degree, sets[degree], left_out, missed / total))
@@ -77,10 +88,13 @@ def worthwhile(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(c for c in found[1:] if c.score <= _TIE * best) if best < _WORTH else ()
 
 
-def _is_fixed(basis: Basis, powers: tuple[Exponent, ...], factors: Sequence[Sequence[np.ndarray]]) -> bool:
-    """Whether all trials together fix every coefficient, at the middle of the search for rho."""
-    R = np.vstack([of_trial[len(of_trial) // 2] for of_trial in factors])
-    s = np.linalg.svd(R[:, _columns(basis, powers)], compute_uv=False)
+def _problem(basis: Basis, samples: Samples) -> Problem:
+    return Problem(basis(samples.theta, samples.tau), samples.velocity, samples.y)
+
+
+def _is_fixed(R: np.ndarray, p: int) -> bool:
+    """Whether all trials together, whose R this is, fix the coefficients of the first p columns."""
+    s = np.linalg.svd(R[:p, :p], compute_uv=False)
     return bool(s[-1] > RANK * s[0])
 
 
@@ -90,58 +104,29 @@ def _columns(basis: Basis, powers: tuple[Exponent, ...]) -> list[int]:
     return own + [len(basis.powers) + c for c in own]
 
 
-def _factors(basis: Basis, samples: Samples) -> list[np.ndarray]:
-    """R of the QR of [M, y], (at most 2 k + 1, 2 k + 1), at every rho."""
-    problem = Problem(basis(samples.theta, samples.tau), samples.velocity, samples.y)
-    designs = (np.column_stack([problem.design(rho), samples.y]) for rho in rho_grid())
-    return [np.asarray(np.linalg.qr(M, mode="r")) for M in designs]
-
-
 def _of_others(factors: Sequence[np.ndarray]) -> list[np.ndarray]:
     """R of all trials but one, for each, from those of every trial."""
-    before = list(accumulate(factors, _joined, initial=factors[0][:0]))
-    behind = list(accumulate(reversed(factors), _joined, initial=factors[0][:0]))[::-1]
-    return [_joined(before[k], behind[k + 1]) for k in range(len(factors))]
+    before = list(accumulate(factors[:-1], _joined))
+    behind = list(accumulate(factors[:0:-1], _joined))[::-1]
+    return [behind[0], *map(_joined, before[:-1], behind[1:]), before[-1]]
 
 
 def _joined(R: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """R of the QR of both."""
-    return np.asarray(np.linalg.qr(np.vstack([R, other]), mode="r"))
+    """R of the QR of both, which are triangular."""
+    return np.asarray(dtpqrt(len(R), min(_PANEL, len(R)), R, other)[0])
 
 
 def _left_out(
-    basis: Basis,
-    sets: Sequence[tuple[Exponent, ...]],
-    samples: Sequence[Samples],
-    order: Sequence[int],
-    k: int,
-    of_others: Sequence[np.ndarray],
+    basis: Basis, samples: Sequence[Samples], order: Sequence[int], ends: Sequence[int], k: int, of_others: np.ndarray
 ) -> list[np.ndarray]:
-    """Discrepancy (n,) of trial k by the models of the others, one for each set of powers.
+    """Discrepancy (n,) of trial k by the models of the others, each of the first columns in `order` up to an end.
 
-    `of_others` are their R at every rho, columns of the design in `order`.
+    `of_others` are their R at every rho.
     """
-    others = [t for t in range(len(samples)) if t != k]
-    ends = [2 * len(powers) for powers in sets]
-    best = [(np.inf, 0.0, np.zeros((0, 0)))] * len(sets)
-    for rho, R in zip(rho_grid(), of_others, strict=True):
-        best = [min(b, (_square(R, p), float(rho), R), key=lambda b: b[0]) for b, p in zip(best, ends, strict=True)]
-    domain, s = box(pooled([samples[t] for t in others])), samples[k]
-    whole = Problem(basis(np.clip(s.theta, *domain[0]), np.clip(s.tau, *domain[1])), s.velocity, s.y)
-    return [whole.design(rho)[:, order[:p]] @ _solution(R, p) for p, (_, rho, R) in zip(ends, best, strict=True)]
-
-
-def _square(R: np.ndarray, p: int) -> float:
-    """Least |M x - y|^2 of p columns M, by triangular [M, ..., y]."""
-    size = np.abs(R.diagonal()[:p])
-    if len(R) > p and size.min(initial=np.inf) > _CLEAR * size.max(initial=0.0):
-        return float((R[p:, -1] ** 2).sum())
-    return float(((R[:, -1] - R[:, :p] @ _solution(R, p)) ** 2).sum())
-
-
-def _solution(R: np.ndarray, p: int) -> np.ndarray:
-    """The least x of M x = y in least squares, of p columns M in triangular [M, ..., y]."""
-    return np.asarray(np.linalg.lstsq(R[:p, :p], R[:p, -1], rcond=RANK)[0])
+    domain, s, rhos = box(pooled([*samples[:k], *samples[k + 1 :]])), samples[k], rho_grid()
+    whole = _problem(basis, replace(s, theta=np.clip(s.theta, *domain[0]), tau=np.clip(s.tau, *domain[1])))
+    best = [(p, *best_of_grid(of_others, p)) for p in ends]
+    return [whole.design(float(rhos[i]))[:, order[:p]] @ x for p, i, x in best]
 
 
 def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms, chosen: Candidate) -> JointModel:
@@ -151,7 +136,7 @@ def fit_joint(joint: str, samples: Sequence[Samples], zero: float, terms: Terms,
         return none
     whole, powers, k = pooled(samples), chosen.powers, len(chosen.powers)
     basis = basis_of(powers, box(whole))
-    problem = Problem(basis(whole.theta, whole.tau), whole.velocity, whole.y)
+    problem = _problem(basis, whole)
     found = search(problem)
     if not found.full_rank:
         return none

@@ -8,10 +8,12 @@ encoder's quantum chooses it.
 References: Golub, Pereyra, SIAM J. Numer. Anal. 1973; Kaufman, BIT 1975.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.linalg.lapack import dtrtrs
 from scipy.optimize import brentq
 from scipy.special import expit
 
@@ -19,6 +21,7 @@ Limit = Literal["lowest", "highest"]
 RHO = (2.0, 1000.0)  # [s/rad] limits of the search
 _GRID = 8
 RANK = 1e-7  # smallest over largest singular value of the scaled design [-]
+_CLEAR = 1e3 * RANK  # least over largest of R's diagonal, above which columns are clearly of full rank [-]
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,8 @@ def project(problem: Problem, rho: float) -> Projection:
 def search(problem: Problem) -> Projection:
     """The best rho within its limits: best of a grid, then the zero of the derivative next to it."""
     grid = rho_grid()
-    best = int(np.argmin([float(r @ r) for r in (project(problem, rho).r for rho in grid)]))
+    columns = range(2 * problem.phi.shape[1])
+    best = best_of_grid(triangular(problem, columns, grid), len(columns))[0]
     low, high = np.log(grid[max(best - 1, 0)]), np.log(grid[min(best + 1, len(grid) - 1)])
 
     def slope(log_rho: float) -> float:
@@ -94,6 +98,40 @@ def search(problem: Problem) -> Projection:
     if slope(high) <= 0.0:
         return project(problem, float(np.exp(high)))
     return project(problem, float(np.exp(brentq(slope, low, high, xtol=1e-10))))
+
+
+def triangular(problem: Problem, columns: Sequence[int], rhos: np.ndarray) -> np.ndarray:
+    """R of the QR of [M, y] at every rho, (n_rhos, c + 1, c + 1), of c columns of M in their order."""
+    n, c = len(problem.y), len(columns)
+    rows = np.zeros((len(rhos), max(n, c + 1), c + 1))
+    for of_rho, rho in zip(rows, rhos, strict=True):
+        of_rho[:n, :c], of_rho[:n, c] = problem.design(rho)[:, columns], problem.y
+    return np.asarray(np.linalg.qr(rows, mode="r"))
+
+
+def best_of_grid(factors: np.ndarray, p: int) -> tuple[int, np.ndarray]:
+    """Which rho leaves the least |y - M x|^2, and x, of the first p columns M of triangular [M, ..., y] at every rho.
+
+    What columns of full rank would leave is the least that can be left: most rho need no solution.
+    """
+    least = (factors[:, p:, -1] ** 2).sum(axis=1)
+    best, found = np.inf, (0, np.zeros(p))
+    for k in np.argsort(least):
+        if least[k] >= best:
+            break
+        R, y = factors[k, :p, :p], factors[k, :p, -1]
+        x = _solution(R, y)
+        left = float(least[k] + ((y - R @ x) ** 2).sum())
+        best, found = (left, (int(k), x)) if left < best else (best, found)
+    return found
+
+
+def _solution(R: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The least x of R x = y in least squares, R triangular."""
+    size = np.abs(R.diagonal())
+    if size.min() > _CLEAR * size.max():
+        return np.asarray(dtrtrs(R, y)[0])
+    return np.asarray(np.linalg.lstsq(R, y, rcond=RANK)[0])
 
 
 def rho_grid() -> np.ndarray:

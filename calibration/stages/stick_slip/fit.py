@@ -20,7 +20,7 @@ import numpy as np
 from calibration.stages.stick_slip.band import Band, LeftOut, block_means, ensemble_of, fitted_band, reached
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.model import Direction
-from calibration.stages.stick_slip.search import FRICTIONS, Point, searched, settled, sketched, tried, warmed
+from calibration.stages.stick_slip.search import FRICTIONS, Point, settled, sketched, tried
 from calibration.stages.stick_slip.wheels import SlipParameters, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source
@@ -39,14 +39,12 @@ class Fitted:
         covariance: (15, 15).
         others: (k, 15) without each of the trials.
         cost: -2 log of the posterior.
-        starts: Costs to which the starts of the search came.
     """
 
     logarithms: np.ndarray
     covariance: np.ndarray
     others: np.ndarray
     cost: float
-    starts: tuple[float, ...]
 
     @property
     def parameters(self) -> SlipParameters:
@@ -54,9 +52,8 @@ class Fitted:
         return SlipParameters.of(self.logarithms)
 
 
-def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
-    """The parameters that predict the trials best; from a known start (15,), where there is one, without a search."""
-    best, starts = searched(trials) if start is None else (warmed(trials, start), ())
+def fitted(trials: Trials, best: Point) -> Fitted:
+    """The parameters that predict the trials best, about the end of a search."""
     best, (H_k, g_k) = settled(trials, best)
     prior = trials.prior.information
     H = H_k.sum(axis=0) + prior
@@ -65,7 +62,7 @@ def fitted(trials: Trials, start: np.ndarray | None = None) -> Fitted:
     own = np.diag(covariance)
     covariance += np.diag(np.maximum(_one_sided(trials, best) ** 2 - own, 0.0))
     steps = np.array([_without(H, H_k[k], g_k[k], trials.prior.sigma) for k in range(len(g_k))])
-    return Fitted(best.logarithms, covariance, _others(trials, best, steps), best.cost, starts)
+    return Fitted(best.logarithms, covariance, _others(trials, best, steps), best.cost)
 
 
 def _scatter(H_k: np.ndarray, g_k: np.ndarray, prior: np.ndarray) -> float:
@@ -104,9 +101,9 @@ def _others(trials: Trials, best: Point, steps: np.ndarray) -> np.ndarray:
     return np.take_along_axis(at, costs.argmin(axis=0)[None, :, None], axis=0)[0]
 
 
-def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = None) -> Direction:
-    """Parameters, ensemble, band and what trials say that were left out, from one source of the wrench."""
-    found = fitted(trials, start)
+def fit_direction(source: Source, trials: Trials, best: Point) -> Direction:
+    """Parameters, ensemble, band and what trials say that were left out, about the end of a search by one source."""
+    found = fitted(trials, best)
     ensemble = ensemble_of(trials, found.logarithms, found.covariance)
     members, _ = trials.simulated(ensemble)
     x = left_out(trials, found.others)
@@ -135,15 +132,15 @@ def fit_direction(source: Source, trials: Trials, start: np.ndarray | None = Non
 def rough_direction(source: Source, trials: Trials) -> Direction:
     """Parameters by a shorter search, without their covariance or a band; judged by the trials they are fitted to."""
     best, _ = sketched(trials)
-    (x,), _ = trials.simulated(best.logarithms[None])
+    (x,), _ = trials.simulated(best[None])
     seen = np.concatenate([m.valid for m in trials.motions])
     error = np.where(seen[:, None], trials.measured - block_means(trials, x), np.nan)
-    p, held_out = len(best.logarithms), _held_out(trials, error)
+    p, held_out = len(best), _held_out(trials, error)
     return Direction(
         source,
-        best.logarithms,
+        best,
         np.zeros((p, p)),
-        best.logarithms[None],
+        best[None],
         Band(*np.zeros((4, 3))),
         held_out,
         by_plate=trials.corrected or source != "plate",

@@ -8,7 +8,7 @@ the noise of the markers. Parameters are logarithms and the load's place, p with
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -17,7 +17,7 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import RATE
-from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing, planar_force
+from calibration.stages.stick_slip.forcing import PlanarForcing, planar_force
 from calibration.stages.stick_slip.kernel.bases import Bases, at_rest
 from calibration.stages.stick_slip.kernel.integration import simulated
 from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, pooled_noise
@@ -40,7 +40,7 @@ class Trials:
         wheels: The robot's.
         corrected: Whether a plate corrects the prediction.
         starts: (k + 1,) first sample of each trial, and the number of samples.
-        drive: (STEPS n, 11).
+        drive: (steps n, 11).
         inertia: (n, 15).
         rest: (n,) True in the first second of a trial.
         motions: Measured.
@@ -89,9 +89,23 @@ class Trials:
         return np.concatenate([m.x for m in self.motions])
 
     @property
+    def steps(self) -> int:
+        """Of the integration to a sample."""
+        return len(self.drive) // len(self.inertia)
+
+    @property
+    def _step(self) -> float:
+        return 1.0 / (RATE * self.steps)
+
+    @property
+    def coarse(self) -> "Trials":
+        """The same in one step to a sample."""
+        return replace(self, drive=np.ascontiguousarray(self.drive[self.steps - 1 :: self.steps]))
+
+    @property
     def loads(self) -> np.ndarray:
         """(k, 3) (-Fz, My, -Mx) under which each trial begins."""
-        return self.drive[STEPS * self.starts[:-1], 3:6]
+        return self.drive[self.steps * self.starts[:-1], 3:6]
 
     def force(self, source: Source) -> np.ndarray:
         """(n, 3) change of Fx, Fy, Mz on the floor, by its source."""
@@ -100,8 +114,7 @@ class Trials:
     def alone(self, k: int) -> "Trials":
         """Trial k alone."""
         a, b = self.spans[k]
-        per = len(self.drive) // len(self.inertia)
-        drive, inertia, rest = self.drive[a * per : b * per], self.inertia[a:b], self.rest[a:b]
+        drive, inertia, rest = self.drive[self.steps * a : self.steps * b], self.inertia[a:b], self.rest[a:b]
         motions = self.motions[k : k + 1]
         ids, starts = self.ids[k : k + 1], np.array([0, b - a])
         return Trials(ids, self.wheels, self.corrected, starts, drive, inertia, rest, motions, self.prior)
@@ -112,7 +125,7 @@ class Trials:
         By parameters (k, p); the wheels' deflections (k, m, 2) at the start of each trial may be given.
         """
         bases = bases_of(self.wheels, logarithms, self.corrected, preload)
-        x, share = simulated(self.starts, self.drive, self.inertia, bases, STEP, len(logarithms))
+        x, share = simulated(self.starts, self.drive, self.inertia, bases, self._step, len(logarithms))
         for a, b in self.spans:
             x[:, a:b] -= x[:, a:b][:, self.rest[a:b]].mean(axis=1, keepdims=True)
         return x, share
@@ -120,7 +133,7 @@ class Trials:
     def errors(self, logarithms: np.ndarray, places: np.ndarray | None = None) -> list[np.ndarray]:
         """By each of some parameters (k, p), and places of the wheels (k, m, 2) other than declared, see `error`."""
         bases = bases_of(self.wheels, logarithms, self.corrected, places=places)
-        x, _ = simulated(self.starts, self.drive, self.inertia, bases, STEP, len(logarithms), BLOCK)
+        x, _ = simulated(self.starts, self.drive, self.inertia, bases, self._step, len(logarithms), BLOCK)
         return side_by_side(self.error, x)
 
     def error(self, x: np.ndarray) -> np.ndarray:

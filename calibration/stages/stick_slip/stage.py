@@ -35,7 +35,7 @@ from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.poses import links_of
-from calibration.stages.stick_slip.search import elsewhere, shifts_of_wheels
+from calibration.stages.stick_slip.search import elsewhere, searched, shifts_of_wheels, warmed
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
@@ -72,20 +72,24 @@ class Campaign:
 
 
 def fit_stick_slip(
-    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, trains: DriveTrains | None = None
+    sources: WrenchSources,
+    trials: Sequence[Trial],
+    suspension: Suspension,
+    trains: DriveTrains | None = None,
+    rough: np.ndarray | None = None,
 ) -> tuple[StickSlip | None, tuple[Verdict, ...]]:
     """The base by calibration trials in which it is not driven, None where it is not identified, and the findings.
 
-    By inverse dynamics of link angles, where drive trains are known.
+    By inverse dynamics of link angles, where drive trains are known; from rough parameters (15,), where they are.
     """
     try:
         campaign = campaign_of(sources, trials, suspension, trains)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "missing", str(error)),)
     wheels, read, usable = campaign.wheels, campaign.read, campaign.by_source
-    fits: list[Direction] = []
-    for source, _, of_source in usable:
-        fits.append(fit_direction(source, of_source, fits[0].logarithms if fits else None))
+    (source, _, first), *others = usable
+    fits = [fit_direction(source, first, searched(first, rough))]
+    fits += [fit_direction(source, own, warmed(own, fits[0].logarithms)) for source, _, own in others]
     shift, chi2 = shifts_of_wheels(usable[0][2], usable[0][1], fits[0])
     if _behind(fits):
         fits[0] = _uncorrected(fits, usable[0][2])
@@ -257,7 +261,8 @@ def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
     Wheels that yield otherwise than by friction under their load, as casters that turn, make the simulated force wrong,
     not the position.
     """
-    tried = fit_direction("plate", replace(campaign, corrected=False), fits[1].logarithms)
+    alone = replace(campaign, corrected=False)
+    tried = fit_direction("plate", alone, warmed(alone, fits[1].logarithms))
     calm = _calm((fits[0], tried))
     left = [np.log(d.held_out.only(calm).variance(np.ones(3, dtype=bool))).mean() for d in (fits[0], tried)]
     return tried if left[1] < left[0] + np.log(_BETTER) else fits[0]

@@ -6,7 +6,7 @@ import pytest
 
 from calibration.stages.stick_slip.fit import fit_direction, fitted, left_out
 from calibration.stages.stick_slip.likelihood import joined
-from calibration.stages.stick_slip.search import displaced, searched, settled, tried
+from calibration.stages.stick_slip.search import displaced, searched, settled, sketched, tried, warmed
 from calibration.stages.stick_slip.wheels import LOGARITHMS, NAMES, PRIOR, PRIOR_SIGMA, WIDE, SlipParameters
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import TRUTH
@@ -27,7 +27,7 @@ def trials():
 
 @pytest.fixture(scope="module")
 def found(trials):
-    return fitted(trials, NEAR)
+    return fitted(trials, warmed(trials, NEAR))
 
 
 def slip_forces(logarithms):
@@ -47,7 +47,7 @@ def test_a_fit_finds_what_made_the_data_and_is_sure_of_no_more(trials, found):
 
 
 def test_from_far_off_the_search_comes_to_the_same(trials, found):
-    best, _ = searched(trials)
+    best = searched(trials)
     np.testing.assert_allclose(best.logarithms[STIFFNESSES], found.logarithms[STIFFNESSES], atol=0.03)
     np.testing.assert_allclose(slip_forces(best.logarithms), slip_forces(found.logarithms), atol=0.03)
 
@@ -83,8 +83,16 @@ def test_ends_a_deviation_apart_come_to_the_same():
 
 
 def test_several_starts_are_made_and_the_best_is_kept(trials):
-    best, starts = searched(trials)
+    rough, starts = sketched(trials)
+    (best,) = tried(trials.coarse, [rough])
     assert len(starts) >= 2 and best.cost <= min(starts)
+
+
+def test_steps_twice_as_long_lead_to_where_short_ones_do(trials, found):
+    rough = sketched(trials)[0]
+    assert trials.coarse.steps == 1 and trials.steps == 2
+    np.testing.assert_allclose((rough - found.logarithms)[ROWS], 0.0, atol=0.1)
+    assert searched(trials, rough).cost == pytest.approx(searched(trials).cost)
 
 
 def test_the_gradient_is_that_of_the_cost(trials):
@@ -98,8 +106,11 @@ def test_the_gradient_is_that_of_the_cost(trials):
 
 
 def test_a_friction_that_nothing_reaches_keeps_its_prior(trials):
-    i, found = NAMES.index("drive_mu"), fitted(trials)
-    assert found.logarithms[i] == pytest.approx(PRIOR[i], abs=0.05)
+    """Nor what is a standard deviation less."""
+    i = NAMES.index("drive_mu")
+    rough = replace(trials, prior=replace(WIDE, mean=WIDE.mean + 0.7 * np.eye(len(NAMES))[i]))
+    found = fitted(rough, searched(rough))
+    assert found.logarithms[i] == pytest.approx(PRIOR[i] + 0.7, abs=0.05)
     assert np.sqrt(found.covariance[i, i]) > 0.8 * PRIOR_SIGMA[i]
 
 
@@ -108,7 +119,7 @@ def test_a_friction_that_only_ever_sticks_is_known_on_one_side(trials, found):
     rng = np.random.default_rng(5)
     rows = [slipping.recorded(rng, plate=False, truth=highest) for _ in range(3)]
     stuck = joined(slipping.WHEELS, rows)
-    start = fitted(stuck, highest.logarithms)
+    start = fitted(stuck, warmed(stuck, highest.logarithms))
     ends = start.logarithms + np.outer([-0.5, 0.5], np.eye(len(NAMES))[i])
     below, above = (stuck.cost(p, e) - start.cost for p, e in zip(ends, stuck.errors(ends), strict=True))
     assert below > 50.0 and above < 5.0
@@ -121,7 +132,7 @@ def test_without_a_trial_the_parameters_are_near_those_of_all(trials, found):
 
 
 def test_trials_left_out_are_predicted(trials):
-    direction = fit_direction("dynamics", trials, NEAR)
+    direction = fit_direction("dynamics", trials, warmed(trials, NEAR))
     assert np.all(direction.held_out.r2 > 0.98)
     assert direction.held_out.error.shape == (4, 3)
     x = left_out(trials, np.repeat(direction.logarithms[None], 4, axis=0))
@@ -133,7 +144,8 @@ def test_a_window_that_slips_as_nobody_could_know_counts_little():
     rows = [slipping.recorded(rng, plate=False) for _ in range(4)]
     rows[1][1].x[80:] += [3e-3, -2e-3, 20e-3]  # pushed
     known = replace(WIDE, sigma=np.where(np.arange(len(NAMES)) < LOGARITHMS, WIDE.sigma, 1e-3))  # where the load is
-    found = fitted(joined(slipping.WHEELS, rows, known), NEAR).logarithms
+    trials = joined(slipping.WHEELS, rows, known)
+    found = fitted(trials, warmed(trials, NEAR)).logarithms
     np.testing.assert_allclose((found - TRUTH.logarithms)[ROWS], 0.0, atol=0.05)
 
 

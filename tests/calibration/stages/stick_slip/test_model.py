@@ -11,6 +11,7 @@ from calibration.stages.stick_slip.fit import fit_direction
 from calibration.stages.stick_slip.forcing import STEPS, Tilting
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
+from calibration.stages.stick_slip.search import warmed
 from calibration.stages.stick_slip.stream import Sample, slip_stream
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import MASS, TRUTH, WEIGHT, WHEELS
@@ -18,7 +19,8 @@ from tests.calibration.stages.stick_slip.slipping import MASS, TRUTH, WEIGHT, WH
 
 @pytest.fixture(scope="module")
 def model():
-    direction = fit_direction("plate", slipping.campaign(3, seed=21), TRUTH.logarithms)
+    trials = slipping.campaign(3, seed=21)
+    direction = fit_direction("plate", trials, warmed(trials, TRUTH.logarithms))
     return StickSlip(WHEELS, Tilting(1e7 * np.eye(6), np.eye(6)), (direction,))
 
 
