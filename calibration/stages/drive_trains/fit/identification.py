@@ -61,12 +61,14 @@ class Candidate:
         score: Of trials left out; less is better.
         left_out: (k,) windows of trials left out less their prediction [rad].
         covariance: (p + 5, p + 5) of theta and gamma.
+        steady: Whether steady contact alone has it, which jolts do not mislead.
     """
 
     fit: TrainFit
     score: float
     left_out: np.ndarray
     covariance: np.ndarray
+    steady: bool = False
 
 
 def identify(
@@ -154,7 +156,8 @@ def best_train(problem: Problem, coarse: JointData, backlash: float, deflection:
     without = replace(richer, form="dead_zone", prior=problem.prior)
     n = len(richest.fit.theta) - problem.data.modes.shape[1]
     same = judged(fit_train(without, np.delete(richest.fit.theta, [n - 2, n - 1]), _FINE))
-    return richest if richest.score < min(plain.score, same.score) - _BETTER else plain
+    best = same if not plain.steady and same.score < plain.score - _BETTER else plain
+    return richest if richest.score < min(plain.score, same.score) - _BETTER else best
 
 
 def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
@@ -169,7 +172,7 @@ def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
     else:
         steady = loaded(steady, moving)
         fits = [evaluated(of, steady.theta, steady.gamma) for of in (moving, still)]
-        found = [_predicting(fit, steady.without(fit.problem), steady.covariance) for fit in fits]
+        found = [replace(_predicting(fit, steady.without(fit.problem), steady.covariance), steady=True) for fit in fits]
     best, plain = (
         min((one for one in found if one.fit.problem.dynamic is dynamic), key=lambda one: one.score)
         for dynamic in (True, False)

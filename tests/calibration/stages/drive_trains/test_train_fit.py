@@ -116,7 +116,17 @@ def test_friction_in_the_mesh_must_predict_better_than_a_dead_zone_of_the_same_w
     monkeypatch.setattr(identification, "_dead_zone", lambda *_: worse)
     with_mesh = np.concatenate([plain.fit.theta[:5], [5e3, 0.1]])
     monkeypatch.setattr(identification, "hinted", lambda *_: [with_mesh])
-    assert identification.best_train(of, of.data, 8e-3, 1e-2) is worse
+    assert plain.steady and identification.best_train(of, of.data, 8e-3, 1e-2) is worse
+
+
+def test_a_search_that_went_astray_is_left_for_a_dead_zone_where_friction_in_the_mesh_began(monkeypatch) -> None:
+    of, poor = problem(data()), 100.0
+    plain = identification.best_train(of, of.data, 8e-3, 1e-2)
+    astray = replace(plain, score=plain.score + poor, steady=False)
+    monkeypatch.setattr(identification, "_dead_zone", lambda *_: astray)
+    monkeypatch.setattr(identification, "hinted", lambda *_: [np.concatenate([plain.fit.theta[:5], [5e3, 0.1]])])
+    found = identification.best_train(of, of.data, 8e-3, 1e-2)
+    assert found.fit.problem.form == "dead_zone" and found.score < plain.score + 0.1 * poor
 
 
 def test_a_gap_that_is_never_crossed_is_not_identifiable_and_says_what_would() -> None:
