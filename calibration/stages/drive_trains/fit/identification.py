@@ -141,7 +141,11 @@ def _start(fit: TrainFit) -> tuple[float, float]:
 
 
 def best_train(problem: Problem, coarse: JointData, backlash: float, deflection: float) -> Candidate:
-    """The form that holds; priors as `prior_of`. The search begins with the joint's data in `coarse` windows."""
+    """The form that holds; priors as `prior_of`. The search begins with the joint's data in `coarse` windows.
+
+    Where steady contact does not show the friction, the search for a dead zone may end far off; one that begins where
+    friction in the mesh ended takes its place if it predicts better.
+    """
     first = replace(problem, form="dead_zone", dynamic=False, data=coarse.sliding)
     rough = min((fit_train(first, theta, _ROUGH) for theta in _starts(first)), key=lambda fit: fit.cost)
     plain = _dead_zone(problem, rough)
