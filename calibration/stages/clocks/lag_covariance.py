@@ -35,7 +35,7 @@ class Reduced:
     Attributes:
         r: (6 n + b,) whitened residuals without their part in U.
         S: (6 n + b, 2) their derivatives by lag and drift, likewise.
-        V: (6 n + b, p + 2) basis of the nuisances, orthonormal but for rounding, and S with its part in U, normalised.
+        V: (6 n + b, p + 2) basis of the span U, orthonormal but for rounding; and S with its part in U, normalised.
         M: (n_blocks + 1, p + 2, p + 2) V_g' V_g of each block of samples, then of the coefficients.
         t: (n,) [s, mocap clock].
     """
@@ -45,11 +45,6 @@ class Reduced:
     V: np.ndarray
     M: np.ndarray
     t: np.ndarray
-
-    @property
-    def U(self) -> np.ndarray:  # noqa: N802
-        """(6 n + b, p) orthonormal basis of the nuisances."""
-        return self.V[:, :-2] @ inverse_root(self.M.sum(axis=0)[:-2, :-2])
 
     def coefficients(self, x: np.ndarray) -> np.ndarray:
         """b (b,) where x (2,) are lag and drift."""

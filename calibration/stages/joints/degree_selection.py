@@ -69,11 +69,12 @@ def candidates(samples: Sequence[Samples], terms: Terms, highest: int = HIGHEST)
     sets = [tuple(p for p in exponents(terms, degree) if p in kept) for degree in range(highest + 1)]
     new = [d for d, powers in enumerate(sets) if powers and (d == 0 or powers != sets[d - 1])]
     order = list(dict.fromkeys(c for d in new for c in _columns(basis, sets[d])))  # those of lower degrees first
-    middle = triangular(_problem(basis, whole), order, rho_grid()[len(rho_grid()) // 2 :][:1])[0]
+    rhos = rho_grid()
+    middle = triangular(_problem(basis, whole), order, rhos[[len(rhos) // 2]])[0]
     degrees = [d for d in new if _is_fixed(middle, 2 * len(sets[d]))]
     ends = [2 * len(sets[d]) for d in degrees]
     order = order[: max(ends, default=0)]
-    factors = [triangular(_problem(basis, s), order, rho_grid()) for s in samples]
+    factors = [triangular(_problem(basis, s), order, rhos) for s in samples]
     of_others = np.array([_of_others(of_rho) for of_rho in zip(*factors, strict=True)]).swapaxes(0, 1)
     folds = [_left_out(basis, samples, order, ends, k, R) for k, R in enumerate(of_others)]
     for degree, left_out in zip(degrees, zip(*folds, strict=True), strict=True):

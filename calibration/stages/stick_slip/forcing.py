@@ -69,10 +69,10 @@ class PlanarForcing:
         return planar_force(self.drive, self.source)
 
 
-def planar_force(drive: np.ndarray, source: Source) -> np.ndarray:
-    """Change of Fx, Fy, Mz (n, 3) on the floor by its source, of drives (STEPS n, 11)."""
+def planar_force(drive: np.ndarray, source: Source, steps: int = STEPS) -> np.ndarray:
+    """Change of Fx, Fy, Mz (n, 3) on the floor by its source, of drives (steps n, 11)."""
     first = PLATE if source == "plate" else 0
-    return np.asarray(drive[STEPS - 1 :: STEPS, first : first + 3])
+    return np.asarray(drive[steps - 1 :: steps, first : first + 3])
 
 
 @dataclass(frozen=True)

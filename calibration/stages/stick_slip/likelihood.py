@@ -109,7 +109,7 @@ class Trials:
 
     def force(self, source: Source) -> np.ndarray:
         """(n, 3) change of Fx, Fy, Mz on the floor, by its source."""
-        return planar_force(self.drive, source)
+        return planar_force(self.drive, source, self.steps)
 
     def alone(self, k: int) -> "Trials":
         """Trial k alone."""

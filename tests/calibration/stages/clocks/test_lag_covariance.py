@@ -28,10 +28,10 @@ def reduced(rng):
 
 def mean_covariance(x, rng, draws=200):
     """Of as many draws of white noise on the same design, and how often 1.96 sigmas hold the truth."""
-    C, z = np.zeros((2, 2)), []
+    C, z, U = np.zeros((2, 2)), [], np.linalg.qr(x.V[:, :-2])[0]  # of the nuisances
     for _ in range(draws):
         noise = rng.normal(size=len(x.r))
-        found, one = lag_and_drift(replace(x, r=noise - x.U @ (x.U.T @ noise)))
+        found, one = lag_and_drift(replace(x, r=noise - U @ (U.T @ noise)))
         C, z = C + one / draws, [*z, found / np.sqrt(np.diag(one))]
     return C, (np.abs(z) <= 1.96).mean(axis=0)
 
