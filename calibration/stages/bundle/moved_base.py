@@ -36,7 +36,7 @@ class RoughBase(NamedTuple):
 def moved_as_predicted(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension) -> RoughBase:
     """By the plate, or by inverse dynamics where there is none; nothing of trials and robots that do not show it."""
     try:
-        campaign = campaign_of(sources, trials, suspension)
+        campaign = campaign_of(sources, trials, suspension, most=1)
     except NotEnoughData:
         return RoughBase(AS_SEEN)
     source, _, of_source = campaign.by_source[0]

@@ -165,15 +165,15 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wr
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)
     if sources.robot is None or not len(trial.t_robot):
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)), wheels_of(lab))
-    readings = readings_of(lab, sources.robot, trial)
+    t, q, wrench = readings_of(sources.robot, trial)
+    readings = Readings(t, q, hand_push(lab.urdf, lab.description, t, q, wrench))
     return replace(wrenches_along(lab, readings, plate, T_lab_0), trial_id=trial.id, start=start)
 
 
-def readings_of(lab: Laboratory, robot: Clock, trial: Trial) -> Readings:
-    """The whole readings of a trial, by a robot with its payload."""
+def readings_of(robot: Clock, trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times (n,) [s, mocap clock] of the whole readings of a trial, the motors' (n, k) and the wrist's (n, 6)."""
     known = np.isfinite(trial.q_motor).all(axis=1)
-    t, q = robot.to_mocap(trial.t_robot[known]), trial.q_motor[known]
-    return Readings(t, q, hand_push(lab.urdf, lab.description, t, q, trial.wrist_wrench[known]))
+    return robot.to_mocap(trial.t_robot[known]), trial.q_motor[known], trial.wrist_wrench[known]
 
 
 def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_lab_0: np.ndarray) -> Wrenches:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.errors import NotEnoughData
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.lie import from_vector, inverse, to_vector
 from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
 from calibration.recording.clock import Clock
@@ -36,7 +37,7 @@ from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.floor_wrench import Load, motion_load
 from calibration.stages.suspension.model import Source
-from calibration.stages.suspension.rest_frame import rest_of
+from calibration.stages.suspension.rest_frame import Rest, rest_of
 
 
 @dataclass(frozen=True)
@@ -122,9 +123,14 @@ class Links(NamedTuple):
 def links_of(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, T_lab_0: np.ndarray) -> Links:
     """The links in a whole trial with its payload, and what else loads the hand."""
     lab, trains = lab.of_trial(trial.id), trains.of_trial(trial.id)
-    readings, known = readings_of(lab, robot, trial), np.isfinite(trial.q_motor).all(axis=1)
-    push = trains.push(readings.t, readings.q, trial.wrist_wrench[known])
-    return Links(lab, trains, readings._replace(push=push), T_lab_0)
+    t, q, wrench = readings_of(robot, trial)
+    return Links(lab, trains, Readings(t, q, trains.push(t, q, wrench)), T_lab_0)
+
+
+def links_seen(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: MeasuredTrial, rest: Rest) -> Load:
+    """Inverse dynamics of links that move with the base as its markers show it."""
+    links = links_of(lab, trains, robot, trial, rest.T_lab_0)
+    return links.load(trial.t_mocap, trial.base.T @ inverse(rest.T_0_B))
 
 
 def planar_twist(t: np.ndarray, T_lab_base: np.ndarray, T_lab_0: np.ndarray, at: np.ndarray) -> np.ndarray | None:

@@ -9,17 +9,15 @@
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
-from calibration.numerics.lie import inverse
 from calibration.numerics.side_by_side import side_by_side
-from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
-from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.band import PlainBand, heave_band, plain_band, reached
 from calibration.stages.stick_slip.fit import fit_direction
@@ -34,14 +32,13 @@ from calibration.stages.stick_slip.forcing import (
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
-from calibration.stages.stick_slip.poses import links_of
+from calibration.stages.stick_slip.poses import links_seen
 from calibration.stages.stick_slip.search import elsewhere, searched, shifts_of_wheels, warmed
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
-from calibration.stages.suspension.floor_wrench import Load
 from calibration.stages.suspension.model import Source, Suspension
-from calibration.stages.suspension.rest_frame import Rest, rest_of
+from calibration.stages.suspension.rest_frame import rest_of
 from calibration.verdict import Verdict
 
 STAGE = "stick_slip"
@@ -105,9 +102,13 @@ def fit_stick_slip(
 
 
 def campaign_of(
-    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, trains: DriveTrains | None = None
+    sources: WrenchSources,
+    trials: Sequence[Trial],
+    suspension: Suspension,
+    trains: DriveTrains | None = None,
+    most: int = len(SOURCES),
 ) -> Campaign:
-    """The trials by their wrenches.
+    """The trials by their wrenches, of so many sources.
 
     Raises:
         NotEnoughData: Too few wheels are declared, or too few trials show the base and its wrench.
@@ -118,8 +119,9 @@ def campaign_of(
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials, suspension, trains)
     tilting, prior = tilting_of(sources, read, wheels, suspension)
-    by_source = [(source, _rows(description, read, tilting, source)) for source in SOURCES]
-    usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in by_source if len(rows) >= _LEAST_TRIALS]
+    by_source = ((source, _rows(description, read, tilting, source)) for source in SOURCES)
+    shown = ((source, rows) for source, rows in by_source if len(rows) >= _LEAST_TRIALS)
+    usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in islice(shown, most)]
     if not usable:
         raise NotEnoughData("no stick-slip base: it takes two trials that show the base and its wrench")
     return Campaign(wheels, read, tilting, usable)
@@ -137,20 +139,13 @@ def _read(
                 far = slid(sources.lab.description, trial, rest, wrenches.plate, suspension)
                 wrenches = replace(wrenches, slid=far)
             if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
-                wrenches = replace(wrenches, links=_linked(sources.lab, trains, sources.robot, trial, rest))
+                wrenches = replace(wrenches, links=links_seen(sources.lab, trains, sources.robot, trial, rest))
             return Read(trial, rest, wrenches)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             return None
 
     return [one for one in side_by_side(read, trials) if one is not None]
-
-
-def _linked(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, rest: Rest) -> Load:
-    """Inverse dynamics of links that move with the base as its markers show it."""
-    links = links_of(lab, trains, robot, trial, rest.T_lab_0)
-    T_lab_B = MeasuredTrial.of(lab.description, trial).base.T
-    return links.load(trial.t_mocap, T_lab_B @ inverse(rest.T_0_B))
 
 
 def _rows(

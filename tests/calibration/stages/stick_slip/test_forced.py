@@ -14,7 +14,15 @@ from calibration.stages.drive_trains import DriveTrain, DriveTrains
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import wrenches_of
 from calibration.stages.stick_slip.band import Band
-from calibration.stages.stick_slip.forcing import CUTOFF, FARTHEST, STEPS, Tilting, planar_forcing, readings_of
+from calibration.stages.stick_slip.forcing import (
+    CUTOFF,
+    FARTHEST,
+    STEPS,
+    Readings,
+    Tilting,
+    planar_forcing,
+    readings_of,
+)
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.stick_slip.poses import Links, forced, planar_twist
 from calibration.stages.stick_slip.wheels import wheel_set
@@ -53,7 +61,7 @@ def links(trial, half_gap):
     trains = (DriveTrain("arm_1_joint", "dead_zone", values, dynamic=False),)
     robot = dynamics(mjcf.urdf(), DESCRIPTION, np.zeros(8))
     of = DriveTrains(robot, trains, mjcf.urdf(), DESCRIPTION)
-    return Links(SOURCES.lab, of, readings_of(SOURCES.lab, ROBOT, trial), T_LAB_BASE)
+    return Links(SOURCES.lab, of, Readings(*readings_of(ROBOT, trial)[:2]), T_LAB_BASE)
 
 
 def test_a_plate_says_what_wheels_bear_whatever_the_links_do(trial):
