@@ -47,6 +47,7 @@ _SPACING, _PASSED = 0.5, 250  # [s] between postures passed through, at least; s
 _MOVES = 0.05  # [rad, m] a joint must move to count as moving
 _LOADED, _TORQUE = 0.1, 0.3  # a joint is loaded while |tau| exceeds this share of its largest, and this [N.m, N]
 _FREE = 0.02  # [rad, m] random error of a joint that is not loaded: more than any gear's play
+_STRIDES = (4, 1)  # of the samples, pass by pass
 _UNKNOWN = 0.1  # [s] standard deviation of a lag that says less than angular velocities do
 _log = logging.getLogger(__name__)
 
@@ -99,13 +100,15 @@ def _postures(description: Description, trials: Sequence[Trial], robot: Clock) -
         return passed
 
 
-def refined_lags(robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock) -> list[TrialLag]:
-    """Lags of the trials that move loaded joints, around an approximate clock."""
+def refined_lags(
+    robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock, stride: int = 1
+) -> list[TrialLag]:
+    """Lags of the trials that move loaded joints, around an approximate clock, by one sample of so many."""
 
     def found(trial: Trial) -> TrialLag | None:
         try:
             samples = read_samples(MeasuredTrial.of(description, trial), clock, calm=True)
-            return _refined(robot, samples, trial.id, clock)
+            return _refined(robot, samples.thinned(stride), trial.id, clock)
         except NotEnoughData as error:
             _log.info("%s: %s", trial.id, error)
             return None
@@ -191,17 +194,16 @@ def _gravity_torques(hand: HandModel, q: np.ndarray) -> np.ndarray:
     return hand.chain.gravity_torques(hand.angles(q))
 
 
-def refined(
-    robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock, passes: int = 2
-) -> list[TrialLag]:
-    """Lags from poses; each pass starts from the clock of the one before.
+def refined(robot: Provisional, description: Description, trials: Sequence[Trial], clock: Clock) -> list[TrialLag]:
+    """Lags from poses, around the clock that a first pass by fewer samples finds.
 
     Raises:
         NotEnoughData: No trial moves a joint that gravity preloads.
     """
     lags: list[TrialLag] = []
-    for _ in range(passes):
-        lags = [lag for lag in refined_lags(robot, description, trials, clock) if lag.lag.sigma < _UNKNOWN]
+    for stride in _STRIDES:
+        found = refined_lags(robot, description, trials, clock, stride)
+        lags = [lag for lag in found if lag.lag.sigma < _UNKNOWN]
         if not lags:
             raise NotEnoughData("no trial moves a joint that gravity preloads on one flank, or readings are too coarse")
         clock = fit_clock(clock.instrument, lags)[0]

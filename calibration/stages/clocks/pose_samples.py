@@ -5,7 +5,7 @@ otherwise look like accelerations of 5 rad/s2. The readings themselves stay as t
 white and averages out over thousands of samples.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -41,6 +41,10 @@ class Samples:
     lost: np.ndarray
     T: np.ndarray
     covariance: np.ndarray
+
+    def thinned(self, stride: int) -> "Samples":
+        """One sample of so many."""
+        return Samples(*(getattr(self, f.name)[::stride] for f in fields(self)))
 
 
 def read_samples(trial: MeasuredTrial, clock: Clock, calm: bool) -> Samples:
