@@ -140,6 +140,17 @@ def widening(v: np.ndarray) -> np.ndarray:
     return np.asarray(stdtrit(nu, _QUANTILE) / ndtri(_QUANTILE))
 
 
+def holding(errors: np.ndarray) -> np.ndarray:
+    """Standard deviations (p,) of which 1.96 hold 95 % of errors (n, p), or of others like them; their rms at least.
+
+    Of errors most of which are small 1.96 rms hold fewer. Other errors are below the k-th of n in k / (n + 1) of cases.
+    """
+    if not len(errors):
+        return np.zeros(errors.shape[1])
+    within = np.quantile(np.abs(errors), 2.0 * _QUANTILE - 1.0, axis=0, method="weibull")
+    return np.asarray(np.maximum(np.sqrt((errors**2).mean(axis=0)), within / ndtri(_QUANTILE)))
+
+
 def long_run_variance(psi: np.ndarray, rate: float) -> float:
     """Variance of sum(psi), sampled at `rate` [Hz], allowing for autocorrelation up to `MEMORY` (Bartlett weights)."""
     return float(long_run_covariance(psi[:, None], rate)[0, 0])

@@ -8,7 +8,9 @@ q_link is what a joint's link encoder reads less the errors found with its drive
 where the side of the mesh is certain; of other joints it is what the drive train predicts, with its interval. Such
 variance widens a posture's covariance along the joint. How far predictions of drive trains are off at rest:
 
-    s_j^2 = mean over dwells of (q_predicted - q_link)^2         of joint j [rad2]
+    s_j = max(rms e, q_95(|e|) / 1.96),     e = q_predicted - q_link over dwells       of joint j [rad]
+
+Links stop elsewhere in their gaps in few dwells: 1.96 rms hold too few. 95 % of other dwells are below the quantile.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,6 +23,7 @@ from calibration.inference.parameters import Model
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import Postures, dwell_windows, passing_postures, readings_at, static_postures
 from calibration.numerics.lie import inverse
+from calibration.numerics.robust_covariance import holding
 from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
@@ -70,7 +73,7 @@ class RefittedGeometry:
         model: Parameters of the geometry.
         bending: Of the column.
         trains: The drive trains; `dynamics.offset` are the new zeros.
-        at_rest: (m,) rms error of each train's angle in dwells, by link encoders [rad]; 0 where not known.
+        at_rest: (m,) s_j of each train's angle in dwells, by link encoders [rad]; 0 where not known.
         shown: Effects that the residuals show and the model leaves out, as messages.
     """
 
@@ -221,7 +224,7 @@ def _have_link_encoders(trains: DriveTrains) -> np.ndarray:
 
 
 def rest_errors(trains: DriveTrains, corrected: Sequence[CorrectedTrial], robot: Clock) -> np.ndarray:
-    """(m,) rms over all dwells of each drive train's angle less its link encoder's [rad]; 0 without one."""
+    """(m,) s_j of each drive train's angle less its link encoder's [rad]; 0 without one."""
     found = [np.zeros((0, len(trains.trains)))]
     columns = [trains.joints.index(train.joint) for train in trains.trains]
     for one in (one for one in corrected if len(one.trial.dwell_start)):
@@ -230,8 +233,7 @@ def rest_errors(trains: DriveTrains, corrected: Sequence[CorrectedTrial], robot:
             dwell = q[(t >= start) & (t <= stop)][:, columns]
             dwell = dwell[np.isfinite(dwell).all(axis=1)]
             found.append(dwell[:1] if len(dwell) == 0 else dwell.mean(axis=0, keepdims=True))
-    every = np.concatenate(found)
-    return np.sqrt((every**2).mean(axis=0)) if len(every) else np.zeros(len(columns))
+    return holding(np.concatenate(found))
 
 
 def hand_poses(hand: HandModel, bending: ColumnBending, corrected: CorrectedTrial, robot: Clock) -> np.ndarray:
