@@ -43,8 +43,9 @@ class Samples:
     covariance: np.ndarray
 
     def thinned(self, stride: int) -> "Samples":
-        """One sample of so many."""
-        return Samples(*(getattr(self, f.name)[::stride] for f in fields(self)))
+        """One sample of so many; all of them where too few would be left."""
+        every = stride if len(self.t) >= stride * _ENOUGH else 1
+        return Samples(*(getattr(self, f.name)[::every] for f in fields(self)))
 
 
 def read_samples(trial: MeasuredTrial, clock: Clock, calm: bool) -> Samples:

@@ -10,7 +10,8 @@ from calibration.numerics.time_delay import Lag
 from calibration.recording.clock import Clock
 from calibration.robot.chain import chain_of
 from calibration.stages.clocks.clock_fit import TrialLag, allowance, fit_clock
-from calibration.stages.clocks.pose_refinement import provisional, refined_lags
+from calibration.stages.clocks.pose_refinement import provisional, refined, refined_lags
+from calibration.stages.clocks.pose_samples import Samples
 from tests.doubles import geared_robot, rigid_robot
 
 KNOWN = rigid_robot.described().tolerances.model_copy(update={"joint_delay": 8e-5, "joint_delay_spread": 0.5})
@@ -75,3 +76,22 @@ def test_friction_that_winds_the_gears_is_found_and_not_where_there_is_none():
         unseen = reported.unseen
     assert found[1] - found[0] > 1e-4 > abs(found[0])
     assert 0.0 < unseen < 1e-4  # 0.1 mrad at 0.3 rad/s are 0.3 ms, most of which the fit tells from the lag
+
+
+def test_a_first_pass_by_fewer_samples_ends_at_the_same_clock(monkeypatch):
+    description, chain = rigid_robot.described(), chain_of(mjcf.urdf(), rigid_robot.described())
+    rng = np.random.default_rng(5)
+    trial = geared_robot.record(
+        rigid_robot.defects(0), geared_robot.gears(rng), geared_robot.swing(rng, 20.0), 12.0, rng
+    )
+    late, found = replace(CLOCK, offset=CLOCK.offset + 4e-3), []
+    model = provisional(chain, description, [trial], late)
+    for strides in ((1, 1), (4, 1), (4, 4)):
+        monkeypatch.setattr("calibration.stages.clocks.pose_refinement._STRIDES", strides)
+        found.append(refined(model, description, [trial], late)[0].lag.value)
+    assert abs(found[1] - found[0]) < 1e-6 < 1e-5 < abs(found[2] - found[0])
+
+
+def test_few_samples_all_count():
+    few, many = (Samples(*(np.arange(float(n)),) * 6) for n in (399, 400))
+    assert len(few.thinned(4).t) == 399 and len(many.thinned(4).t) == 100
