@@ -50,5 +50,7 @@ def slip_loads(twin: Twin, wheels: Sequence[Wheel]) -> np.ndarray:
     found = []
     for unit in np.linalg.inv(K)[:, HELD].T:
         shares = np.array([(springs(w)[0] * (lever(w) @ unit))[:2] for w in wheels])
-        found.append(min(np.min(mu * N / np.linalg.norm(shares, axis=1)), np.min(turns / np.abs(shares).max(axis=1))))
+        with np.errstate(divide="ignore"):  # a rigid body's wheels have no share
+            slips = mu * N / np.linalg.norm(shares, axis=1), turns / np.abs(shares).max(axis=1)
+        found.append(min(np.min(slips[0]), np.min(slips[1])))
     return np.array(found)
