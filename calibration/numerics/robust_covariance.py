@@ -140,7 +140,7 @@ def widening(v: np.ndarray) -> np.ndarray:
     return np.asarray(stdtrit(nu, _QUANTILE) / ndtri(_QUANTILE))
 
 
-def holding(errors: np.ndarray) -> np.ndarray:
+def covering_sigma(errors: np.ndarray) -> np.ndarray:
     """Standard deviations (p,) of which 1.96 hold 95 % of errors (n, p), or of others like them; their rms at least.
 
     Of errors most of which are small 1.96 rms hold fewer. Other errors are below the k-th of n in k / (n + 1) of cases.

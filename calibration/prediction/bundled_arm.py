@@ -68,7 +68,7 @@ class BundledArm:
     Attributes:
         trains: With the payload in the hand.
         bending: Of the column.
-        rest_sigma: (k,) of each joint's angle in dwells, 1.96 hold 95 % [rad]; 0 where not known.
+        rest_sigma: (k,) standard deviation of each joint's angle in dwells [rad]; 0 where not known.
     """
 
     trains: DriveTrains

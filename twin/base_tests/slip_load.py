@@ -51,6 +51,6 @@ def slip_loads(twin: Twin, wheels: Sequence[Wheel]) -> np.ndarray:
     for unit in np.linalg.inv(K)[:, HELD].T:
         shares = np.array([(springs(w)[0] * (lever(w) @ unit))[:2] for w in wheels])
         with np.errstate(divide="ignore"):  # a rigid body's wheels have no share
-            slips = mu * N / np.linalg.norm(shares, axis=1), turns / np.abs(shares).max(axis=1)
-        found.append(min(np.min(slips[0]), np.min(slips[1])))
+            limits = mu * N / np.linalg.norm(shares, axis=1), turns / np.abs(shares).max(axis=1)
+        found.append(np.min(limits))
     return np.array(found)

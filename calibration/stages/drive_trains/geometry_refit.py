@@ -23,7 +23,7 @@ from calibration.inference.parameters import Model
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.mocap.postures import Postures, dwell_windows, passing_postures, readings_at, static_postures
 from calibration.numerics.lie import inverse
-from calibration.numerics.robust_covariance import holding
+from calibration.numerics.robust_covariance import covering_sigma
 from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
@@ -233,7 +233,7 @@ def rest_errors(trains: DriveTrains, corrected: Sequence[CorrectedTrial], robot:
             dwell = q[(t >= start) & (t <= stop)][:, columns]
             dwell = dwell[np.isfinite(dwell).all(axis=1)]
             found.append(dwell[:1] if len(dwell) == 0 else dwell.mean(axis=0, keepdims=True))
-    return holding(np.concatenate(found))
+    return covering_sigma(np.concatenate(found))
 
 
 def hand_poses(hand: HandModel, bending: ColumnBending, corrected: CorrectedTrial, robot: Clock) -> np.ndarray:

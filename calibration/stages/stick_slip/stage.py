@@ -108,7 +108,7 @@ def campaign_of(
     trains: DriveTrains | None = None,
     most: int = len(SOURCES),
 ) -> Campaign:
-    """The trials by their wrenches, of so many sources.
+    """The trials by their wrenches, of `most` sources, the plate first.
 
     Raises:
         NotEnoughData: Too few wheels are declared, or too few trials show the base and its wrench.
@@ -130,22 +130,25 @@ def campaign_of(
 def _read(
     sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, trains: DriveTrains | None
 ) -> list[Read]:
-    def read(trial: Trial) -> Read | None:
-        try:
-            trial = MeasuredTrial.of(sources.lab.description, trial)
-            rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-            wrenches = wrenches_of(sources, trial, rest.T_lab_0)
-            if wrenches.plate is not None:
-                far = slid(sources.lab.description, trial, rest, wrenches.plate, suspension)
-                wrenches = replace(wrenches, slid=far)
-            if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
-                wrenches = replace(wrenches, links=links_seen(sources.lab, trains, sources.robot, trial, rest))
-            return Read(trial, rest, wrenches)
-        except NotEnoughData as error:
-            _log.info("%s: %s", trial.id, error)
-            return None
+    found = side_by_side(lambda trial: _read_one(sources, trial, suspension, trains), trials)
+    return [one for one in found if one is not None]
 
-    return [one for one in side_by_side(read, trials) if one is not None]
+
+def _read_one(sources: WrenchSources, trial: Trial, suspension: Suspension, trains: DriveTrains | None) -> Read | None:
+    """None where its base or wrench is not shown."""
+    try:
+        seen = MeasuredTrial.of(sources.lab.description, trial)
+        rest = rest_of(sources.lab.description, seen, sources.T_base_B)
+        wrenches = wrenches_of(sources, seen, rest.T_lab_0)
+        if wrenches.plate is not None:
+            far = slid(sources.lab.description, seen, rest, wrenches.plate, suspension)
+            wrenches = replace(wrenches, slid=far)
+        if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
+            wrenches = replace(wrenches, links=links_seen(sources.lab, trains, sources.robot, seen, rest))
+        return Read(seen, rest, wrenches)
+    except NotEnoughData as error:
+        _log.info("%s: %s", trial.id, error)
+        return None
 
 
 def _rows(

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibration.errors import NotEnoughData, ShapeError
-from calibration.numerics.robust_covariance import ENOUGH, LONG, MANY, block_covariance, holding, widening
+from calibration.numerics.robust_covariance import ENOUGH, LONG, MANY, block_covariance, covering_sigma, widening
 
 
 def series(rng, a, n, p):
@@ -97,11 +97,11 @@ def test_so_many_deviations_hold_95_percent_of_others_of_which_few_are_large():
         return np.where(rng.uniform(size=(n, m)) < 0.1, rng.uniform(-1.0, 1.0, (n, m)), rng.normal(0.0, 0.03, (n, m)))
 
     some, others = drawn(40, 4000), drawn(2000, 1)
-    inside = [(np.abs(others) < 1.96 * s).mean() for s in (holding(some), np.sqrt((some**2).mean(axis=0)))]
+    inside = [(np.abs(others) < 1.96 * s).mean() for s in (covering_sigma(some), np.sqrt((some**2).mean(axis=0)))]
     assert inside[0] > 0.95 > 0.942 > inside[1]
     gauss = np.random.default_rng(2).normal(size=(40, 4000))
-    assert holding(gauss).mean() == pytest.approx(1.0, abs=0.12)
+    assert covering_sigma(gauss).mean() == pytest.approx(1.0, abs=0.12)
 
 
 def test_without_errors_nothing_is_to_be_held():
-    np.testing.assert_array_equal(holding(np.zeros((0, 3))), np.zeros(3))
+    np.testing.assert_array_equal(covering_sigma(np.zeros((0, 3))), np.zeros(3))
