@@ -8,7 +8,7 @@ blocks of time, because gears lag for as long as a motion lasts.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from calibration.mocap.postures import passed_rows, readings_at
 from calibration.numerics.lie import inverse, log6
 from calibration.recording.clock import Clock
 from calibration.robot.blocks import BacklashPreload, Compliance
-from calibration.robot.hand import HandModel
+from calibration.robot.hand import HandModel, HandPoses
 
 _SPACING, _MOST = 0.25, 600  # [s] between samples, at least; so many of them, about
 _STEP = 0.02  # [s] either side, for velocities
@@ -39,6 +39,7 @@ class Passed:
         link: (n, n_measured) link readings [rad, m], NaN without one.
         T: (n, 4, 4) measured T_B_H.
         late: (n,) standard deviation of the readings' clock [s].
+        payload: (n,) what is in the hand [kg].
     """
 
     trial: np.ndarray
@@ -48,6 +49,7 @@ class Passed:
     link: np.ndarray
     T: np.ndarray
     late: np.ndarray
+    payload: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -86,9 +88,8 @@ def unexplained(hand: HandModel, model: Model, x: Passed) -> Unexplained:
     """Residuals of samples x of a hand with the values of an estimated model."""
     known = [k for k, p in enumerate(model.parameters) if p.name in hand.names]
     names, covariance = [model.parameters[k].name for k in known], model.random_covariance[np.ix_(known, known)]
-    tau = hand.chain.gravity_torques(hand.angles(x.q))
     gears = [n for kind in (Compliance, BacklashPreload) for n in hand.block(kind).names if n not in names]
-    at = hand.poses_and_derivatives(x.q, tau, (*names, *gears))
+    at = _loaded(hand, x, (*names, *gears))
     r, p = log6(inverse(x.T) @ at.T), len(names)
     size = np.repeat([np.sqrt((r[:, part] ** 2).mean()) for part in (slice(3), slice(3, 6))], 3)
     B = np.concatenate([at.J[:, :, :p] @ _root(covariance), _PLAY * at.J[:, :, p:]], axis=2) / size[:, None]
@@ -101,6 +102,17 @@ def unexplained(hand: HandModel, model: Model, x: Passed) -> Unexplained:
         lambda columns: without(_stacked(columns / size[:, None])),
         float(np.sqrt((r[:, :3] ** 2).sum(axis=1).mean())),
     )
+
+
+def _loaded(hand: HandModel, x: Passed, names: Sequence[str]) -> HandPoses:
+    """Poses and derivatives, the payload of its trial in the hand at every sample."""
+    found: list[HandPoses] = []
+    masses, of = np.unique(x.payload, return_inverse=True)
+    for k, mass in enumerate(masses):
+        loaded, q = hand.carrying(float(mass)), x.q[of == k]
+        found.append(loaded.poses_and_derivatives(q, loaded.chain.gravity_torques(loaded.angles(q)), names))
+    back = np.argsort(np.argsort(of, kind="stable"))
+    return HandPoses(*(np.concatenate([getattr(part, f.name) for part in found])[back] for f in fields(HandPoses)))
 
 
 def passed(trials: Sequence[MeasuredTrial], robot: Clock) -> Passed:
@@ -117,7 +129,8 @@ def passed(trials: Sequence[MeasuredTrial], robot: Clock) -> Passed:
         link = readings_at(trial, robot, t[rows], trial.q_link)
         at = t[rows][good]
         late = robot.sigma_at(robot.from_mocap(at))
-        found.append((np.full(good.sum(), k), at, q[good], v[good], link[good], T[good], late))
+        payload = np.full(good.sum(), trial.description.payload_of(trial.id))
+        found.append((np.full(good.sum(), k), at, q[good], v[good], link[good], T[good], late, payload))
     return Passed(*(np.concatenate(x) for x in zip(*found, strict=True)))
 
 

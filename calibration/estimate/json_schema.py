@@ -71,7 +71,7 @@ class ModelEntry(Entry):
     @field_validator("parameters")
     @classmethod
     def _are_named_once(cls, parameters: tuple[ParameterEntry, ...]) -> tuple[ParameterEntry, ...]:
-        refuse_repeated({"parameters": [p.name for p in parameters]})
+        refuse_repeated(parameters=[p.name for p in parameters])
         return parameters
 
 

@@ -154,7 +154,7 @@ class Predictor:
         """The base on its suspension, its marker body at rest at T_lab_B (4, 4)."""
         if self.suspension is None:
             return None
-        lab = laboratory(self.urdf, self.description.loaded(entry), self.robot, self.plate)
+        lab = laboratory(self.urdf, self.description.carrying(entry.payload), self.robot, self.plate)
         return BaseInTrial(self.suspension, lab, trial, T_lab_B)
 
 

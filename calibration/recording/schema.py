@@ -4,7 +4,7 @@ SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and 
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
@@ -36,7 +36,7 @@ class Declaration(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-def refuse_repeated(groups: Mapping[str, Sequence[str]]) -> None:
+def refuse_repeated(**groups: Sequence[str]) -> None:
     """Raise ValueError for the first group that holds a name more than once."""
     for group, names in groups.items():
         twice = sorted(n for n, count in Counter(names).items() if count > 1)
@@ -242,15 +242,14 @@ class Description(Setup):
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> "Description":
-        groups = {
-            "joints": [j.name for j in self.joints],
-            "bodies": [b.name for b in self.bodies],
-            "markers": [m.name for b in self.bodies for m in b.markers],
-            "plates": [p.name for p in self.plates],
-            "wheels": [w.name for w in self.wheels],
-            "trials": [t.id for t in self.trials],
-        }
-        refuse_repeated(groups)
+        refuse_repeated(
+            joints=[j.name for j in self.joints],
+            bodies=[b.name for b in self.bodies],
+            markers=[m.name for b in self.bodies for m in b.markers],
+            plates=[p.name for p in self.plates],
+            wheels=[w.name for w in self.wheels],
+            trials=[t.id for t in self.trials],
+        )
         return self
 
     @model_validator(mode="after")
@@ -264,15 +263,16 @@ class Description(Setup):
             )
         return self
 
-    def loaded(self, entry: TrialEntry) -> "Description":
-        """The description with the payload of one trial."""
-        return self.carrying(entry.payload)
-
     def carrying(self, mass: float | None) -> "Description":
         """The description with another mass [kg] of its payload; itself where None, or where it has no payload."""
         if mass is None or self.payload is None:
             return self
         return self.model_copy(update={"payload": self.payload.model_copy(update={"mass": mass})})
+
+    def payload_of(self, trial_id: str | None = None) -> float:
+        """Mass [kg] in the hand in a trial, the campaign's where none is named or it has no other; 0 without one."""
+        payload = self.carrying(next((e.payload for e in self.trials if e.id == trial_id), None)).payload
+        return 0.0 if payload is None else payload.mass
 
     @property
     def alone(self) -> "Description":

@@ -177,12 +177,11 @@ class Mapping(Declaration):
 
     @model_validator(mode="after")
     def _names_fit(self) -> "Mapping":
-        groups = {
-            "bodies": [b.name for b in self.bodies],
-            "markers": [name for b in self.bodies for name in b.marker_names],
-            "trials": [t.id for t in self.trials],
-        }
-        refuse_repeated(groups)
+        refuse_repeated(
+            bodies=[b.name for b in self.bodies],
+            markers=[name for b in self.bodies for name in b.marker_names],
+            trials=[t.id for t in self.trials],
+        )
         unknown = sorted(set(self.reversed_effort) - set(self.setup.joint_names))
         if unknown:
             raise ValueError(f"reversed_effort: {unknown} are no joints of the setup")

@@ -70,24 +70,22 @@ class HungLoad:
 
 def hung_load(urdf: str, description: Description, offset: np.ndarray, trials: Sequence[Trial]) -> HungLoad | None:
     """By the trials' readings; None where no sensor was read. `offset` (k,) zeros of the motors' readings [rad, m]."""
-    masses = {entry.id: entry.payload for entry in description.trials}
-    declared = 0.0 if description.payload is None else description.payload.mass
     rows: list[tuple[np.ndarray, np.ndarray, float]] = []
     nominal = wrist_sensor(urdf, description)
     for trial in trials if nominal is not None else ():
-        mass = masses.get(trial.id)
+        mass = description.payload_of(trial.id)
         known = np.isfinite(trial.q_motor).all(axis=1) & np.isfinite(trial.wrist_wrench).all(axis=1)
         sensor = wrist_sensor(urdf, description.carrying(mass)) if known.any() else None
         readings = trial.t_robot[known], trial.q_motor[known] - offset, trial.wrist_wrench[known]
         if sensor is None or sensor.push(*readings) is not None:
             continue
         with suppress(NotEnoughData):
-            rows.append((*_means(sensor, smoothed(*readings)), declared if mass is None else mass))
+            rows.append((*_means(sensor, smoothed(*readings)), mass))
     if nominal is None or not rows:
         return None
     prior = _prior(nominal, description.tolerances)
     x, C = _fitted(rows, np.zeros(7), prior)
-    return HungLoad(x[:4], x[4:], C, declared, _hung(nominal), float(x @ np.linalg.solve(prior, x)))
+    return HungLoad(x[:4], x[4:], C, description.payload_of(), _hung(nominal), float(x @ np.linalg.solve(prior, x)))
 
 
 def hand_load(
@@ -114,7 +112,7 @@ def hand_load(
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
     if sensor is None or hung is None:
         return None if sensor is None else sensor.push(t, q, wrench)
-    mass = 0.0 if description.payload is None else description.payload.mass
+    mass = description.payload_of()
     known = hung.added(mass)
     pushed = sensor.carrying(known).push(t, q, wrench)
     if pushed is not None or mass == hung.payload:

@@ -137,7 +137,7 @@ def dynamics(urdf: str, description: Description, offset: np.ndarray, hung: Hung
     model = floating_model(urdf, description)
     model.gravity = pin.Motion.Zero()
     if hung is not None:
-        hung.on(model, 0.0 if description.payload is None else description.payload.mass)
+        hung.on(model, description.payload_of())
     return Dynamics(model, description.joint_names, offset, np.array(description.gravity))
 
 

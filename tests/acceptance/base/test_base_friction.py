@@ -36,7 +36,7 @@ def test_friction_of_each_wheel_limits_the_prediction_after_slips(scenario, tmp_
     estimate, dataset = calibration.load_estimate(run / "estimate"), calibration.load(run / "dataset")
     model, clocks = estimate.bundle.stick_slip, (estimate.clock("robot"), estimate.clock("plate"))
     for entry, trial in dataset.trials("validation"):
-        sources = laboratory(dataset.urdf, dataset.description.loaded(entry), *clocks)
+        sources = laboratory(dataset.urdf, dataset.description.carrying(entry.payload), *clocks)
         wrenches = wrenches_of(sources, trial, rest_of(dataset.description, trial, sources.T_base_B).T_lab_0)
         for direction in model.directions:
             off = errors(model, direction, planar_forcing(wrenches, model.tilting, direction.source))
