@@ -114,9 +114,14 @@ class WristSensor:
         return self._on_body(Push(-f, -inertia), read.t, t)
 
     def beyond(self, read: "SmoothReadings") -> tuple[np.ndarray, np.ndarray]:
-        """-(w + f) (n, 6), and the regressor (n, 6, 4) of -w by mass and first moment, axes of the last body."""
+        """-(w + f) (n, 6), and the regressor (n, 6, 4) of -w by mass and first moment, axes of the last body.
+
+        Moments about the centre of what nominally hangs there: gears that sag turn its weight, which has none there.
+        """
         Y = np.stack([self.alone(unit)._moved(read)[0] for unit in np.eye(4)], axis=2)
-        return -(read.wrench + self._moved(read)[0]), Y
+        about = np.eye(6)
+        about[3:, :3] = -pin.skew(pin.SE3(self.body).actInv(self.tree.moment[-1] / self.tree.mass[-1]))
+        return -(read.wrench + self._moved(read)[0]) @ about.T, about @ Y
 
     def carrying(self, more: np.ndarray) -> "WristSensor":
         """The sensor with a further mass and its first moment (4,) on it."""

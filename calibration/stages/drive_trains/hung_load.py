@@ -161,12 +161,13 @@ def _fitted(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(7,) and its covariance, by rows (y, Y, payload) and a normal prior."""
     A = [np.concatenate([Y, mass * Y[:, :, 1:]], axis=2) for _, Y, mass in rows]
-    x, P = mean, np.linalg.inv(prior)
+    P, left = np.linalg.inv(prior), [np.zeros(6) for _ in rows]  # at first the sensor's errors alone
     for _ in range(_ROUNDS):
         H, g = P.copy(), P @ mean
-        for B, (y, _, _) in zip(A, rows, strict=True):
-            weight = 1.0 / (_TOGETHER * (_SENSOR**2 + ((y - B @ x) ** 2).mean(axis=0)))
+        for B, (y, _, _), square in zip(A, rows, left, strict=True):
+            weight = 1.0 / (_TOGETHER * (_SENSOR**2 + square))
             H += np.einsum("nij,i,nik->jk", B, weight, B)
             g += np.einsum("nij,i,ni->j", B, weight, y)
         x = np.linalg.solve(H, g)
+        left = [((y - B @ x) ** 2).mean(axis=0) for B, (y, _, _) in zip(A, rows, strict=True)]
     return x, np.linalg.inv(H)

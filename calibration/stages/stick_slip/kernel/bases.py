@@ -16,7 +16,7 @@ X, V, DX, STICKS, P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels
 D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, force, wheels that slide, which stick
 BODY = 30  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 LEANS, PULL, W = 34, 36, 37  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
-STUCK, ROWS = 40, 43  # force of a wheel that sticks (2), its load
+STUCK, NOW, ROWS = 40, 43, 46  # force of a wheel that sticks (2), its load; v at the time of the load
 
 
 class Bases(NamedTuple):

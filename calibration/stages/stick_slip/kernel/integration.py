@@ -10,7 +10,8 @@ action on the floor and g_i the base's on the wheel [N]; M is of the robot witho
 base, by (rx, ry) from the vertical, which brings a share of what they carry into the floor's plane: N_i less the weight
 m_i G of the wheel. At rest no wheel pushes the floor sideways. A wheel whose force would exceed mu_i N_i slides: the
 force is cut to that length, and u_i is what that leaves, implicit in time. The rest is explicit, velocity first
-(symplectic Euler): a step's position is that of the time of its load.
+(symplectic Euler): a step's position is that of the time of its load, its velocity half a step older. Dampers feel
+v + h/2 dv/dt, that of the time of the load: without it they take a hundredth of the inertia away.
 
 A wheel bears where it touches the floor, e_i behind its place under the base, by the forces of the step before:
 
@@ -36,6 +37,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     LANES,
     LEANS,
     LOAD,
+    NOW,
     PLATE,
     PULL,
     SLID,
@@ -72,9 +74,12 @@ def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         s[LOAD * LANES + l] = z + z0 * a0 + z1 * a1 + z2 * a2
         s[(LOAD + 1) * LANES + l] = pitching + yaw * rolling + s[LEANS * LANES + l]
         s[(LOAD + 2) * LANES + l] = rolling - yaw * pitching + s[(LEANS + 1) * LANES + l]
-        s[F * LANES + l] = s[BODY * LANES + l] * s[V * LANES + l]
-        s[(F + 1) * LANES + l] = s[BODY * LANES + l] * s[(V + 1) * LANES + l]
-        s[(F + 2) * LANES + l] = s[(BODY + 1) * LANES + l] * s[(V + 2) * LANES + l]
+        v0, v1 = s[V * LANES + l] + 0.5 * h * a0, s[(V + 1) * LANES + l] + 0.5 * h * a1
+        v2 = s[(V + 2) * LANES + l] + 0.5 * h * a2
+        s[NOW * LANES + l], s[(NOW + 1) * LANES + l], s[(NOW + 2) * LANES + l] = v0, v1, v2
+        s[F * LANES + l] = s[BODY * LANES + l] * v0
+        s[(F + 1) * LANES + l] = s[BODY * LANES + l] * v1
+        s[(F + 2) * LANES + l] = s[(BODY + 1) * LANES + l] * v2
         s[BITS * LANES + l] = 1.0
         s[LEANS * LANES + l] = s[(LEANS + 1) * LANES + l] = 0.0
         s[W * LANES + l] = s[(W + 1) * LANES + l] = s[(W + 2) * LANES + l] = 0.0

@@ -16,6 +16,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     LEANS,
     LOAD,
     MASS,
+    NOW,
     PULL,
     SLID,
     STUCK,
@@ -25,7 +26,6 @@ from calibration.stages.stick_slip.kernel.bases import (
     E,
     F,
     U,
-    V,
     W,
 )
 
@@ -44,13 +44,13 @@ def on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float,
             d3, d4, d5 = s[LOAD * LANES + l], s[(LOAD + 1) * LANES + l], s[(LOAD + 2) * LANES + l]
             load = w[6 * LANES + l] + w[7 * LANES + l] * d3 + w[8 * LANES + l] * d4 + w[9 * LANES + l] * d5
             N = max(load, 0.0)
-            turn, spin = s[(D + 2) * LANES + l], s[(V + 2) * LANES + l]
+            turn, spin = s[(D + 2) * LANES + l], s[(NOW + 2) * LANES + l]
             mass, ux, uy = w[MASS * LANES + l] * rate, w[U * LANES + l], w[(U + 1) * LANES + l]
             qx, qy, hangs = px - w[E * LANES + l], py - w[(E + 1) * LANES + l], N - _G * w[MASS * LANES + l]
             ex = w[E * LANES + l] + s[D * LANES + l] - turn * qy
             ey = w[(E + 1) * LANES + l] + s[(D + 1) * LANES + l] + turn * qx
-            fx = w[2 * LANES + l] * ex + c * (s[V * LANES + l] - spin * qy) - hangs * ry + mass * ux
-            fy = w[3 * LANES + l] * ey + c * (s[(V + 1) * LANES + l] + spin * qx) + hangs * rx + mass * uy
+            fx = w[2 * LANES + l] * ex + c * (s[NOW * LANES + l] - spin * qy) - hangs * ry + mass * ux
+            fy = w[3 * LANES + l] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + hangs * rx + mass * uy
             w[E * LANES + l], w[(E + 1) * LANES + l] = ex, ey
             s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l], s[(STUCK + 2) * LANES + l] = fx, fy, N
             s[LEANS * LANES + l] += N * ex

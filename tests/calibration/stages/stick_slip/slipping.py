@@ -58,17 +58,18 @@ def literal(
     """The equations of `integration` by its docstring, under w (n, 3); a plate reads the load, corrects nothing."""
     rows, tilt = WHEELS.rows(p), np.zeros((len(w), 2)) if tilt is None else tilt
     M = MASS - sum(m * across(q).T @ across(q) for m, q in zip(WHEELS.mass, WHEELS.position, strict=True))
-    x, v, more, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
+    x, v, a, more, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
     e, out = -(rows[:, 6] + rows[:, 7:10] @ WEIGHT - WHEELS.weight)[:, None] * leaning(*tilt[0]) / rows[:, 2:4], []
     for k, force in enumerate(w):
         load, more = (about(x, WEIGHT) if plate else WEIGHT) + more, np.zeros(3)
         assert np.all(rows[:, 6] + rows[:, 7:10] @ load > 0.0)
-        floor, on_base = np.array([p.body_c, p.body_c, p.body_cr]) * v, np.zeros(3)
+        now = v + 0.5 * h * a
+        floor, on_base = np.array([p.body_c, p.body_c, p.body_cr]) * now, np.zeros(3)
         slides = np.zeros(len(rows), dtype=bool)
         for i, (kx, ky, c, mu, n, *G, m) in enumerate(rows[:, 2:]):
-            N, K, speed, faster = n + np.dot(G, load), np.array([kx, ky]), across(rows[i, :2] - e[i]) @ v, np.zeros(2)
-            stuck = e[i] + speed * h
-            f = K * stuck + c * speed + (N - WHEELS.weight[i]) * leaning(*tilt[k]) + m / h * u[i]
+            N, K, A, faster = n + np.dot(G, load), np.array([kx, ky]), across(rows[i, :2] - e[i]), np.zeros(2)
+            stuck = e[i] + A @ v * h
+            f = K * stuck + c * A @ now + (N - WHEELS.weight[i]) * leaning(*tilt[k]) + m / h * u[i]
             at = across(rows[i, :2] - stuck)
             if np.linalg.norm(f) > mu * N:
                 left = f * (1.0 - mu * N / np.linalg.norm(f))
@@ -81,7 +82,8 @@ def literal(
         yaw = x[2] + 0.5 * h * v[2]
         x = x + h * np.array([np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1], v[2]])
         out.append((x, v, floor, e.copy(), slides))
-        v = v + h * np.linalg.solve(M, force - floor - on_base)
+        a = np.linalg.solve(M, force - floor - on_base)
+        v = v + h * a
     return Motion(*(np.array(column) for column in zip(*out, strict=True)))
 
 

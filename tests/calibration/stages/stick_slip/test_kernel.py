@@ -81,6 +81,23 @@ def test_wheels_that_stick_answer_a_steady_force_by_their_stiffness():
     assert share.max() == 0.0
 
 
+def test_wheels_that_stick_sway_as_springs_and_dampers_do():
+    """By X = (K + i w C - w^2 M)^-1 F at 3 Hz, in size to a two hundredth, in time to a tenth of a millisecond."""
+    p, omega, force = replace(STUCK, body_c=1e-9, body_cr=1e-9), 6.0 * np.pi, 1e-3 * np.array([5.0, -8.0, 3.0])
+    A, c = [slipping.across(q) for q in POSITION], WHEELS.rows(p)[:, 4]
+    M = MASS - sum(m * a.T @ a for m, a in zip(WHEELS.mass, A, strict=True))
+    C = sum(damping * a.T @ a for damping, a in zip(c, A, strict=True))
+    swayed = np.linalg.solve(WHEELS.stiffness(p) + 1j * omega * C - omega**2 * M, force)
+    t = np.arange(round(10.0 / STEP)) * STEP
+    x, _ = run(slipping.forcing((np.clip(t / 4.0, 0.0, 1.0) * np.sin(omega * t))[:, None] * force), p)
+    last = slice(-300, None)  # three seconds
+    at = t[STEPS - 1 :: STEPS][last]
+    found = np.linalg.lstsq(np.stack([np.sin(omega * at), np.cos(omega * at)], axis=1), x[last])[0]
+    ratio = (found[0] + 1j * found[1]) / swayed
+    np.testing.assert_allclose(np.abs(ratio), 1.0, atol=5e-3)
+    np.testing.assert_allclose(np.angle(ratio) / omega, 0.0, atol=1e-4)
+
+
 def test_wheels_that_slide_leave_a_constant_friction():
     p, mass = replace(TRUTH, body_c=1e-9, body_cr=1e-9), 70.0
     rows = WHEELS.rows(p)
