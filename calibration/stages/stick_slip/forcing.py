@@ -52,6 +52,7 @@ class PlanarForcing:
         heave: (n, 3) z, rx, ry by the compliance [m, rad].
         rest: (n,) True in the first second.
         linear: (n, 3) x, y, yaw by the compliance.
+        pushed: Whether the wrist's sensor shows that the hand is pushed.
     """
 
     trial_id: str
@@ -62,6 +63,7 @@ class PlanarForcing:
     heave: np.ndarray
     rest: np.ndarray
     linear: np.ndarray
+    pushed: bool = False
 
     @property
     def force(self) -> np.ndarray:
@@ -125,6 +127,7 @@ class Wrenches:
         slips: A base of the most likely parameters, for heave and tilt while it slips; None: as if it stuck.
         slid: How far the base has slid (k, 3), on which the plate stands still, where that is known: predicted, or in
             a calibration trial as its markers show it. Then the plate shows heave and tilt, whatever is to move it.
+        pushed: As of `PlanarForcing`.
     """
 
     trial_id: str
@@ -137,6 +140,7 @@ class Wrenches:
     links: Load | None = None
     slips: Bases | None = None
     slid: Signal | None = None
+    pushed: bool = False
 
     @property
     def inverse_dynamics(self) -> Load | None:
@@ -180,7 +184,8 @@ def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_la
     """The wrench of the plate, and that of readings."""
     t, q = readings.t, readings.q
     dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, readings.push), composite_inertia(lab, t, q, CUTOFF)
-    return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab))
+    pushed = readings.push is not None
+    return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab), pushed=pushed)
 
 
 def wheels_of(lab: Laboratory) -> WheelSet:
@@ -218,13 +223,11 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
             load, rows = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0), _inertia(M)
     drive[:, 3:6] = vertical(load)
     if source == "plate":
-        drive[:, 4:6], drive[:, PLATE:] = (
-            drive[:, 4:6] - drive[:, 3:4] * tilting.off,
-            load[:, PLANE] - load[rest][:, PLANE].mean(axis=0),
-        )
+        drive[:, 4:6] -= drive[:, 3:4] * tilting.off
+        drive[:, PLATE:] = load[:, PLANE] - load[rest][:, PLANE].mean(axis=0)
     drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:] + tilting.leans(drive[rest, 3:6].mean(axis=0))
     own = slice(STEPS - 1, None, STEPS)
-    return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[own], rest[own], linear(t))
+    return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[own], rest[own], linear(t), wrenches.pushed)
 
 
 def _compliant(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) -> tuple[np.ndarray, np.ndarray]:

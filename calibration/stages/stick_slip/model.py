@@ -15,6 +15,7 @@ from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.model import Source
 
 EXPLAINED = 0.8  # R2 of yaw
+PUSHED = {"plate": 0.02, "dynamics": 0.1}  # of its motion, one sigma: a push holds wheels at frictions that swings hide
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,8 @@ class StickSlip:
         x = elastic + kept * (x - elastic)
         plain = np.where(found.linear, forcing.linear, 0.0)
         variance = np.where(found.slips, variance, found.plain.variance(reached(elastic)))
+        if forcing.pushed:
+            variance = variance + PUSHED[forcing.source] ** 2 * reached(x)
         return PlanarPrediction(np.where(found.slips, x, plain), variance, share, kept)
 
     def _motions(self, forcing: PlanarForcing, found: Direction, preload: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from calibration.estimate.plain_values import plain, restored
 from calibration.stages.stick_slip.band import PlainBand
 from calibration.stages.stick_slip.fit import fit_direction
 from calibration.stages.stick_slip.forcing import STEPS, Tilting
-from calibration.stages.stick_slip.model import StickSlip
+from calibration.stages.stick_slip.model import PUSHED, StickSlip
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
 from calibration.stages.stick_slip.search import warmed
 from calibration.stages.stick_slip.stream import Sample, slip_stream
@@ -57,6 +57,15 @@ def test_the_band_sees_a_slip_coming_that_nobody_can_predict(model):
     sigma = np.sqrt([p.variance[-1] for p in (found, model.predict(known))])
     assert np.all(sigma[0] > 10.0 * sigma[1])
     assert np.all(np.abs(found.x - true)[-1] < 4.0 * sigma[0])
+
+
+def test_a_pushed_base_is_known_to_a_share_of_how_far_it_moves(model):
+    forcing, _ = trial(43, size=0.7)
+    free, pushed = (model.predict(replace(forcing, pushed=push)) for push in (False, True))
+    np.testing.assert_array_equal(pushed.x, free.x)
+    more = PUSHED["plate"] ** 2 * np.maximum.accumulate(free.x**2, axis=0)
+    np.testing.assert_allclose(pushed.variance - free.variance, more, rtol=1e-6, atol=1e-18)
+    assert pushed.variance[-1, 2] > 2.0 * free.variance[-1, 2]
 
 
 def test_prediction_is_pure(model, new):
