@@ -132,7 +132,7 @@ def causes(
     moved = ((delivered.T_lab_B - T_lab_B) @ delivered.T_B_H)[:, :3, 3]
     effects = tuple(name for name, _ in delivered.without)
     without = np.array([T[:, :3, 3] - seen for _, T in delivered.without]).reshape(-1, len(seen), 3)
-    velocity = np.gradient(T_lab_H[:, :3, 3], t, axis=0)
+    velocity = np.nan_to_num(np.gradient(T_lab_H[:, :3, 3], t, axis=0))  # beside a gap it is not known
     found = Causes(
         T_lab_H[:, :3, 3] - seen,
         np.where(np.isfinite(moved), moved, 0.0),
@@ -148,7 +148,7 @@ def causes(
 
 def budget(trials: Sequence[Causes]) -> Budget | None:
     """The budget of some trials; None where nothing was compared."""
-    trials = [one.rows(_complete(one)) for one in trials]
+    trials = [one.rows(np.isfinite(one.whole).all(axis=1)) for one in trials]
     trials = [one for one in trials if len(one.whole)]
     if not trials:
         return None
@@ -165,11 +165,6 @@ def budget(trials: Sequence[Causes]) -> Budget | None:
     shares = [Share(name, _mm(x), _mm(total) - _mm(total - x), _REMEDY.get(name, "")) for name, x in squares.items()]
     worth = sorted(_worth(trials), key=lambda w: -w.without_mm)
     return Budget(_mm(total), tuple(sorted(shares, key=lambda s: -s.size_mm)), tuple(worth))
-
-
-def _complete(one: Causes) -> np.ndarray:
-    """(n,) samples with everything that is compared."""
-    return np.isfinite(one.whole).all(axis=1) & np.isfinite(one.velocity).all(axis=1)
 
 
 def _of_joints(trials: Sequence[Causes]) -> list[np.ndarray]:

@@ -12,8 +12,11 @@ T = np.arange(0.0, 60.0, 0.01)
 SIZE = {"base": 3e-4, "joints": 4e-4, "clocks": 2e-4, "geometry": 1e-4, "noise": 1.5e-4}
 
 
-def one(size: dict[str, float], link: bool = True):
-    """A trial whose hand is off by each cause, RMS per component as in `size`; instruments have errors of their own."""
+def one(size: dict[str, float], link: bool = True, lost: slice = slice(0)):
+    """A trial whose hand is off by each cause, RMS per component as in `size`; instruments have errors of their own.
+
+    Without predictions in some samples.
+    """
     rng, n = np.random.default_rng(1), len(T)
     wave = np.sqrt(2.0) * np.sin(2.0 * np.pi * np.outer(T, [0.31, 0.43, 0.57]))
     place = np.array([0.5, 0.1, 0.9]) + 0.2 * np.sin(2.0 * np.pi * np.outer(T, [0.11, 0.17, 0.23]))
@@ -31,6 +34,7 @@ def one(size: dict[str, float], link: bool = True):
     seen[:, :3, 3] -= e["noise"]
     predicted = compose(still, place - e["base"])
     T_B = compose(still, e["base"])
+    T_B[lost] = np.nan
     q_link = np.zeros((n, 3)) - e["joints"] + 2e-4 * rng.normal(size=(n, 3)) if link else np.full((n, 3), np.nan)
     without = ("base", compose(still, place + 5e-3))
     delivered = Delivered(("a", "b", "c"), T_B, predicted, np.full((n, 3), 0.3), q_link, still, (without,))
@@ -61,6 +65,13 @@ def test_next_steps_are_ranked_by_what_they_gain():
     assert found.next_steps[0].gain_mm == pytest.approx(gain, abs=0.05)
     assert "of the 0.5" in found.sentence.lower() and "link-side encoders" in found.sentence
     assert found.worth[0].without_mm == pytest.approx(5.0, rel=0.05)
+
+
+def test_samples_beside_lost_ones_count():
+    found = one(SIZE, lost=slice(3000, 3300, 30))
+    whole = found.whole[np.isfinite(found.whole).all(axis=1)]
+    assert len(whole) == len(found.whole) - 10
+    assert budget_of([found]).whole_mm == pytest.approx(1e3 * np.sqrt((whole**2).mean()), rel=1e-12)
 
 
 def test_without_link_encoders_joints_and_geometry_are_one_cause():
