@@ -172,7 +172,8 @@ def _dead_zone(problem: Problem, rough: TrainFit) -> Candidate:
         slides = fit_train(replace(moving, data=problem.data.sliding), rough.theta, FLOORS[1:])
         found = [judged(fit_train(of, slides.theta, _FINE)) for of in (moving, still)]
     elif problem.believes(steady.information, COULOMB):
-        found = [*_continued(steady, moving), *_continued(steady, still, moving)]
+        begun = rubbing(steady, moving, float(rough.theta[COULOMB]))
+        found = [*_continued(begun, moving), *_continued(begun, still, moving)]
     else:
         steady = loaded(steady, moving)
         fits = [evaluated(of, steady.theta, steady.gamma) for of in (moving, still)]
@@ -210,6 +211,18 @@ def _unexplained(problem: Problem, at: SteadyContact) -> float:
     difference = problem.data.y - problem.deltas(theta, gamma)
     scales = sizes(problem, difference - problem.data.terms @ gamma, FLOORS[1])
     return cost(problem, theta, difference, gamma, scales) + problem.of_sizes(scales)
+
+
+def rubbing(steady: SteadyContact, problem: Problem, coulomb: float) -> SteadyContact:
+    """The same with another friction [N.m] where the other windows say so: steady contact has no more than a prior.
+
+    What hangs together with it moves with it.
+    """
+    C, p = steady.covariance[:, COULOMB], len(steady.theta)
+    step = C / C[COULOMB] * (coulomb - steady.theta[COULOMB])
+    theta = np.maximum(steady.theta + step[:p], problem.prior.least)
+    other, whole = replace(steady, theta=theta, gamma=steady.gamma + step[p:]), steady.continued(problem)
+    return min((steady, other), key=lambda at: _unexplained(whole, at))
 
 
 def _continued(steady: SteadyContact, problem: Problem, *others: Problem) -> list[Candidate]:

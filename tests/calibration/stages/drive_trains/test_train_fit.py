@@ -12,6 +12,7 @@ from calibration.stages.drive_trains.fit.identification import (
     judged,
     loaded,
     residual_and_doubt,
+    rubbing,
     torque_sigma,
 )
 from calibration.stages.drive_trains.fit.quantities import FORM, MOTOR, covariance_of, reported, reverses
@@ -26,6 +27,7 @@ from calibration.stages.drive_trains.fit.train_fit import (
     prior_of,
 )
 from calibration.stages.drive_trains.joint_data import JointData
+from calibration.stages.drive_trains.link_motion import COULOMB
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
 ECCENTRICITY = np.array([4e-3, 1e-3, -2e-3, 3e-4, -5e-4])
@@ -258,6 +260,17 @@ def test_a_stiff_joint_s_load_is_what_its_changes_of_side_show() -> None:
     steady = steady_contact(of, theta, ECCENTRICITY)
     assert steady is not None and np.sqrt(steady.covariance[5, 5]) > 0.3
     assert loaded(steady, of).theta[-1] == pytest.approx(1.0, abs=0.15) != steady.theta[-1]
+
+
+def test_a_friction_that_steady_contact_does_not_show_is_begun_where_changes_of_side_are_explained() -> None:
+    """Friction beyond every load: what steady contact has is the prior's, at which the load would decide the side."""
+    of = problem(data(load=0.05))
+    steady = steady_contact(of, np.append(TRUTH.values[:4], 0.0), ECCENTRICITY)
+    assert steady is not None and of.believes(steady.information, COULOMB)
+    assert steady.theta[COULOMB] < 0.01
+    right = rubbing(steady, of, 0.15)
+    np.testing.assert_allclose(right.theta[:3], TRUTH.values[:3], rtol=0.03)
+    assert rubbing(right, of, 0.005).theta[COULOMB] == right.theta[COULOMB]
 
 
 def test_where_a_play_operator_found_the_friction_the_link_keeps_its_inertia(monkeypatch) -> None:
