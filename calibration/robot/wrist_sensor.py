@@ -42,10 +42,12 @@ class Push(NamedTuple):
     Attributes:
         wrench: p (n, 6), axes and origin of the tree's last body [N, N.m].
         inertia: (n, k) I about each joint [kg.m2, kg].
+        outside: Whether it comes from outside, and is not a load that hangs on the sensor.
     """
 
     wrench: np.ndarray
     inertia: np.ndarray
+    outside: bool = True
 
 
 def hung_bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[pin.Inertia]:
@@ -111,7 +113,7 @@ class WristSensor:
     def load(self, t: np.ndarray, read: "SmoothReadings") -> Push:
         """What hangs on the sensor as a load at t (n,) [s] of a robot of which it is no part."""
         f, inertia = self._moved(read)
-        return self._on_body(Push(-f, -inertia), read.t, t)
+        return self._on_body(Push(-f, -inertia, outside=False), read.t, t)
 
     def beyond(self, read: "SmoothReadings") -> tuple[np.ndarray, np.ndarray]:
         """-(w + f) (n, 6), and the regressor (n, 6, 4) of -w by mass and first moment, axes of the last body.
@@ -138,7 +140,7 @@ class WristSensor:
     def _on_body(self, found: Push, t: np.ndarray, at: np.ndarray) -> Push:
         """With its wrench in the last body's axes, at other times."""
         wrench = interpolate_columns(at, t, found.wrench @ pin.SE3(self.body).dualAction.T)
-        return Push(wrench, interpolate_columns(at, t, found.inertia))
+        return found._replace(wrench=wrench, inertia=interpolate_columns(at, t, found.inertia))
 
     def _moved(self, at: "SmoothReadings") -> tuple[np.ndarray, np.ndarray]:
         """f (n, 6) in the sensor's axes about its origin, and I (n, k)."""

@@ -184,7 +184,7 @@ def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_la
     """The wrench of the plate, and that of readings."""
     t, q = readings.t, readings.q
     dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, readings.push), composite_inertia(lab, t, q, CUTOFF)
-    pushed = readings.push is not None
+    pushed = readings.push is not None and readings.push.outside
     return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab), pushed=pushed)
 
 
