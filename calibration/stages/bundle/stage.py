@@ -30,6 +30,7 @@ from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
+from calibration.stages.stick_slip.poses import Arm
 from calibration.stages.stick_slip.stage import fit_stick_slip
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Suspension
@@ -102,7 +103,7 @@ def fit_bundle(
     base = None
     if suspension is not None:
         sources = replace(sources, T_base_B=from_vector(hand.base))
-        base, more = fit_stick_slip(sources, trials, suspension, trains, rough.logarithms)
+        base, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)
         found += more
     parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, trains.hung)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)

@@ -31,7 +31,7 @@ from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.hung_load import HungLoad, inertial_tolerance
 
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second
-_SLOW, _FAST = 5.0, 12.0  # [Hz] of the base's, from markers: at all times, and where it is jolted
+_BANDS = 5.0, 12.0, 20.0  # [Hz] of the base's: at all times, and where a jolt exceeds the noise
 _JOLT = 0.15  # [s] over which the energy of a jolt is compared with the noise
 _MOST, _LEAST = 6, 0.005  # modes, and the least torque [N.m rms] one is worth: fewer make a load too large or small
 _THINNED = 10  # samples between those the modes are of
@@ -191,7 +191,7 @@ def base_acceleration(gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray
         seen_at = even(t, to_vector(inverse(middle) @ T_lab_root))
     except NotEnoughData:
         return np.tile(np.append(-gravity @ middle[:3, :3], np.zeros(3)), (len(at), 1))
-    moved = from_vector(low_passed(seen_at, _SLOW).x)[:, :3, :3]
+    moved = from_vector(low_passed(seen_at, _BANDS[0]).x)[:, :3, :3]
     a = _accelerations(seen_at)
     linear = a[:, :3] - (gravity @ middle[:3, :3])
     columns = np.concatenate([(linear[:, None] @ moved)[:, 0], a[:, 3:]], axis=1)
@@ -199,18 +199,18 @@ def base_acceleration(gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray
 
 
 def _accelerations(x: Signal) -> np.ndarray:
-    """Second derivatives (n, c) below `_SLOW`, and below `_FAST` where what is between them exceeds its noise.
+    """Second derivatives (n, c) below the first of `_BANDS`, and from each to the next where they exceed its noise.
 
-    Noise is what is usual there; the share kept is Wiener's, 1 - noise / energy.
+    Noise is what is usual in a band; the share kept is Wiener's, 1 - noise / energy.
     """
-    slow, fast = (
-        np.gradient(np.gradient(low_passed(x, cutoff).x, 1.0 / RATE, axis=0), 1.0 / RATE, axis=0)
-        for cutoff in (_SLOW, _FAST)
+    found, *faster = (
+        np.gradient(np.gradient(low_passed(x, cutoff).x, 1.0 / RATE, axis=0), 1.0 / RATE, axis=0) for cutoff in _BANDS
     )
-    width = int(_JOLT * RATE)
-    energy = uniform_filter1d((fast - slow) ** 2, width, axis=0)
-    noise = 2.0 * np.median(energy, axis=0)
-    return np.asarray(slow + np.clip(1.0 - noise / np.maximum(energy, np.finfo(float).tiny), 0.0, 1.0) * (fast - slow))
+    for band in np.diff([found, *faster], axis=0):
+        energy = uniform_filter1d(band**2, int(_JOLT * RATE), axis=0)
+        noise = 2.0 * np.median(energy, axis=0)
+        found = found + np.clip(1.0 - noise / np.maximum(energy, np.finfo(float).tiny), 0.0, 1.0) * band
+    return np.asarray(found)
 
 
 def load_modes(loads: Sequence[LinkLoads], column: int, root: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.stage import AS_SEEN, Moved
 from calibration.stages.stick_slip.forcing import (
     CUTOFF,
     PLANE,
@@ -127,10 +128,22 @@ def links_of(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, T
     return Links(lab, trains, Readings(t, q, trains.push(t, q, wrench)), T_lab_0)
 
 
-def links_seen(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: MeasuredTrial, rest: Rest) -> Load:
-    """Inverse dynamics of links that move with the base as its markers show it."""
-    links = links_of(lab, trains, robot, trial, rest.T_lab_0)
-    return links.load(trial.t_mocap, trial.base.T @ inverse(rest.T_0_B))
+class Arm(NamedTuple):
+    """An arm on a base of calibration trials.
+
+    Attributes:
+        trains: Its drive trains.
+        moved: How the base moved in trials in which that is not taken from its markers.
+    """
+
+    trains: DriveTrains
+    moved: Moved = AS_SEEN
+
+
+def links_seen(lab: Laboratory, arm: Arm, robot: Clock, trial: MeasuredTrial, rest: Rest) -> Load:
+    """Inverse dynamics of links that move with the base as it is predicted, or else as its markers show it."""
+    links, T_lab_B = links_of(lab, arm.trains, robot, trial, rest.T_lab_0), arm.moved.get(trial.id, trial.base.T)
+    return links.load(trial.t_mocap, T_lab_B @ inverse(rest.T_0_B))
 
 
 def planar_twist(t: np.ndarray, T_lab_base: np.ndarray, T_lab_0: np.ndarray, at: np.ndarray) -> np.ndarray | None:

@@ -18,7 +18,6 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.side_by_side import side_by_side
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
-from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.band import PlainBand, heave_band, plain_band, reached
 from calibration.stages.stick_slip.fit import fit_direction
 from calibration.stages.stick_slip.forcing import (
@@ -32,7 +31,7 @@ from calibration.stages.stick_slip.forcing import (
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
-from calibration.stages.stick_slip.poses import links_seen
+from calibration.stages.stick_slip.poses import Arm, links_seen
 from calibration.stages.stick_slip.search import elsewhere, searched, shifts_of_wheels, warmed
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
@@ -72,7 +71,7 @@ def fit_stick_slip(
     sources: WrenchSources,
     trials: Sequence[Trial],
     suspension: Suspension,
-    trains: DriveTrains | None = None,
+    arm: Arm | None = None,
     rough: np.ndarray | None = None,
 ) -> tuple[StickSlip | None, tuple[Verdict, ...]]:
     """The base by calibration trials in which it is not driven, None where it is not identified, and the findings.
@@ -80,7 +79,7 @@ def fit_stick_slip(
     By inverse dynamics of link angles, where drive trains are known; from rough parameters (15,), where they are.
     """
     try:
-        campaign = campaign_of(sources, trials, suspension, trains)
+        campaign = campaign_of(sources, trials, suspension, arm)
     except NotEnoughData as error:
         return None, (Verdict(STAGE, "missing", str(error)),)
     wheels, read, usable = campaign.wheels, campaign.read, campaign.by_source
@@ -105,7 +104,7 @@ def campaign_of(
     sources: WrenchSources,
     trials: Sequence[Trial],
     suspension: Suspension,
-    trains: DriveTrains | None = None,
+    arm: Arm | None = None,
     most: int = len(SOURCES),
 ) -> Campaign:
     """The trials by their wrenches, of `most` sources, the plate first.
@@ -117,7 +116,7 @@ def campaign_of(
     if len(description.wheels) < _LEAST_WHEELS:
         raise NotEnoughData("no stick-slip base: dataset.json declares no wheels")
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
-    read = _read(sources, trials, suspension, trains)
+    read = _read(sources, trials, suspension, arm)
     tilting, prior = tilting_of(sources, read, wheels, suspension)
     by_source = ((source, _rows(description, read, tilting, source)) for source in SOURCES)
     shown = ((source, rows) for source, rows in by_source if len(rows) >= _LEAST_TRIALS)
@@ -127,14 +126,12 @@ def campaign_of(
     return Campaign(wheels, read, tilting, usable)
 
 
-def _read(
-    sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, trains: DriveTrains | None
-) -> list[Read]:
-    found = side_by_side(lambda trial: _read_one(sources, trial, suspension, trains), trials)
+def _read(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, arm: Arm | None) -> list[Read]:
+    found = side_by_side(lambda trial: _read_one(sources, trial, suspension, arm), trials)
     return [one for one in found if one is not None]
 
 
-def _read_one(sources: WrenchSources, trial: Trial, suspension: Suspension, trains: DriveTrains | None) -> Read | None:
+def _read_one(sources: WrenchSources, trial: Trial, suspension: Suspension, arm: Arm | None) -> Read | None:
     """None where its base or wrench is not shown."""
     try:
         seen = MeasuredTrial.of(sources.lab.description, trial)
@@ -143,8 +140,8 @@ def _read_one(sources: WrenchSources, trial: Trial, suspension: Suspension, trai
         if wrenches.plate is not None:
             far = slid(sources.lab.description, seen, rest, wrenches.plate, suspension)
             wrenches = replace(wrenches, slid=far)
-        if trains is not None and trains.trains and sources.robot is not None and wrenches.dynamics is not None:
-            wrenches = replace(wrenches, links=links_seen(sources.lab, trains, sources.robot, seen, rest))
+        if arm is not None and arm.trains.trains and sources.robot is not None and wrenches.dynamics is not None:
+            wrenches = replace(wrenches, links=links_seen(sources.lab, arm, sources.robot, seen, rest))
         return Read(seen, rest, wrenches)
     except NotEnoughData as error:
         _log.info("%s: %s", trial.id, error)

@@ -6,6 +6,7 @@ import pytest
 from calibration.stages.stick_slip.fit import fitted
 from calibration.stages.stick_slip.likelihood import joined
 from calibration.stages.stick_slip.parameters import KNOWN
+from calibration.stages.stick_slip.search import searched
 from calibration.stages.stick_slip.wheels import NAMES, PRIOR, PRIOR_SIGMA, Prior, SlipParameters
 from tests.calibration.stages.stick_slip import slipping
 
@@ -24,7 +25,8 @@ def standardized(seed):
     prior = Prior(PRIOR.copy(), PRIOR_SIGMA.copy())
     prior.mean[LOADS], prior.sigma[LOADS] = true.logarithms[LOADS] + TILT * rng.normal(size=2), TILT
     rows = [slipping.recorded(rng, plate=False, truth=true) for _ in range(TRIALS)]
-    found = fitted(joined(slipping.WHEELS, rows, prior))
+    trials = joined(slipping.WHEELS, rows, prior)
+    found = fitted(trials, searched(trials))
     sigma = np.sqrt(np.diag(found.covariance))
     return ((found.logarithms - true.logarithms) / sigma)[JUDGED], sigma[JUDGED] < KNOWN
 

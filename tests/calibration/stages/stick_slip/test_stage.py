@@ -5,12 +5,16 @@ import pinocchio as pin
 import pytest
 
 import mjcf
+from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.moved_base import moved_as_predicted
+from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
+from calibration.stages.stick_slip.poses import Arm, links_seen
 from calibration.stages.stick_slip.stage import _behind, _misplaced, linear_where
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
@@ -232,3 +236,20 @@ def test_a_base_moves_slowly_as_its_markers_show_it_and_fast_as_its_wrench_does(
     assert np.std((drift - wave)[middle]) < 0.15 * slow / np.sqrt(2.0)
     none = replace(sources, lab=Laboratory(mjcf.urdf(), rigid_robot.described()))
     assert rough is not None and moved_as_predicted(none, shaken, suspension) == ({}, None)
+
+
+def test_links_move_with_the_base_as_it_is_predicted(recorded):
+    """A base that sways, in its markers or by prediction."""
+    trial, sources = recorded[0][0], laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
+    seen, x = MeasuredTrial.of(DESCRIPTION, trial), np.zeros((len(trial.t_mocap), 6))
+    x[:, 5] = 0.05 * np.sin(2.0 * np.pi * trial.t_mocap) * (trial.t_mocap > trial.t_mocap[0] + 1.0)
+    swaying = MeasuredTrial.of(DESCRIPTION, moved(trial, x, trial.t_mocap))
+    rest = rest_of(DESCRIPTION, seen, sources.T_base_B)
+    robot = dynamics(mjcf.urdf(), DESCRIPTION, np.zeros(len(DESCRIPTION.joint_names)))
+    bare = DriveTrains(robot, (), mjcf.urdf(), DESCRIPTION)
+    still, by_markers, predicted = (
+        links_seen(sources.lab, Arm(bare, T), ROBOT, of, rest).signal.x
+        for of, T in ((seen, {}), (swaying, {}), (seen, {trial.id: swaying.base.T}))
+    )
+    np.testing.assert_array_equal(predicted, by_markers)
+    assert np.abs(predicted - still).max() > 0.5
