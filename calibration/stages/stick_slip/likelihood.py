@@ -24,7 +24,7 @@ from calibration.stages.stick_slip.measured import BLOCK, PlanarMotion, pooled_n
 from calibration.stages.stick_slip.wheels import NAMES, WIDE, Prior, WheelSet, values_of
 from calibration.stages.suspension.model import Source
 
-CORRECTION = (80.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel.corrector`
+CORRECTION = (130.0, 0.1)  # rate g [1/s] of the plate's correction and l [-], see `kernel.corrector`
 WINDOW = round(4.0 * RATE / BLOCK)  # blocks
 _MEMORY = 1.0  # [s] between independent samples of the error
 _FAR = 0.2  # [m, rad] an error that counts as no larger

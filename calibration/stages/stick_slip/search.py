@@ -5,7 +5,7 @@
 Whether a wheel slides in a jolt at all is a threshold: far from the right friction the cost has valleys of its own.
 So a few steps are made from several starts, one of which hardly slips, and whenever the search ends, each friction and
 each stiffness, which a wheel that slides at every turn shows little of, is tried at other values; it goes on from a
-better one. So far the base is integrated in steps of 10 ms, which is half the work; from there on in those of 5 ms. Out
+better one. So far the base is integrated in steps of 10 ms, a third of the work; from there on in those of 3.3 ms. Out
 of valleys that no single parameter leads out of, two frictions changed at once do, or draws about the end, up to ten
 times as wide as the information has it: a few steps from the best of these. Without them one matched robot in ten ends
 far off, and front casters seem to slide where drives do.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 PLATE = 8  # first of the plate's columns of `drive`
-STEPS = 2  # of the integration to a sample
+STEPS = 3  # of the integration to a sample
 COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
 LANES = 16  # bases side by side
 VECTOR = 4  # lanes that one instruction takes

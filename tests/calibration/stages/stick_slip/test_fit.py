@@ -88,10 +88,10 @@ def test_several_starts_are_made_and_the_best_is_kept(trials):
     assert len(starts) >= 2 and best.cost <= min(starts)
 
 
-def test_steps_twice_as_long_lead_to_where_short_ones_do(trials, found):
+def test_long_steps_lead_to_where_short_ones_do(trials, found):
     rough = sketched(trials)[0]
-    assert trials.coarse.steps == 1 and trials.steps == 2
-    np.testing.assert_allclose((rough - found.logarithms)[ROWS], 0.0, atol=0.1)
+    assert trials.coarse.steps == 1 and trials.steps == 3
+    np.testing.assert_allclose((rough - found.logarithms)[ROWS], 0.0, atol=0.15)
     assert searched(trials, rough).cost == pytest.approx(searched(trials).cost)
 
 

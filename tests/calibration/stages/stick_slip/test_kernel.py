@@ -120,9 +120,9 @@ def test_a_sprung_base_keeps_its_energy_without_dampers():
     state[3:6] = np.array([[0.05], [-0.03], [0.2]])
     A = np.array([slipping.across(q) for q in POSITION])
     M = MASS - np.einsum("i,iab,iac->bc", WHEELS.mass, A, A)  # wheels that stick do not move
-    one, energy = slipping.forcing(np.zeros((2000, 3))), []
+    one, energy = slipping.forcing(np.zeros((1000 * STEPS, 3))), []
     for k in range(1000):
-        advance(state, wheels, one.drive[2 * k : 2 * k + 2], one.inertia[k], STEP, lanes)
+        advance(state, wheels, one.drive[STEPS * k : STEPS * (k + 1)], one.inertia[k], STEP, lanes)
         v, e = state[3:6, 0], wheels[:, E : E + 2, 0]
         e = e + 0.5 * STEP * np.array([slipping.across(q) @ v for q in POSITION - e])  # half a step on, as v is
         energy.append(0.5 * v @ M @ v + 0.5 * (rows[:, 2:4] * e**2).sum())
