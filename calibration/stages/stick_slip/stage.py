@@ -31,7 +31,7 @@ from calibration.stages.stick_slip.forcing import (
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
-from calibration.stages.stick_slip.poses import Arm, links_seen
+from calibration.stages.stick_slip.poses import Arm, moving_links
 from calibration.stages.stick_slip.search import elsewhere, searched, shifts_of_wheels, warmed
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
@@ -141,7 +141,7 @@ def _read_one(sources: WrenchSources, trial: Trial, suspension: Suspension, arm:
             far = slid(sources.lab.description, seen, rest, wrenches.plate, suspension)
             wrenches = replace(wrenches, slid=far)
         if arm is not None and arm.trains.trains and sources.robot is not None and wrenches.dynamics is not None:
-            wrenches = replace(wrenches, links=links_seen(sources.lab, arm, sources.robot, seen, rest))
+            wrenches = replace(wrenches, links=moving_links(sources.lab, arm, sources.robot, seen, rest))
         return Read(seen, rest, wrenches)
     except NotEnoughData as error:
         _log.info("%s: %s", trial.id, error)

@@ -14,7 +14,7 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
-from calibration.stages.stick_slip.poses import Arm, links_seen
+from calibration.stages.stick_slip.poses import Arm, moving_links
 from calibration.stages.stick_slip.stage import _behind, _misplaced, linear_where
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
@@ -248,7 +248,7 @@ def test_links_move_with_the_base_as_it_is_predicted(recorded):
     robot = dynamics(mjcf.urdf(), DESCRIPTION, np.zeros(len(DESCRIPTION.joint_names)))
     bare = DriveTrains(robot, (), mjcf.urdf(), DESCRIPTION)
     still, by_markers, predicted = (
-        links_seen(sources.lab, Arm(bare, T), ROBOT, of, rest).signal.x
+        moving_links(sources.lab, Arm(bare, T), ROBOT, of, rest).signal.x
         for of, T in ((seen, {}), (swaying, {}), (seen, {trial.id: swaying.base.T}))
     )
     np.testing.assert_array_equal(predicted, by_markers)
