@@ -43,7 +43,8 @@ from calibration.verdict import Verdict
 STAGE = "stick_slip"
 _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
-_BETTER = 0.8  # mean square over another's, below which a prediction takes its place: the compliance's of an axis
+_BETTER = 0.8  # mean square over another's, below which a prediction takes its place
+_MOST = 0.5  # R2 of yaw above which springs may be all that moves the base
 _LESS = 0.1  # by which R2 of the plate may be less
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
@@ -163,27 +164,20 @@ def _rows(
 
 
 def linear_where(direction: Direction, suspension: Suspension) -> Direction:
-    """The direction, linear on axes that the compliance predicts better, both on trials left out, noise taken off.
+    """The direction, linear where no wheel slides: on the axes that the compliance moves.
 
-    With trials that slipped too far to be predicted and without: what one of them shows is chance, that one slipped is
-    not. Where slip does not explain yaw in the others either, wheels yield otherwise: then all trials decide, and the
-    compliance need not be better. Nor along x and y where yaw is linear: no wheel slid then, in any trial.
+    No wheel slides where, on trials left out, the compliance explains most of yaw and leaves less than slip of x, y and
+    yaw together (geometric mean of what is left, noise taken off). A valley of the fit may explain one axis by slip of
+    a base that is anchored; x and y, moved by the same wheels, and trials in which it predicts a slip then speak
+    against it.
     """
-    slips, held_out = direction.held_out, dict(suspension.held_out)
-    tried = held_out.get(direction.source, suspension.held_out[0][1])
-    variance = tried.variance(np.ones(6, dtype=bool))
-    plane = variance[list(PLANE)]
-    if direction.source not in held_out:
+    tried = dict(suspension.held_out).get(direction.source)
+    if tried is None:
         return direction
-    calm, moved = slips.only(~slips.wild), direction.moved
-    linear = tried.moves[list(PLANE)] & (plane < slips.variance(moved) / _BETTER)
-    if calm.r2[2] >= EXPLAINED:
-        same = len(tried.count) == len(slips.count)
-        still = tried.only(~slips.wild).variance(np.ones(6, dtype=bool))[list(PLANE)] if same else plane
-        linear &= (plane < _BETTER * slips.variance(moved)) & (still < _BETTER * calm.variance(moved))
-    if linear[2]:
-        linear |= tried.moves[list(PLANE)] & (plane < slips.variance(moved) / _BETTER)
-    return replace(direction, linear=linear)
+    axes = np.ones(6, dtype=bool)
+    left, plane = direction.held_out.variance(axes[: len(PLANE)]), tried.variance(axes)[list(PLANE)]
+    slides = tried.r2[PLANE[2]] < _MOST or np.log(plane).mean() > np.log(_BETTER * left).mean()
+    return direction if slides else replace(direction, linear=tried.moves[list(PLANE)])
 
 
 def _heaved(direction: Direction, wheels: WheelSet, tilting: Tilting, read: Sequence[Read]) -> Direction:
