@@ -35,7 +35,13 @@ def rows(rng, n, size=1.0, corrected=True):
 
 @pytest.mark.parametrize(
     ("corrected", "size", "low", "high"),
-    [(True, 0.5, 0.93, 0.99), (True, 1.0, 0.90, 0.98), (True, 2.0, 0.87, 0.98), (False, 1.0, 0.90, 0.98)],
+    [
+        (True, 0.5, 0.93, 0.99),
+        (True, 1.0, 0.90, 0.98),
+        (True, 2.0, 0.87, 0.98),
+        (True, 8.0, 0.87, 0.98),
+        (False, 1.0, 0.90, 0.98),
+    ],
 )
 def test_the_band_holds_its_share_of_what_it_has_not_seen(corrected, size, low, high):
     rng = np.random.default_rng(1)
