@@ -35,7 +35,6 @@ from calibration.stages.stick_slip.stream import (
     UNDRIVEN,
     Fitted,
     Sample,
-    SlipState,
     SlipStream,
     mean_of,
     slip_stream,
@@ -149,17 +148,8 @@ class SlippingBase:
         w, (y, u), x, lags, moved, a, row, state, wheels, found = carried(
             wrench, motion, t - before.t, earlier, slip.bases, place, stream.fitted, tree, *actions, work, room
         )
-        slip = SlipState(
-            slip.start,
-            t,
-            slip.rest,
-            slip.n,
-            row,
-            Bases(state, wheels, slip.bases.lanes),
-            found,
-            slip.band,
-            found[1] * stream.fitted.moves,
-        )
+        bases = Bases(state, wheels, slip.bases.lanes)
+        slip = slip._replace(t=t, before=row, bases=bases, found=found, x=found[1] * stream.fitted.moves)
         return BaseState(before.start, t, w, before.rest, before.n, u, y, x, moved, a, slip, lags)
 
     def variance(self, state: BaseState) -> np.ndarray:

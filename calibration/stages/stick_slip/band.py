@@ -60,8 +60,9 @@ PRIOR = np.log(
 WIDTH = np.array([0.5, 0.3, 0.4, 0.5])  # left-out `around_z` alone would make l as large as what it shows of frictions
 SURE = 10.0  # by which -2 log of the likelihood falls; robots on the model's ground: 5 at most
 _LARGER = np.log([1.0, 2.0, 4.0, 8.0, 16.0])  # m
+TRIED, LEFT = 0.1, 0.4  # least share, and of the variance by preloads what is left of it when a plate judged them
 _HIGHEST = 0.975  # share below the band's upper end
-OTHER, FAR = 0.7, 25.0  # [-] of the most that wheels can be preloaded, [N.m] from the usual load
+OTHER, FAR = 0.8, 25.0  # [-] of the most that wheels can be preloaded, [N.m] from the usual load
 _PLAIN, _PLAIN_WIDTH = 0.3, np.array([1.5, 1.5])  # r, and what the logarithms of s and r are uncertain by
 
 
@@ -86,6 +87,15 @@ class Band:
     def begun(self, load: np.ndarray) -> "Band":
         """The band of a trial that begins under a load (3,) (-Fz, My, -Mx): p^2 + g^2 in the place of p^2."""
         return replace(self, start=np.sqrt(self.start**2 + other_start(load[1:], self.usual)))
+
+    def judged(self, load: np.ndarray) -> tuple["Band", float]:
+        """The same where a plate judges preloads, and how far those are tried, as a share of the most.
+
+        p^2 + LEFT (g / share)^2 in the place of p^2: weights of few preloads are surer than they should be.
+        """
+        squared = other_start(load[1:], self.usual)
+        share = squared + TRIED**2
+        return replace(self, start=np.sqrt(self.start**2 + LEFT * squared / share)), float(np.sqrt(share))
 
     def variance(self, ensemble: np.ndarray, preloaded: np.ndarray, slipped: np.ndarray) -> np.ndarray:
         """V (n, 3) of the variances by parameters and by preload (n, 3) and the largest square of a slip (n, 3)."""
@@ -231,7 +241,7 @@ def block_means(trials: Trials, x: np.ndarray) -> np.ndarray:
 
 @njit(cache=True, error_model="numpy")
 def banded(
-    ensemble: tuple[np.ndarray, np.ndarray, np.ndarray],
+    ensemble: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     before: np.ndarray,
     band: np.ndarray,
     elastic: np.ndarray,
@@ -248,11 +258,11 @@ def banded(
         heave: (3,) z, rx, ry.
         out: (5, 3), filled.
     """
-    moved, spread, preloaded = ensemble
+    moved, spread, preloaded, judged = ensemble
     for a in range(3):
         slip = moved[a] - elastic[a]
         largest = max(before[0, a], slip * slip)
-        excess = band[1, a] ** 2 * spread[a] + band[2, a] ** 2 * preloaded[a] + band[3, a] ** 2 * largest
+        excess = band[1, a] ** 2 * spread[a] + band[2, a] ** 2 * preloaded[a] + band[3, a] ** 2 * largest + judged[a]
         kept = 1.0 - min(excess / largest, 1.0) if largest > 0.0 else 0.0
         out[0, a], out[1, a], out[2, a] = largest, elastic[a] + kept * slip, band[0, a] ** 2 + excess
         out[3, a] = max(before[3, a], elastic[a] * elastic[a])

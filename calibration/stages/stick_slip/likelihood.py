@@ -125,7 +125,7 @@ class Trials:
         By parameters (k, p); the wheels' deflections (k, m, 2) at the start of each trial may be given.
         """
         bases = bases_of(self.wheels, logarithms, self.corrected, preload)
-        x, share = simulated(self.starts, self.drive, self.inertia, bases, self._step, len(logarithms))
+        x, share, _ = simulated(self.starts, self.drive, self.inertia, bases, self._step, len(logarithms))
         for a, b in self.spans:
             x[:, a:b] -= x[:, a:b][:, self.rest[a:b]].mean(axis=1, keepdims=True)
         return x, share
@@ -133,7 +133,7 @@ class Trials:
     def errors(self, logarithms: np.ndarray, places: np.ndarray | None = None) -> list[np.ndarray]:
         """By each of some parameters (k, p), and places of the wheels (k, m, 2) other than declared, see `error`."""
         bases = bases_of(self.wheels, logarithms, self.corrected, places=places)
-        x, _ = simulated(self.starts, self.drive, self.inertia, bases, self._step, len(logarithms), BLOCK)
+        x, _, _ = simulated(self.starts, self.drive, self.inertia, bases, self._step, len(logarithms), BLOCK)
         return side_by_side(self.error, x)
 
     def error(self, x: np.ndarray) -> np.ndarray:
@@ -215,10 +215,14 @@ def bases_of(
     corrected: bool,
     preload: np.ndarray | None = None,
     places: np.ndarray | None = None,
+    noise: np.ndarray | None = None,
 ) -> Bases:
-    """Bases of parameters (k, p), preloaded by deflections (k, m, 2), on wheels at other places (k, m, 2)."""
+    """Bases of parameters (k, p), preloaded by deflections (k, m, 2), on wheels at other places (k, m, 2).
+
+    Judged by a plate's force, sigma (3,) [N, N.m], where that is given.
+    """
     values = values_of(logarithms)
-    return at_rest(wheels.each(values, places), bodies(values, corrected), preload)
+    return at_rest(wheels.each(values, places), bodies(values, corrected), preload, noise)
 
 
 def joined(wheels: WheelSet, rows: Sequence[tuple[PlanarForcing, PlanarMotion]], prior: Prior = WIDE) -> Trials:

@@ -9,6 +9,7 @@ from calibration.errors import NoSuchElement
 from calibration.stages.stick_slip.band import Band, PlainBand, reached
 from calibration.stages.stick_slip.forcing import HEAVE, PLANE, STEP, PlanarForcing, Tilting
 from calibration.stages.stick_slip.kernel.integration import simulated
+from calibration.stages.stick_slip.kernel.preloaded import noise_at_rest, weighed_along
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -131,14 +132,19 @@ class StickSlip:
         """
         found = self.direction(forcing.source)
         p, load = found.parameters, forcing.drive[0, 3:6]
-        starts = preloads(self.wheels, p, load)
-        every, share = self._motions(forcing, found, starts)
+        band, tried = found.band.judged(load) if found.corrected else (found.band.begun(load), 1.0)
+        every, share, unlikely = self._motions(forcing, found, tried * preloads(self.wheels, p, load))
         n = len(found.ensemble)
-        preloaded = np.mean((every[n:] - every[0]) ** 2, axis=0)
+        own = [0, *range(n, len(every))]
+        shift, judged, preloaded = weighed_along(unlikely[own], every[own]).transpose(1, 0, 2)
         x = every[:n].mean(axis=0)
+        if found.corrected:
+            x = x + shift
         elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
         slipped = reached(x - elastic)
-        variance = found.band.begun(load).variance(every[:n].var(axis=0), preloaded, slipped)
+        variance = band.variance(every[:n].var(axis=0), preloaded, slipped)
+        if found.corrected:
+            variance = variance + judged
         kept = believed(slipped, variance - found.band.floor**2)
         x = elastic + kept * (x - elastic)
         plain = np.where(found.linear, forcing.linear, 0.0)
@@ -147,17 +153,20 @@ class StickSlip:
             variance = variance + PUSHED[forcing.source] ** 2 * reached(x)
         return PlanarPrediction(np.where(found.slips, x, plain), variance, share, kept)
 
-    def _motions(self, forcing: PlanarForcing, found: Direction, preload: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions since the first second (k, n, 3), and shares of the optimum's wheels that slid (n,).
+    def _motions(
+        self, forcing: PlanarForcing, found: Direction, preload: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions since the first second (k, n, 3), shares of the optimum's wheels that slid (n,), `unlikely` (k, n).
 
         Of the ensemble, then of the optimum from preloads (p, m, 2).
         """
         k, starts = len(found.ensemble), np.array([0, len(forcing.inertia)])
         e = np.concatenate([np.zeros((k, *preload.shape[1:])), preload])
         p = np.concatenate([found.ensemble, np.repeat(found.logarithms[None], len(preload), axis=0)])
-        bases = bases_of(self.wheels, p, found.corrected, e)
-        x, share = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, len(p))
-        return x - x[:, forcing.rest].mean(axis=1, keepdims=True), share[0]
+        noise = noise_at_rest(forcing.force[forcing.rest].var(axis=0)) if found.corrected else None
+        bases = bases_of(self.wheels, p, found.corrected, e, noise=noise)
+        x, share, unlikely = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, len(p))
+        return x - x[:, forcing.rest].mean(axis=1, keepdims=True), share[0], unlikely
 
     def displacement(self, forcing: PlanarForcing) -> tuple[np.ndarray, np.ndarray]:
         """Displacement of the base frame (n, 6) [m, rad, frame 0] and its variances (n, 6)."""

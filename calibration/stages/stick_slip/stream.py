@@ -16,8 +16,20 @@ from calibration.numerics.compiled import njit
 from calibration.recording.trial import REST
 from calibration.stages.stick_slip.band import banded
 from calibration.stages.stick_slip.forcing import UNMOVED, Tilting
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, PLATE, STEPS, Bases, X, at_rest
+from calibration.stages.stick_slip.kernel.bases import (
+    COLUMNS,
+    LANES,
+    NOISE,
+    PLATE,
+    ROWS,
+    STEPS,
+    UNLIKELY,
+    Bases,
+    X,
+    at_rest,
+)
 from calibration.stages.stick_slip.kernel.integration import advance
+from calibration.stages.stick_slip.kernel.preloaded import noise_at_rest, weighed
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bodies
 from calibration.stages.stick_slip.model import Direction, StickSlip
@@ -74,6 +86,7 @@ class SlipState(NamedTuple):
         rest: (8,) mean of the plate's (Fx, Fy, Mz) and of those of inverse dynamics in the first second, and how the
             base leans then (rx, ry).
         n: Samples in that mean.
+        noise: (3,) sum of squares about that mean of the plate's.
         before: (11,) the last sample as the kernel takes it.
         bases: The members, then the preloaded optimum.
         found: (5, 3) see `banded`.
@@ -85,6 +98,7 @@ class SlipState(NamedTuple):
     t: float
     rest: np.ndarray
     n: int
+    noise: np.ndarray
     before: np.ndarray
     bases: Bases
     found: np.ndarray
@@ -127,8 +141,10 @@ class SlipStream:
             row[6:PLATE] = leans
             if before is None:
                 return self._first(sample.t, row, rest)
-            n = before.n + 1
-            return before._replace(t=sample.t, rest=before.rest + (rest - before.rest) / n, n=n, before=row)
+            n, off = before.n + 1, rest - before.rest
+            noise = before.noise + off[:3] ** 2 * (n - 1) / n
+            bases = self._judging(before.bases, noise / n)
+            return before._replace(t=sample.t, rest=before.rest + off / n, n=n, noise=noise, before=row, bases=bases)
         was = before.bases
         bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes)
         row, found = np.empty(COLUMNS), np.empty_like(before.found)
@@ -136,16 +152,26 @@ class SlipStream:
         step_members(bases, readings, self.fitted, before.band, (sample.t - before.t) / STEPS, row, found)
         return before._replace(t=sample.t, before=row, bases=bases, found=found, x=found[1] * self.fitted.moves)
 
+    def _judging(self, bases: Bases, variance: np.ndarray) -> Bases:
+        """The same, judged by the plate's force of a variance (3,) where it corrects them."""
+        if not self.direction.corrected:
+            return bases
+        state = bases.state.copy()
+        state[:, NOISE:ROWS] = 0.25 / noise_at_rest(variance)[:, None] ** 2
+        return bases._replace(state=state)
+
     def _first(self, t: float, row: np.ndarray, rest: np.ndarray) -> SlipState:
-        of, none = self.direction.band.begun(row[3:6]), np.zeros((5, 3))
+        of, none, tried = self.direction.band.begun(row[3:6]), np.zeros((5, 3)), 1.0
+        if self.direction.corrected:
+            of, tried = self.direction.band.judged(row[3:6])
         none[2] = of.floor**2
         band = np.array([of.floor, of.spread, of.start, of.slip])
         e = np.zeros((*self.wheels.shape[:2], 2))
-        e[len(self.direction.ensemble) :] = preloads(self.wheel_set, self.direction.parameters, row[3:6])
+        e[len(self.direction.ensemble) :] = tried * preloads(self.wheel_set, self.direction.parameters, row[3:6])
         bases = at_rest(self.wheels, self.bodies, e)
         for wheels, lanes in zip(bases.wheels, bases.lanes, strict=True):
             deflect_at_rest(wheels.reshape(-1), row, lanes)
-        return SlipState(t, t, rest, 1, row, bases, none, band, none[1])
+        return SlipState(t, t, rest, 1, np.zeros(3), row, bases, none, band, none[1])
 
 
 def slip_stream(model: StickSlip) -> SlipStream:
@@ -177,7 +203,7 @@ def mean_of(state: np.ndarray, row: int, members: int) -> np.ndarray:
 @njit(cache=True, error_model="numpy")
 def advance_members(
     bases: Bases, drive: np.ndarray, inertia: np.ndarray, h: float, members: int, k: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """`advance` for k bases: the members of an ensemble, then preloaded ones of the first member's parameters.
 
     Args:
@@ -189,20 +215,27 @@ def advance_members(
         k: Of all.
 
     Returns:
-        Mean and variance (3,) of the members, mean square (3,) of the preloaded about the first.
+        Mean (3,) of the members, shifted as a plate judges preloads, and their variance; mean square (3,) of the
+        preloaded about the first; variance (3,) of the shift, 0 without a plate.
     """
-    variance, preloaded, x = np.zeros(3), np.zeros(3), np.empty(k)
+    variance, x, own = np.zeros(3), np.empty((k - members + 1, 3)), np.empty(k - members + 1)
+    found = np.zeros((3, 3))
     for g in range(len(bases.lanes)):
         advance(bases.state[g], bases.wheels[g], drive, inertia, h, bases.lanes[g])
     mean = mean_of(bases.state, X, members)
     for a in range(3):
-        for i in range(k):
-            x[i] = bases.state[i // LANES, X + a, i % LANES]
         for i in range(members):
-            variance[a] += (x[i] - mean[a]) ** 2 / members
-        for i in range(members, k):
-            preloaded[a] += (x[i] - x[0]) ** 2 / max(k - members, 1)
-    return mean, variance, preloaded
+            variance[a] += (bases.state[i // LANES, X + a, i % LANES] - mean[a]) ** 2 / members
+    for o in range(len(own)):
+        i = members - 1 + o if o > 0 else 0
+        own[o] = bases.state[i // LANES, UNLIKELY, i % LANES]
+        for a in range(3):
+            x[o, a] = bases.state[i // LANES, X + a, i % LANES]
+    if k > members:
+        weighed(own, x, found)
+    if bases.state[0, NOISE, 0] == 0.0:
+        found[:2] = 0.0
+    return mean + found[0], variance, found[2], found[1]
 
 
 @njit(cache=True, error_model="numpy")

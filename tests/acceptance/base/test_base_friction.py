@@ -52,7 +52,7 @@ def errors(model, direction, forcing):
     def moved(wheels):
         starts = np.array([0, len(forcing.inertia)])
         bases = at_rest(wheels[None], bodies(p.values[None], direction.corrected))
-        (x,), _ = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, 1)
+        (x,), _, _ = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, 1)
         return x - x[forcing.rest].mean(axis=0)
 
     still, found = moved(rows), []

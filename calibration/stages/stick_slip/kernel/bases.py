@@ -16,7 +16,8 @@ X, V, DX, STICKS, P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels
 D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, force, wheels that slide, which stick
 BODY = 30  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 LEANS, PULL, W = 34, 36, 37  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
-STUCK, NOW, ROWS = 40, 43, 46  # force of a wheel that sticks (2), its load; v at the time of the load
+STUCK, NOW = 40, 43  # force of a wheel that sticks (2), its load; v at the time of the load
+UNLIKELY, NOISE, ROWS = 46, 47, 50  # see `integration`; 1 / (4 sigma^2) of the plate's force, 0: not judged
 
 
 class Bases(NamedTuple):
@@ -37,13 +38,16 @@ class Bases(NamedTuple):
         return self.wheels[i // LANES, :, E:U, i % LANES]
 
 
-def at_rest(wheels: np.ndarray, bodies: np.ndarray, preload: np.ndarray | None = None) -> Bases:
+def at_rest(
+    wheels: np.ndarray, bodies: np.ndarray, preload: np.ndarray | None = None, noise: np.ndarray | None = None
+) -> Bases:
     """Bases at rest.
 
     Args:
         wheels: (k, m, 11) x, y, kx, ky, c, mu, n, G, mass.
         bodies: (k, 4), see BODY.
         preload: (k, m, 2) deflections [m]; None: none.
+        noise: sigma (3,) of the plate's force, by which bases are judged; None: they are not.
     """
     k, m = wheels.shape[:2]
     groups = -(-k // LANES)
@@ -54,4 +58,6 @@ def at_rest(wheels: np.ndarray, bodies: np.ndarray, preload: np.ndarray | None =
     lanes = np.minimum(k - LANES * np.arange(groups), LANES)
     state = np.zeros((groups, ROWS, LANES))
     state[:, BODY:LEANS] = bodies[own].reshape(groups, LANES, 4).transpose(0, 2, 1)
+    if noise is not None:
+        state[:, NOISE:ROWS] = 0.25 / noise[:, None] ** 2
     return Bases(state, np.ascontiguousarray(rows), -(-lanes // VECTOR) * VECTOR)

@@ -20,8 +20,9 @@ A wheel bears where it touches the floor, e_i behind its place under the base, b
 and does not pull, see `lifted`. A force plate stands still: (My, -Mx) about the base is
 R(yaw)' ((My, -Mx)_0 + Fz (x, y)). Seven millimetres move 10 N from one drive to the other.
 
-With a force plate the position is corrected, see `corrector`. Some bases that differ in their parameters or preloads
-are integrated side by side under the same load, see `Bases`.
+With a force plate the position is corrected, see `corrector`, and bases may be judged by what it measures, F, beside
+what their wheels bear, see `preloaded`. Some bases that differ in their parameters or preloads are integrated side by
+side under the same load, see `Bases`.
 Reference: Simo, Hughes, Computational Inelasticity, 1998, ch. 1 (return mapping).
 """
 
@@ -37,11 +38,13 @@ from calibration.stages.stick_slip.kernel.bases import (
     LANES,
     LEANS,
     LOAD,
+    NOISE,
     NOW,
     PLATE,
     PULL,
     SLID,
     STICKS,
+    UNLIKELY,
     Bases,
     D,
     F,
@@ -113,6 +116,22 @@ def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int)
 
 
 @njit(cache=True, error_model="numpy")
+def _judged(s: np.ndarray, u: np.ndarray, dt: float, n: int) -> None:
+    """Add a sample of dt [s] to how unlikely n lanes are by the plate's force in the drive u (11,)."""
+    if s[NOISE * LANES] == 0.0:
+        return
+    fx, fy, mz = u[PLATE], u[PLATE + 1], u[PLATE + 2]
+    for l in range(n):
+        yaw = s[(X + 2) * LANES + l]
+        c, across = 1.0 - 0.5 * yaw * yaw, s[X * LANES + l] * fy - s[(X + 1) * LANES + l] * fx
+        r0 = c * fx + yaw * fy - s[F * LANES + l]
+        r1 = c * fy - yaw * fx - s[(F + 1) * LANES + l]
+        r2 = mz - across - s[(F + 2) * LANES + l]
+        q0, q1 = r0 * r0 * s[NOISE * LANES + l], r1 * r1 * s[(NOISE + 1) * LANES + l]
+        s[UNLIKELY * LANES + l] += dt * np.log((1.0 + q0) * (1.0 + q1) * (1.0 + r2 * r2 * s[(NOISE + 2) * LANES + l]))
+
+
+@njit(cache=True, error_model="numpy")
 def _ended(s: np.ndarray, u: np.ndarray, M: np.ndarray, h: float, n: int) -> None:
     """Accelerations by what the force leaves of the drive, positions and velocities a step on; M without wheels."""
     c00, c01, c02, c11, c12, c22, i = cofactors(M)
@@ -161,6 +180,7 @@ def _advance(  # noqa: PLR0913
                         corrector(wheels, l, s[(BODY + 3) * LANES + l], s)
             _corrected(s, u[PLATE], u[PLATE + 1], u[PLATE + 2], h, n)
         _ended(s, u, M, h, n)
+    _judged(s, drive[len(drive) - 1], h * len(drive), n)
 
 
 @njit(cache=True, error_model="numpy")
@@ -182,8 +202,10 @@ def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: n
 
 def simulated(  # noqa: PLR0913
     starts: np.ndarray, drive: np.ndarray, inertia: np.ndarray, bases: Bases, h: float, k: int, every: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (k, n, 3) [m, rad] and shares of wheels that slid (k, n) of k bases in trials one after the other.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions (k, n, 3) [m, rad], shares of wheels that slid (k, n), and how unlikely bases became (k, n).
+
+    Of k bases in trials one after the other.
 
     Args:
         starts: Sample at which each trial starts, and n.
@@ -195,26 +217,26 @@ def simulated(  # noqa: PLR0913
         every: Samples of a trial, of which means are returned; what is left at its end is not.
     """
     first = np.cumsum([0, *(np.diff(starts) // every)])
-    x, share = np.empty((k, first[-1], 3)), np.empty((k, first[-1]))
+    x, share, unlikely = np.empty((k, first[-1], 3)), np.empty((k, first[-1])), np.empty((k, first[-1]))
     side_by_side(
-        lambda a, b, out: _simulated(x, share, (a, b, out, every), drive, inertia, bases, h),
+        lambda a, b, out: _simulated((x, share, unlikely), (a, b, out, every), drive, inertia, bases, h),
         starts[:-1], starts[1:], first[:-1],
     )  # fmt: skip
-    return x, share
+    return x, share, unlikely
 
 
 @njit(cache=True, error_model="numpy")
-def _simulated(  # noqa: PLR0913
-    x: np.ndarray,
-    share: np.ndarray,
+def _simulated(
+    found: tuple[np.ndarray, np.ndarray, np.ndarray],
     of: tuple[int, int, int, int],
     drive: np.ndarray,
     inertia: np.ndarray,
     bases: Bases,
     h: float,
 ) -> None:
-    """One trial of `simulated`'s x and share: its first sample, its end, its first mean, samples of a mean."""
+    """One trial of what `simulated` finds: its first sample, its end, its first mean, samples of a mean."""
     a, b, out, every = of
+    x, share, unlikely = found
     k, m, steps = len(x), bases.wheels.shape[1], len(drive) // len(inertia)
     total = np.zeros(4 * LANES)
     for g in range(len(bases.lanes)):
@@ -234,6 +256,7 @@ def _simulated(  # noqa: PLR0913
                 at = out + done // every - 1
                 for l in range(min(lanes, k - LANES * g)):
                     share[LANES * g + l, at] = total[3 * LANES + l] / (m * steps * every)
+                    unlikely[LANES * g + l, at] = state[UNLIKELY * LANES + l]
                     for i in range(3):
                         x[LANES * g + l, at, i] = total[i * LANES + l] / every
                 for l in range(4 * LANES):

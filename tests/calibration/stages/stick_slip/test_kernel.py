@@ -17,7 +17,7 @@ SHARES = np.array([TRUTH.drive_load] * 2 + [1.0] * 2 + [TRUTH.back_load] * 2)
 
 def run(one, p=TRUTH, corrected=False, start=None, wheels=WHEELS):
     bases = bases_of(wheels, p.logarithms[None], corrected, None if start is None else start[None])
-    (x,), (share,) = simulated(np.array([0, len(one.inertia)]), one.drive, one.inertia, bases, STEP, 1)
+    (x,), (share,), _ = simulated(np.array([0, len(one.inertia)]), one.drive, one.inertia, bases, STEP, 1)
     return x, share
 
 
@@ -36,7 +36,7 @@ def test_a_base_that_moved_on_its_plate_bears_on_other_wheels():
     w = slipping.push(np.random.default_rng(0), seconds=3.0)
     true, fixed, one = slipping.literal(w, plate=True), slipping.literal(w), slipping.forcing(w)
     wheels, bodies = WHEELS.rows(TRUTH)[None], np.array([[TRUTH.body_c, TRUTH.body_cr, 1e-12, 0.1]])
-    (x,), _ = simulated(np.array([0, len(one.inertia)]), one.drive, one.inertia, at_rest(wheels, bodies), STEP, 1)
+    (x,), _, _ = simulated(np.array([0, len(one.inertia)]), one.drive, one.inertia, at_rest(wheels, bodies), STEP, 1)
     own = np.abs(x - true.x[STEPS - 1 :: STEPS]).max(axis=0)
     assert np.all(own < 0.05 * np.abs(fixed.x - true.x).max(axis=0))  # to first order in the yaw
 
@@ -171,7 +171,7 @@ def test_trials_one_after_the_other_do_not_know_of_each_other():
     n = len(one.inertia)
     drive, inertia = np.concatenate([one.drive] * 2), np.concatenate([one.inertia] * 2)
     bases = bases_of(WHEELS, TRUTH.logarithms[None], False)
-    (twice,), _ = simulated(np.array([0, n, 2 * n]), drive, inertia, bases, STEP, 1)
+    (twice,), _, _ = simulated(np.array([0, n, 2 * n]), drive, inertia, bases, STEP, 1)
     np.testing.assert_array_equal(twice[:n], twice[n:])
     np.testing.assert_array_equal(twice[:n], run(one)[0])
 
@@ -183,9 +183,9 @@ def test_bases_side_by_side_do_not_know_of_each_other():
     one, k = slipping.forcing(w, w), LANES + 3
     p, e = TRUTH.logarithms + 0.2 * rng.normal(size=(k, len(TRUTH.logarithms))), 1e-4 * rng.normal(size=(k, 6, 2))
     starts = np.array([0, len(one.inertia)])
-    x, share = simulated(starts, one.drive, one.inertia, bases_of(WHEELS, p, True, e), STEP, k)
+    x, share, _ = simulated(starts, one.drive, one.inertia, bases_of(WHEELS, p, True, e), STEP, k)
     for i in range(k):
-        (alone,), (slid,) = simulated(
+        (alone,), (slid,), _ = simulated(
             starts, one.drive, one.inertia, bases_of(WHEELS, p[i : i + 1], True, e[i : i + 1]), STEP, 1
         )
         np.testing.assert_array_equal(x[i], alone)
