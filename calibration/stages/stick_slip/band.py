@@ -6,12 +6,17 @@
 x_e: predictions by an ensemble of parameters, from their posterior; x_o: by the optimum from wheels that are preloaded
 at the start, about that without preload. m (My, -Mx) at the start: a base that begins under another load than most
 trials came there by slips, which preload its wheels by up to OTHER of what they hold. x_el what springs alone would do
-under the force F: S the largest slip so far, of which a share l_a [-] stays. An error stays once it is there, so a
+under the force F: S the largest slip so far, of which a share l_a [-] stays. Where a plate corrects the prediction it
+tells of the preloads, tried up to c times the most, how likely they are, see `kernel.preloaded`:
+
+    x = mean_e x_e + shift,   (p_a^2 + LEFT g^2 / c^2) mean_o (x_o - x_0)_a^2 + var_o,   c^2 = g^2 + TRIED^2
+
+var_o by the weights, in the place of the preloads' part. An error stays once it is there, so a
 trial is one observation of it,
 
-    e_k^2 ~ V_k t_nu^2,   (log s, r, p, l) ~ N(PRIOR + m, WIDTH^2)             e_k rms of trial k when it was left out
+    e_k^2 ~ V_k t_nu^2,   (log s, r, p, l) ~ N(PRIOR + u, WIDTH^2)             e_k rms of trial k when it was left out
 
-m is 0 where wheels are what the model says. On other ground every error is larger: m is a multiple of log 2, common to
+u is 0 where wheels are what the model says. On other ground every error is larger: u is a multiple of log 2, common to
 the axes, if trials find that likelier by SURE.
 
 V is widened to the band's variance, (t / 1.96)^2 times by the 97.5 % quantile of n - 1 degrees of freedom of n trials.
@@ -59,7 +64,7 @@ PRIOR = np.log(
 )  # s, r, p, l of x, y, yaw, where a plate corrects the prediction and where none does
 WIDTH = np.array([0.5, 0.3, 0.4, 0.5])  # left-out `around_z` alone would make l as large as what it shows of frictions
 SURE = 10.0  # by which -2 log of the likelihood falls; robots on the model's ground: 5 at most
-_LARGER = np.log([1.0, 2.0, 4.0, 8.0, 16.0])  # m
+_LARGER = np.log([1.0, 2.0, 4.0, 8.0, 16.0])  # u
 TRIED, LEFT = 0.1, 0.4  # least share, and of the variance by preloads what is left of it when a plate judged them
 _HIGHEST = 0.975  # share below the band's upper end
 OTHER, FAR = 0.8, 25.0  # [-] of the most that wheels can be preloaded, [N.m] from the usual load
@@ -205,7 +210,7 @@ def fitted_band(rows: LeftOut, noise: np.ndarray, loads: np.ndarray, corrected: 
     """
     prior, usual = PRIOR[0 if corrected else 1], np.median(loads[:, 1:], axis=0)
     known = noise**2 + other_start(loads[:, 1:], usual)[:, None] * rows.preloaded
-    tried = [[_axis(rows, a, prior[a] + m, known[:, a]) for a in range(3)] for m in _LARGER]
+    tried = [[_axis(rows, a, prior[a] + u, known[:, a]) for a in range(3)] for u in _LARGER]
     costs = np.array([sum(cost for _, cost in axes) for axes in tried]) + np.where(_LARGER > 0.0, SURE, 0.0)
     found = np.array([factors for factors, _ in tried[costs.argmin()]])
     found *= stdtrit(max(len(loads) - 1, 1), _HIGHEST) / ndtri(_HIGHEST)

@@ -137,14 +137,11 @@ class StickSlip:
         n = len(found.ensemble)
         own = [0, *range(n, len(every))]
         shift, judged, preloaded = weighed_along(unlikely[own], every[own]).transpose(1, 0, 2)
-        x = every[:n].mean(axis=0)
-        if found.corrected:
-            x = x + shift
+        told = float(found.corrected)
+        x = every[:n].mean(axis=0) + told * shift
         elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
         slipped = reached(x - elastic)
-        variance = band.variance(every[:n].var(axis=0), preloaded, slipped)
-        if found.corrected:
-            variance = variance + judged
+        variance = band.variance(every[:n].var(axis=0), preloaded, slipped) + told * judged
         kept = believed(slipped, variance - found.band.floor**2)
         x = elastic + kept * (x - elastic)
         plain = np.where(found.linear, forcing.linear, 0.0)

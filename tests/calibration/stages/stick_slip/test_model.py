@@ -8,11 +8,14 @@ from calibration.errors import NoSuchElement
 from calibration.estimate.plain_values import plain, restored
 from calibration.stages.stick_slip.band import PlainBand
 from calibration.stages.stick_slip.fit import fit_direction
-from calibration.stages.stick_slip.forcing import STEPS, Tilting
+from calibration.stages.stick_slip.forcing import STEP, STEPS, Tilting
+from calibration.stages.stick_slip.kernel.integration import simulated
+from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import PUSHED, StickSlip
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
 from calibration.stages.stick_slip.search import warmed
 from calibration.stages.stick_slip.stream import Sample, slip_stream
+from calibration.stages.stick_slip.wheels import preloads
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import MASS, TRUTH, WEIGHT, WHEELS
 
@@ -48,6 +51,26 @@ def test_new_trials_are_predicted_within_their_bands(model):
         inside.append((np.abs(error) < 1.96 * np.sqrt(found.variance)).mean(axis=0))
     assert np.all(np.median(np.array(left) / moved, axis=0) < 0.05)
     assert np.all(np.mean(inside, axis=0) > 0.9)
+
+
+def test_a_plate_tells_how_the_wheels_stood(model):
+    """Bases that came there by slips: what the casters bear at first is what displaces the base when they let go."""
+    load, rng, left, alone, inside = WEIGHT + [0.0, 40.0, -20.0], np.random.default_rng(5), [], [], []
+    stood = 0.8 * preloads(WHEELS, TRUTH, load)
+    for seed, e in zip(range(60, 76), rng.permutation(stood), strict=False):
+        w = slipping.push(np.random.default_rng(seed), size=0.25)
+        x, force = slipping.slid(w, TRUTH, load, e[None])
+        forcing = slipping.forcing(w, force + rng.normal(size=force.shape) * [0.1, 0.1, 0.03])
+        forcing.drive[:, 3:6] = load
+        found, true = model.predict(forcing), x[STEPS - 1 :: STEPS]
+        bases = bases_of(WHEELS, model.direction("plate").logarithms[None], True)
+        (unloaded,), _, _ = simulated(np.array([0, len(true)]), forcing.drive, forcing.inertia, bases, STEP, 1)
+        late = slice(len(true) // 2, None)
+        left.append(((found.x - true)[late] ** 2).mean(axis=0))
+        alone.append(((unloaded - true)[late] ** 2).mean(axis=0))
+        inside.append((np.abs(found.x - true) < 1.96 * np.sqrt(found.variance))[late].mean(axis=0))
+    assert np.sqrt(np.mean(left, axis=0) / np.mean(alone, axis=0))[2] < 0.85
+    assert np.mean(inside) > 0.85
 
 
 def test_the_band_sees_a_slip_coming_that_nobody_can_predict(model):
