@@ -16,6 +16,7 @@ from scenarios.steps.process import process
 pytestmark = pytest.mark.slow
 
 SHARE, LEAST = 0.01, 0.02  # [-], [mm]: six static postures carry rows of half a millimetre
+STOPS = 0.1  # [mm], of row `full` at rest: a rounding lets a link that no load holds stop elsewhere in its gap
 EDITS = (
     (r"# payload: (\{link: \w+), mass: 0.5,", r"payload: \1, mass: 0.437,"),
     (r"validation: \[\]", "validation: [postures_validation, xyz, xyz_mirror]"),
@@ -54,5 +55,6 @@ def test_files_give_the_errors_of_the_dataset(native, tmp_path, kinds):
     assert process(mapping, tmp_path / "run").evaluated
     expected, found = errors(native / "processed"), errors(tmp_path / "run")
     assert found.keys() == expected.keys()
-    off = {k: (found[k], e) for k, e in expected.items() if abs(found[k] - e) > max(SHARE * e, LEAST)}
+    least = {k: STOPS if k[0] == "full" and k[3] == "static" else LEAST for k in expected}
+    off = {k: (found[k], e) for k, e in expected.items() if abs(found[k] - e) > max(SHARE * e, least[k])}
     assert off == {}
