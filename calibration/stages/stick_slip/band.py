@@ -7,12 +7,12 @@ x_e: predictions by an ensemble of parameters, from their posterior; x_o: by the
 at the start, about that without preload. m (My, -Mx) at the start: a base that begins under another load than most
 trials came there by slips, which preload its wheels by up to OTHER of what they hold. x_el what springs alone would do
 under the force F: S the largest slip so far, of which a share l_a [-] stays. Where a plate corrects the prediction it
-tells of the preloads, tried up to c times the most, how likely they are, see `kernel.preloaded`:
+tells how likely preloads are, tried up to c times the most, see `kernel.preloaded`:
 
     x = mean_e x_e + shift,   (p_a^2 + LEFT g^2 / c^2) mean_o (x_o - x_0)_a^2 + var_o,   c^2 = g^2 + TRIED^2
 
-var_o by the weights, in the place of the preloads' part. An error stays once it is there, so a
-trial is one observation of it,
+var_o by the weights, in the place of the preloads' part. An error stays once it is there, so a trial is one observation
+of it,
 
     e_k^2 ~ V_k t_nu^2,   (log s, r, p, l) ~ N(PRIOR + u, WIDTH^2)             e_k rms of trial k when it was left out
 
@@ -99,8 +99,8 @@ class Band:
         p^2 + LEFT (g / share)^2 in the place of p^2: weights of few preloads are surer than they should be.
         """
         squared = other_start(load[1:], self.usual)
-        share = squared + TRIED**2
-        return replace(self, start=np.sqrt(self.start**2 + LEFT * squared / share)), float(np.sqrt(share))
+        most = squared + TRIED**2
+        return replace(self, start=np.sqrt(self.start**2 + LEFT * squared / most)), float(np.sqrt(most))
 
     def variance(self, ensemble: np.ndarray, preloaded: np.ndarray, slipped: np.ndarray) -> np.ndarray:
         """V (n, 3) of the variances by parameters and by preload (n, 3) and the largest square of a slip (n, 3)."""

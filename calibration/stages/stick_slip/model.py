@@ -69,6 +69,10 @@ class Direction:
         """Whether a force that a plate measured corrects the prediction."""
         return self.source == "plate" and self.by_plate
 
+    def begun(self, load: np.ndarray) -> tuple[Band, float]:
+        """The band of a trial that begins under a load (3,), and how far preloads are tried, as a share of the most."""
+        return self.band.judged(load) if self.corrected else (self.band.begun(load), 1.0)
+
     @property
     def is_of_wheels(self) -> bool:
         """Whether wheels that stick and slip are what moves the base: no axis is linear, no force contradicts them."""
@@ -132,16 +136,15 @@ class StickSlip:
         """
         found = self.direction(forcing.source)
         p, load = found.parameters, forcing.drive[0, 3:6]
-        band, tried = found.band.judged(load) if found.corrected else (found.band.begun(load), 1.0)
+        band, tried = found.begun(load)
         every, share, unlikely = self._motions(forcing, found, tried * preloads(self.wheels, p, load))
         n = len(found.ensemble)
         own = [0, *range(n, len(every))]
         shift, judged, preloaded = weighed_along(unlikely[own], every[own]).transpose(1, 0, 2)
-        told = float(found.corrected)
-        x = every[:n].mean(axis=0) + told * shift
+        x = every[:n].mean(axis=0) + shift
         elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
         slipped = reached(x - elastic)
-        variance = band.variance(every[:n].var(axis=0), preloaded, slipped) + told * judged
+        variance = band.variance(every[:n].var(axis=0), preloaded, slipped) + judged
         kept = believed(slipped, variance - found.band.floor**2)
         x = elastic + kept * (x - elastic)
         plain = np.where(found.linear, forcing.linear, 0.0)

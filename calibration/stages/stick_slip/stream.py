@@ -19,14 +19,13 @@ from calibration.stages.stick_slip.forcing import UNMOVED, Tilting
 from calibration.stages.stick_slip.kernel.bases import (
     COLUMNS,
     LANES,
-    NOISE,
     PLATE,
-    ROWS,
     STEPS,
     UNLIKELY,
     Bases,
     X,
     at_rest,
+    judge,
 )
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.kernel.preloaded import noise_at_rest, weighed
@@ -157,13 +156,11 @@ class SlipStream:
         if not self.direction.corrected:
             return bases
         state = bases.state.copy()
-        state[:, NOISE:ROWS] = 0.25 / noise_at_rest(variance)[:, None] ** 2
+        judge(state, noise_at_rest(variance))
         return bases._replace(state=state)
 
     def _first(self, t: float, row: np.ndarray, rest: np.ndarray) -> SlipState:
-        of, none, tried = self.direction.band.begun(row[3:6]), np.zeros((5, 3)), 1.0
-        if self.direction.corrected:
-            of, tried = self.direction.band.judged(row[3:6])
+        (of, tried), none = self.direction.begun(row[3:6]), np.zeros((5, 3))
         none[2] = of.floor**2
         band = np.array([of.floor, of.spread, of.start, of.slip])
         e = np.zeros((*self.wheels.shape[:2], 2))
@@ -233,8 +230,6 @@ def advance_members(
             x[o, a] = bases.state[i // LANES, X + a, i % LANES]
     if k > members:
         weighed(own, x, found)
-    if bases.state[0, NOISE, 0] == 0.0:
-        found[:2] = 0.0
     return mean + found[0], variance, found[2], found[1]
 
 

@@ -17,7 +17,7 @@ D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, for
 BODY = 30  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 LEANS, PULL, W = 34, 36, 37  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
 STUCK, NOW = 40, 43  # force of a wheel that sticks (2), its load; v at the time of the load
-UNLIKELY, NOISE, ROWS = 46, 47, 50  # see `integration`; 1 / (4 sigma^2) of the plate's force, 0: not judged
+UNLIKELY, NOISE, ROWS = 46, 47, 50  # see `preloaded`; 1 / (4 sigma^2) of the plate's force, 0: not judged
 
 
 class Bases(NamedTuple):
@@ -36,6 +36,11 @@ class Bases(NamedTuple):
     def deflection(self, i: int) -> np.ndarray:
         """Of the wheels (m, 2) of a base [m]."""
         return self.wheels[i // LANES, :, E:U, i % LANES]
+
+
+def judge(state: np.ndarray, noise: np.ndarray) -> None:
+    """Let states (groups, ROWS, LANES) be judged by a plate's force, sigma (3,) [N, N, N.m]."""
+    state[:, NOISE:ROWS] = 0.25 / noise[:, None] ** 2
 
 
 def at_rest(
@@ -59,5 +64,5 @@ def at_rest(
     state = np.zeros((groups, ROWS, LANES))
     state[:, BODY:LEANS] = bodies[own].reshape(groups, LANES, 4).transpose(0, 2, 1)
     if noise is not None:
-        state[:, NOISE:ROWS] = 0.25 / noise[:, None] ** 2
+        judge(state, noise)
     return Bases(state, np.ascontiguousarray(rows), -(-lanes // VECTOR) * VECTOR)

@@ -100,14 +100,24 @@ def _changed(s: np.ndarray, n: int) -> int:
 
 
 @njit(cache=True, error_model="numpy")
+def _missing(s: np.ndarray, l: int, fx: float, fy: float, mz: float) -> tuple[float, float, float]:
+    """The plate's force, turned into the base's axes about its origin, less that of the wheels of lane l."""
+    yaw = s[(X + 2) * LANES + l]
+    c, across = 1.0 - 0.5 * yaw * yaw, s[X * LANES + l] * fy - s[(X + 1) * LANES + l] * fx
+    return (
+        c * fx + yaw * fy - s[F * LANES + l],
+        c * fy - yaw * fx - s[(F + 1) * LANES + l],
+        mz - across - s[(F + 2) * LANES + l],
+    )
+
+
+@njit(cache=True, error_model="numpy")
 def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int) -> None:
-    """The correction of the next step, by P and the plate's force, turned into the base's axes about its origin."""
+    """The correction of the next step, by P and what wheels miss of the plate's force."""
     for l in range(n):
-        gain, yaw = s[(BODY + 2) * LANES + l] * h, s[(X + 2) * LANES + l]
-        c, across = 1.0 - 0.5 * yaw * yaw, s[X * LANES + l] * fy - s[(X + 1) * LANES + l] * fx
-        r0 = gain * (c * fx + yaw * fy - s[F * LANES + l])
-        r1 = gain * (c * fy - yaw * fx - s[(F + 1) * LANES + l])
-        r2 = gain * (mz - across - s[(F + 2) * LANES + l])
+        gain = s[(BODY + 2) * LANES + l] * h
+        r0, r1, r2 = _missing(s, l, fx, fy, mz)
+        r0, r1, r2 = gain * r0, gain * r1, gain * r2
         p0, p1, p2 = s[P * LANES + l], s[(P + 1) * LANES + l], s[(P + 2) * LANES + l]
         p3, p4, p5 = s[(P + 3) * LANES + l], s[(P + 4) * LANES + l], s[(P + 5) * LANES + l]
         s[DX * LANES + l] = p0 * r0 + p1 * r1 + p2 * r2
@@ -117,16 +127,11 @@ def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int)
 
 @njit(cache=True, error_model="numpy")
 def _judged(s: np.ndarray, u: np.ndarray, dt: float, n: int) -> None:
-    """Add a sample of dt [s] to how unlikely n lanes are by the plate's force in the drive u (11,)."""
+    """Add a sample of dt [s] to how unlikely n lanes are by the plate's force in the drive u (11,), see `preloaded`."""
     if s[NOISE * LANES] == 0.0:
         return
-    fx, fy, mz = u[PLATE], u[PLATE + 1], u[PLATE + 2]
     for l in range(n):
-        yaw = s[(X + 2) * LANES + l]
-        c, across = 1.0 - 0.5 * yaw * yaw, s[X * LANES + l] * fy - s[(X + 1) * LANES + l] * fx
-        r0 = c * fx + yaw * fy - s[F * LANES + l]
-        r1 = c * fy - yaw * fx - s[(F + 1) * LANES + l]
-        r2 = mz - across - s[(F + 2) * LANES + l]
+        r0, r1, r2 = _missing(s, l, u[PLATE], u[PLATE + 1], u[PLATE + 2])
         q0, q1 = r0 * r0 * s[NOISE * LANES + l], r1 * r1 * s[(NOISE + 1) * LANES + l]
         s[UNLIKELY * LANES + l] += dt * np.log((1.0 + q0) * (1.0 + q1) * (1.0 + r2 * r2 * s[(NOISE + 2) * LANES + l]))
 

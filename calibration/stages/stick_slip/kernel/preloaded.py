@@ -2,9 +2,9 @@
 
     w_o ~ exp(-TRUST int log(1 + (F - sum_i A_i' f_i)^2 / (4 sigma^2)) dt),     shift = sum_o w_o (x_o - x_0)
 
-x_0 is of the optimum without preload, x_o of the optimum that started from preload o, and each is judged from the first
-second on, see `integration`. Until its first slips a preload shows in the force; what it displaced the base by stays.
-Robust, since wrong loads in a jolt outweigh seconds of soft motion.
+x_0 is of the optimum without preload, x_o of the optimum that started from preload o; summed over axes, integrated as
+long as there are readings. Until its first slips a preload shows in the force; what it displaced the base by stays.
+Robust, since wrong loads in a jolt outweigh seconds of soft motion. Bases that no plate judges are not shifted.
 Reference: Arulampalam, Maskell, Gordon, Clapp, IEEE Trans. Signal Processing 50, 2002 (sequential importance sampling).
 """
 
@@ -24,7 +24,7 @@ def noise_at_rest(variance: np.ndarray) -> np.ndarray:
 @njit(cache=True, error_model="numpy")
 def weighed(unlikely: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
     """Shift, its variance by the weights, and the mean square without them, (3, 3), of x (p, 3) about the first."""
-    least, total = unlikely.min(), 0.0
+    least, total, judged = unlikely.min(), 0.0, unlikely.max() > 0.0
     out[:] = 0.0
     for o in range(len(x)):
         w = np.exp(-TRUST * (unlikely[o] - least))
@@ -35,8 +35,8 @@ def weighed(unlikely: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
             out[1, a] += w * off * off
             out[2, a] += off * off / (len(x) - 1)
     for a in range(3):
-        out[0, a] /= total
-        out[1, a] = out[1, a] / total - out[0, a] ** 2
+        out[0, a] = out[0, a] / total if judged else 0.0
+        out[1, a] = out[1, a] / total - out[0, a] ** 2 if judged else 0.0
 
 
 @njit(cache=True, error_model="numpy")
