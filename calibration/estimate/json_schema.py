@@ -156,7 +156,9 @@ def _check_sizes(names: tuple[str, ...], file: EstimateFile, bundle: BundleParts
             f"reading_error is of joints that the robot does not have: {', '.join(on_the_way - set(names))}"
         )
     if bundle is not None:
-        sizes += [("offset", len(bundle.offset) or -1, joints), ("at_rest", len(bundle.at_rest), len(bundle.trains))]
+        sizes += [("offset", len(bundle.offset) or -1, joints)]
+        of_trains = ("at_rest", "at_rest_by_dynamics")
+        sizes += [(name, len(getattr(bundle, name)), len(bundle.trains)) for name in of_trains]
         inertials = [len(train.inertials) for train in bundle.trains]
         sizes += [("inertials", n, max(inertials)) for n in inertials]
     for name, found, expected in sizes:

@@ -47,14 +47,16 @@ class Bands:
             return predicted
         q = readings_at(trial, self.clock, trial.t_mocap, trial.q_motor)
         known, wanted = np.isfinite(q).all(axis=1), self._rows.keys() & {row.model for row in predicted.rows}
-        S = {name: np.full((len(q), 6, 6), np.nan) for name in ({self._delivered} & wanted or wanted)}
-        for name in S:
-            S[name][known] = self._robot(name, entry.payload).predict(trial.t_mocap[known], q[known]).covariance
+        own = [row for row in predicted.rows if row.model in ({self._delivered} & wanted or wanted)]
+        S = {key: np.full((len(q), 6, 6), np.nan) for key in map(self._robot_of, own)}
+        for (name, by_dynamics), found in S.items():
+            robot = self._robot(name, by_dynamics, entry.payload)
+            found[known] = robot.predict(trial.t_mocap[known], q[known]).covariance
         noise = 0.0 if entry.kind == "static" else self.description.sigmas.marker**2  # none in the mean of a dwell
         base = poses_of(self.description.base_body, trial).covariance * noise
         rows = tuple(
-            replace(row, covariance=_in_lab(row, S[row.model], base, predicted))
-            if row.model in S and row.encoder == "motor" and not self._unknown(row, predicted)
+            replace(row, covariance=_in_lab(row, S[self._robot_of(row)], base, predicted))
+            if self._robot_of(row) in S and row.encoder == "motor" and not self._unknown(row, predicted)
             else row
             for row in predicted.rows
         )
@@ -78,9 +80,15 @@ class Bands:
         known = [row for row in LADDER if row.geometry in have]
         return {row.name: row for row in known if self.estimate.joint_models or not row.joints}
 
-    def _robot(self, name: str, payload: float | None) -> Compensator:
-        row = self._rows[name]
-        robot = Compensator.of(replace(self.estimate, main=str(row.geometry)), payload)
+    def _robot_of(self, row: Prediction) -> tuple[str, bool]:
+        """Which robot has the row's covariance: its model, and whether inverse dynamics move its base."""
+        return row.model, row.base == "dynamics" and row.model == self._delivered
+
+    def _robot(self, name: str, by_dynamics: bool, payload: float | None) -> Compensator:
+        row, bundle = self._rows[name], self.estimate.bundle
+        if bundle is not None and by_dynamics:
+            bundle = bundle.by_dynamics
+        robot = Compensator.of(replace(self.estimate, main=str(row.geometry), bundle=bundle), payload)
         return robot if row.joints else replace(robot, joints=None)
 
 

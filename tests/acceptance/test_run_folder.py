@@ -374,3 +374,24 @@ def test_white_noise_of_the_base_s_markers_is_not_in_the_band_of_a_dwell(result)
     moving, still = (np.trace(of["full", "measured"], axis1=1, axis2=2) for of in rows)
     assert np.nanmedian(np.sqrt((moving - still) / 3.0)) == pytest.approx(2e-4, rel=0.5)  # 0.1 mm of a marker, at 0.8 m
     np.testing.assert_array_equal(*(of["full", "plate"] for of in rows))
+
+
+def test_links_that_inverse_dynamics_let_stop_elsewhere_widen_the_band_of_their_rows(result):
+    """The base they predict jolts links otherwise: so do predictions of calibration dwells say, in the estimate."""
+    dataset, parts = calibration.load(result.folder / "dataset"), result.estimate.bundle
+    assert (parts.at_rest_by_dynamics > 0.0).all() and parts.by_dynamics.at_rest is parts.at_rest_by_dynamics
+    wide = replace(parts, at_rest_by_dynamics=parts.at_rest + 5e-3)
+    entry = dataset.entries("validation", "swing")[0]
+    trial, predict = dataset.read(entry), predictor(result.estimate, dataset)
+    rows = [
+        {
+            (p.model, p.base): p.covariance
+            for p in bands.on(predict(entry, trial), entry, trial).rows
+            if p.encoder == "motor"
+        }
+        for of in (parts, wide)
+        for bands in [Bands(replace(result.estimate, bundle=of), dataset.description, predict.robot)]
+    ]
+    np.testing.assert_array_equal(*(of["full", "plate"] for of in rows))
+    narrow, wider = (np.nanmax(np.trace(of["full", "dynamics"], axis1=1, axis2=2)) for of in rows)
+    assert wider > 2.0 * narrow

@@ -5,7 +5,7 @@ M       moment that bends the column
 T_lab_B(t)  marker body of the base that sticks and slips, from its first second and a wrench
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -38,7 +38,8 @@ class BundleParts:
         offset: (k,) zeros of the motor readings [rad, m].
         bending: Of the column.
         stick_slip: The base; None where it was not identified.
-        at_rest: (m,) rms error of each train's angle in dwells, by link encoders [rad]; 0 where not known, or empty.
+        at_rest: (m,) s_j of each train's angle in dwells, see `geometry_refit` [rad]; 0 where not known, or empty.
+        at_rest_by_dynamics: The same where inverse dynamics move the base that else a plate moves; empty without.
         hung: What the wrist's sensor weighed beside nominal links and payload; None where nothing was.
     """
 
@@ -47,7 +48,13 @@ class BundleParts:
     bending: ColumnBending
     stick_slip: StickSlip | None
     at_rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    at_rest_by_dynamics: np.ndarray = field(default_factory=lambda: np.zeros(0))
     hung: HungLoad | None = None
+
+    @property
+    def by_dynamics(self) -> "BundleParts":
+        """The same where inverse dynamics move the base: links that its jolts move stop elsewhere."""
+        return replace(self, at_rest=self.at_rest_by_dynamics) if len(self.at_rest_by_dynamics) else self
 
 
 @dataclass(frozen=True)
@@ -59,7 +66,7 @@ class BundledRobot:
         trains: Its drive trains with the dynamics that load them; none where none was identified.
         bending: Of the column.
         stick_slip: Its base; None where it was not identified.
-        at_rest: (k,) rms error of each joint's angle in dwells [rad]; 0 where not known.
+        at_rest: (k,) s_j of each joint's angle in dwells [rad]; 0 where not known.
     """
 
     hand: HandModel

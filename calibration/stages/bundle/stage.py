@@ -8,6 +8,7 @@ Each part is estimated with the others at their estimates.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +16,10 @@ import numpy as np
 from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model, Parameter
 from calibration.numerics.lie import from_vector
+from calibration.numerics.side_by_side import side_by_side
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
+from calibration.robot.hand import HandModel
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.moved_base import RoughBase, moved_as_predicted
 from calibration.stages.bundle.robot import BundleParts
@@ -24,14 +27,21 @@ from calibration.stages.drive_trains.column_bending import rigid
 from calibration.stages.drive_trains.drive_train import Quantity
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.from_markers import completed
-from calibration.stages.drive_trains.geometry_refit import RefittedGeometry
+from calibration.stages.drive_trains.geometry_refit import (
+    CorrectedTrial,
+    RefittedGeometry,
+    corrected_trial,
+    rest_errors,
+)
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved, fit_drive_trains, motor_zeros
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
+from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
-from calibration.stages.stick_slip.poses import Arm
+from calibration.stages.stick_slip.poses import Arm, slipping_base_poses
 from calibration.stages.stick_slip.stage import fit_stick_slip
+from calibration.stages.stick_slip.standing import SOURCES
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Suspension
 from calibration.verdict import Verdict
@@ -105,8 +115,27 @@ def fit_bundle(
         sources = replace(sources, T_base_B=from_vector(hand.base))
         base, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)
         found += more
-    parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, trains.hung)
+    other = _at_rest_by_dynamics(base, sources, trials, trains, hand) if len(at_rest) else np.zeros(0)
+    parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, other, trains.hung)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
+
+
+def _at_rest_by_dynamics(
+    base: StickSlip | None, sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains, hand: HandModel
+) -> np.ndarray:
+    """s_j (m,) of `BundleParts` on the base that inverse dynamics move; empty where no plate moves it better."""
+    robot = sources.robot
+    if base is None or robot is None or len(base.directions) < len(SOURCES):
+        return np.zeros(0)
+
+    def corrected(trial: Trial) -> CorrectedTrial | None:
+        with suppress(NotEnoughData):
+            T_lab_B = slipping_base_poses(base, sources, trial, "dynamics", trains).T_lab_B
+            return corrected_trial(trains, trial, robot, hand, T_lab_B)
+        return None
+
+    found = side_by_side(corrected, [trial for trial in trials if len(trial.dwell_start)])
+    return rest_errors(trains, [one for one in found if one is not None], robot)
 
 
 def _completed(  # noqa: PLR0913

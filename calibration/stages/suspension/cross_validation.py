@@ -63,6 +63,12 @@ class HeldOut:
         """Of some trials (n_trials,) bool."""
         return HeldOut(self.error[trials], self.motion[trials], self.noise[trials], self.count[trials])
 
+    def farthest(self, axis: int) -> tuple[int, "HeldOut | None"]:
+        """The trial that moves an axis most, and the others if it moves it more than all of those together."""
+        moved = self.motion[:, axis]
+        most = int(moved.argmax())
+        return most, self.only(np.arange(len(moved)) != most) if 2.0 * moved[most] > moved.sum() else None
+
     @property
     def still(self) -> np.ndarray:
         """(6,) of a base taken to stay: mean square of the trial that moved it most; noise taken off."""

@@ -15,7 +15,7 @@ from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
 from calibration.stages.stick_slip.poses import Arm, moving_links
-from calibration.stages.stick_slip.stage import _behind, _misplaced, linear_where
+from calibration.stages.stick_slip.stage import _behind, _judged, _misplaced, linear_where
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -169,6 +169,23 @@ def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
     wild = replace(calm, error=np.concatenate([error[:7], 1e-4 * sums[:1]]))
     assert not wild.moves.any() and wild.wild.tolist() == [False] * 7 + [True]
     assert replace(direction, held_out=calm).moved.all() and replace(direction, held_out=wild).moved.all()
+
+
+def test_a_trial_that_alone_turns_the_base_does_not_decide_by_how_others_predict_it(recorded, suspension):
+    (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    sums, names = np.ones((8, 3)), [f"trial {k}" for k in range(8)]
+
+    def judged(far, of_far, of_others):
+        motion = np.append(far, np.ones(7))[:, None] * 1e-6 * sums
+        error = np.append(of_far * far, of_others * np.ones(7))[:, None] * 1e-6 * sums
+        return _judged(replace(direction, held_out=HeldOut(error, motion, 1e-10 * sums, np.ones(8))), names)
+
+    alone = judged(far=20.0, of_far=0.4, of_others=0.01)
+    assert alone.verdict == "ok" and "yaw 0.70; yaw 0.99 without trial 0" in alone.message
+    assert "without" not in judged(far=20.0, of_far=0.1, of_others=0.01).message
+    for far, of_far, of_others in ((20.0, 0.3, 0.3), (5.0, 0.6, 0.01)):  # nor others; others turn it, too
+        said = judged(far, of_far, of_others)
+        assert said.verdict == "warning" and "check the wheels' declared places" in said.message
 
 
 def test_what_is_missing_is_named(recorded, suspension):
