@@ -82,16 +82,17 @@ class BundledArm:
         velocity: np.ndarray | None = None,
         T_lab_base: np.ndarray | None = None,
         push: Push | None = None,
+        by_plate: bool = False,
     ) -> ArmPositions:
         """Of readings q_motor (n, k) [rad, m] at t (n,) [s].
 
-        Velocity (n, k), the base (n, 4, 4) and what pushes the hand where known.
+        Velocity (n, k), the base (n, 4, 4), by a plate's wrench or not, and what pushes the hand where known.
 
         Raises:
             NotEnoughData: Less than a second of readings and no velocity.
         """
         robot = self.trains.dynamics
-        base = None if T_lab_base is None else self.trains.base_acceleration(t, T_lab_base, t)
+        base = None if T_lab_base is None else self.trains.base_acceleration(t, T_lab_base, t, by_plate)
         if velocity is None:
             loads = robot.loads("", t, q_motor, base, push)
         else:

@@ -182,8 +182,8 @@ class Compensator:
         known = velocity is not None or continuous(t)
         if self.arm is not None:
             T = placed(T_lab_base_start, moved, len(t))
-            along = self.arm.along(t, q, velocity, T, push) if known else self.arm.at_rest(q, T_lab_base_start)
-            found = self._on_links(along)
+            along = partial(self.arm.along, t, q, velocity, T, push, wrench is not None)
+            found = self._on_links(along() if known else self.arm.at_rest(q, T_lab_base_start))
         else:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
         return in_lab(found, base, moved, T_lab_base_start, None if spread is None else partial(np.asarray, spread))

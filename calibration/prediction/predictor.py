@@ -37,6 +37,7 @@ from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.drive_trains.geometry_refit import CorrectedTrial
+from calibration.stages.drive_trains.stage import MovedBase
 from calibration.stages.joints.correction import Corrected, JointModels
 from calibration.stages.stick_slip.poses import BasePrediction
 from calibration.stages.suspension.base_response import laboratory
@@ -100,18 +101,8 @@ class Predictor:
         samples = tuple(joint_samples(self.joints, self.bundled, trial, poses.geared())) if moves else ()
         delivered = poses.delivered() if moves else None
         dwells = dwell_windows(trial)
-        return PredictedTrial(
-            entry.id,
-            entry.kind,
-            trial.t_mocap,
-            rows,
-            motion,
-            samples,
-            poses.T_lab_B,
-            dwells,
-            poses.corrected,
-            delivered,
-        )
+        own = entry.id, entry.kind, trial.t_mocap
+        return PredictedTrial(*own, rows, motion, samples, poses.T_lab_B, dwells, poses.corrected, delivered)
 
     def poses(self, entry: TrialEntry, trial: Trial) -> "TrialPoses":
         """What the rows of one trial are made of."""
@@ -209,8 +200,9 @@ class TrialPoses:
             return None
         row = next(row for row in LADDER if row.bundle)
         slips = [s for s in _SLIPS if source == "measured" and self.slipped(s) is not None]
-        chosen = next(s for s in (*slips, *((source,) if source else SOURCES)) if self.base(row, s) is not None)
-        return self._once(("geared", chosen), lambda: bundled.corrected(self.trial, robot, self.base(row, chosen)))
+        tried = ((s, self.base(row, s)) for s in (*slips, *((source,) if source else SOURCES)))
+        chosen, moved = next((s, MovedBase(T_lab_B, s == "plate")) for s, T_lab_B in tried if T_lab_B is not None)
+        return self._once(("geared", chosen), lambda: bundled.corrected(self.trial, robot, moved))
 
     def prepare(self, source: Base) -> None:
         """Compute what many rows share under a source of the base's motion."""

@@ -14,7 +14,7 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import even, interpolate_columns, low_passed
 from calibration.recording.trial import Trial
-from calibration.stages.drive_trains.stage import AS_SEEN, Moved
+from calibration.stages.drive_trains.stage import AS_SEEN, Moved, MovedBase
 from calibration.stages.stick_slip.fit import rough_direction
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import forced
@@ -43,16 +43,17 @@ def moved_as_predicted(sources: WrenchSources, trials: Sequence[Trial], suspensi
     direction = linear_where(rough_direction(source, of_source), suspension)
     model = StickSlip(campaign.wheels, campaign.tilting, (direction,))
 
-    def poses(read: Read) -> np.ndarray | None:
+    def moved_in(read: Read) -> MovedBase | None:
         try:
             forcing, t = forced(model, read.wrenches, source, None), read.trial.t_mocap
             x = interpolate_columns(t, forcing.t, model.displacement(forcing)[0])
             off = read.rest.displacement(MeasuredTrial.of(sources.lab.description, read.trial).base.T) - x
             slow = low_passed(even(t, off), _SLOWLY)
-            return read.rest.poses(x + interpolate_columns(t, slow.t, slow.x))
+            x = x + interpolate_columns(t, slow.t, slow.x)
+            return MovedBase(read.rest.poses(x), source == "plate")
         except NotEnoughData:
             return None
 
-    found = zip(campaign.read, side_by_side(poses, campaign.read), strict=True)
-    moved = {read.trial.id: T_lab_B for read, T_lab_B in found if T_lab_B is not None}
+    found = zip(campaign.read, side_by_side(moved_in, campaign.read), strict=True)
+    moved = {read.trial.id: one for read, one in found if one is not None}
     return RoughBase(moved, direction.logarithms)

@@ -20,6 +20,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, corrected_trial, hand_poses
 from calibration.stages.drive_trains.hung_load import HungLoad
+from calibration.stages.drive_trains.stage import MovedBase
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import BasePrediction, slipping_base_poses
@@ -92,12 +93,12 @@ class BundledRobot:
         one = corrected if encoder == "motor" else by_link_encoders(self.trains, corrected)
         return hand_poses(self.hand, self.bending, one, robot)
 
-    def corrected(self, trial: Trial, robot: Clock, T_lab_B: np.ndarray | None = None) -> CorrectedTrial:
-        """Link angles in place of a trial's motor readings; the base's marker body predicted at T_lab_B (n, 4, 4).
+    def corrected(self, trial: Trial, robot: Clock, moved: MovedBase | None = None) -> CorrectedTrial:
+        """Link angles in place of a trial's motor readings, on a base that moved so.
 
         Where that is not given, its markers are read throughout.
         """
-        return corrected_trial(self.trains, trial, robot, self.hand, T_lab_B)
+        return corrected_trial(self.trains, trial, robot, self.hand, moved)
 
     def encoder_differences(self, corrected: CorrectedTrial) -> dict[str, np.ndarray]:
         """Motor minus link reading (3, n) [rad] by each drive train with a link encoder: as predicted, on both flanks.

@@ -33,7 +33,7 @@ from calibration.stages.drive_trains.geometry_refit import (
     corrected_trial,
     rest_errors,
 )
-from calibration.stages.drive_trains.stage import AS_SEEN, Moved, fit_drive_trains, motor_zeros
+from calibration.stages.drive_trains.stage import AS_SEEN, Moved, MovedBase, fit_drive_trains, motor_zeros
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
@@ -130,8 +130,8 @@ def _at_rest_by_dynamics(
 
     def corrected(trial: Trial) -> CorrectedTrial | None:
         with suppress(NotEnoughData):
-            T_lab_B = slipping_base_poses(base, sources, trial, "dynamics", trains).T_lab_B
-            return corrected_trial(trains, trial, robot, hand, T_lab_B)
+            moved = slipping_base_poses(base, sources, trial, "dynamics", trains)
+            return corrected_trial(trains, trial, robot, hand, MovedBase(moved.T_lab_B, by_plate=False))
         return None
 
     found = side_by_side(corrected, [trial for trial in trials if len(trial.dwell_start)])

@@ -109,10 +109,12 @@ class DriveTrains:
         """The same with other zeros (k,) of the motor readings."""
         return replace(self, dynamics=replace(self.dynamics, offset=offset))
 
-    def base_acceleration(self, t: np.ndarray, T_lab_base: np.ndarray, at: np.ndarray) -> np.ndarray | None:
+    def base_acceleration(
+        self, t: np.ndarray, T_lab_base: np.ndarray, at: np.ndarray, by_plate: bool = False
+    ) -> np.ndarray | None:
         """`torques.base_acceleration` by poses (m, 4, 4) of the base frame."""
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
-        return base_acceleration(self.dynamics.gravity, t, T_lab_root, at)
+        return base_acceleration(self.dynamics.gravity, t, T_lab_root, at, by_plate)
 
     def push(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> Push | None:
         """What else loads the hand, see `hand_load`; None where nothing does."""

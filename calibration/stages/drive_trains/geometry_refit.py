@@ -35,7 +35,7 @@ from calibration.robot.nominal_frames import nominal_frames
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
-from calibration.stages.drive_trains.stage import AS_SEEN, Moved, loads_of_trial
+from calibration.stages.drive_trains.stage import AS_SEEN, Moved, MovedBase, loads_of_trial
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.departures import TakenForKnown, shown_by, with_departures, with_gears
 from calibration.stages.geometry.hand_residual import NoiseModel
@@ -181,10 +181,10 @@ def referred(train: DriveTrain, geometry: Model, trains: DriveTrains) -> DriveTr
 
 
 def corrected_trial(
-    trains: DriveTrains, trial: Trial, robot: Clock, hand: HandModel, T_lab_B: np.ndarray | None = None
+    trains: DriveTrains, trial: Trial, robot: Clock, hand: HandModel, moved: MovedBase | None = None
 ) -> CorrectedTrial:
     """A trial with link angles in place of its motor readings; the base as of `loads_of_trial`."""
-    return _by_loads(trains, trial, loads_of_trial(trains, trial, robot, hand, T_lab_B))
+    return _by_loads(trains, trial, loads_of_trial(trains, trial, robot, hand, moved))
 
 
 def _by_loads(trains: DriveTrains, trial: Trial, loads: LinkLoads) -> CorrectedTrial:

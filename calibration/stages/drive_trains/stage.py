@@ -7,6 +7,7 @@ zeros, the nominal robot with each trial's payload. Choices are made by trials l
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,8 +35,21 @@ from calibration.stages.drive_trains.torques import (
 from calibration.stages.joints.samples import link_zeros
 from calibration.verdict import Verdict
 
-Moved = Mapping[str, np.ndarray]
-"""T_lab_B (n, 4, 4) of the base's marker body at a trial's mocap times, by the trial's id."""
+
+class MovedBase(NamedTuple):
+    """How the base moved in a trial.
+
+    Attributes:
+        T_lab_B: (n, 4, 4) its marker body at the mocap times.
+        by_plate: Whether a plate's wrench predicted it, see `base_acceleration`.
+    """
+
+    T_lab_B: np.ndarray
+    by_plate: bool
+
+
+Moved = Mapping[str, MovedBase]
+"""By the trial's id."""
 AS_SEEN: Moved = {}
 STAGE = "drive_trains"
 DEFLECTION = 1e-2  # [rad] of a drive at its largest torque, prior
@@ -82,20 +96,20 @@ def fit_drive_trains(  # noqa: PLR0913
 
 
 def loads_of_trial(
-    trains: DriveTrains, trial: Trial, robot: Clock, hand: HandModel, T_lab_B: np.ndarray | None = None
+    trains: DriveTrains, trial: Trial, robot: Clock, hand: HandModel, moved: MovedBase | None = None
 ) -> LinkLoads:
-    """Loads in a trial with its payload, the base's markers at T_lab_B (n, 4, 4); where not given, as they are seen.
+    """Loads in a trial with its payload on a base that moved so; where not given, as its markers are seen.
 
     Without them, or where they are not in the lab, the base is level and at rest.
     """
     rows, base, description = _complete(trial), None, trains.description
     t = trial.t_robot[rows]
-    if T_lab_B is None:
+    if moved is None:
         with suppress(NotEnoughData):
-            T_lab_B = MeasuredTrial.of(description, trial).base.T
-    if T_lab_B is not None and description.marker_frame == "lab":
-        T_lab_base = T_lab_B @ inverse(from_vector(hand.base))
-        base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t))
+            moved = MovedBase(MeasuredTrial.of(description, trial).base.T, by_plate=False)
+    if moved is not None and description.marker_frame == "lab":
+        T_lab_base = moved.T_lab_B @ inverse(from_vector(hand.base))
+        base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t), moved.by_plate)
     own, q = trains.of_trial(trial.id), trial.q_motor[rows]
     return own.dynamics.loads(trial.id, t, q, base, own.push(t, q, trial.wrist_wrench[rows]))
 

@@ -32,6 +32,7 @@ from calibration.stages.drive_trains.hung_load import HungLoad, inertial_toleran
 
 CUTOFF = 20.0  # [Hz] of motor accelerations; starts and stops last a tenth of a second
 _BANDS = 5.0, 12.0, 20.0  # [Hz] of the base's: at all times, and where a jolt exceeds the noise
+_BY_PLATE = 10.0, 20.0  # the same of a base that a plate's wrench moves
 _JOLT = 0.15  # [s] over which the energy of a jolt is compared with the noise
 _MOST, _LEAST = 6, 0.005  # modes, and the least torque [N.m rms] one is worth: fewer make a load too large or small
 _THINNED = 10  # samples between those the modes are of
@@ -173,7 +174,9 @@ def derivatives(t: np.ndarray, q: np.ndarray, cutoff: float) -> tuple[np.ndarray
     return out[0].T.copy(), out[1].T.copy(), out[2].T.copy()
 
 
-def base_acceleration(gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray, at: np.ndarray) -> np.ndarray | None:
+def base_acceleration(
+    gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray, at: np.ndarray, by_plate: bool = False
+) -> np.ndarray | None:
     """Proper acceleration (n, 6) of the tree's root at times `at` (n,), linear [m/s2] and angular [rad/s2], its axes.
 
     Args:
@@ -182,6 +185,8 @@ def base_acceleration(gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray
         T_lab_root: (m, 4, 4) its poses, measured or predicted, NaN where not known; of less than a second of them the
             tilt alone, and None where there are none.
         at: Times.
+        by_plate: Whether a plate's wrench predicts the poses: it says faster than markers or inverse dynamics how they
+            accelerate.
     """
     seen = np.isfinite(T_lab_root).all(axis=(1, 2))
     if not seen.any():
@@ -191,20 +196,21 @@ def base_acceleration(gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray
         seen_at = even(t, to_vector(inverse(middle) @ T_lab_root))
     except NotEnoughData:
         return np.tile(np.append(-gravity @ middle[:3, :3], np.zeros(3)), (len(at), 1))
-    moved = from_vector(low_passed(seen_at, _BANDS[0]).x)[:, :3, :3]
-    a = _accelerations(seen_at)
+    bands = _BY_PLATE if by_plate else _BANDS
+    moved = from_vector(low_passed(seen_at, bands[0]).x)[:, :3, :3]
+    a = _accelerations(seen_at, bands)
     linear = a[:, :3] - (gravity @ middle[:3, :3])
     columns = np.concatenate([(linear[:, None] @ moved)[:, 0], a[:, 3:]], axis=1)
     return interpolate_columns(at, seen_at.t, columns)
 
 
-def _accelerations(x: Signal) -> np.ndarray:
-    """Second derivatives (n, c) below the first of `_BANDS`, and from each to the next where they exceed its noise.
+def _accelerations(x: Signal, bands: Sequence[float]) -> np.ndarray:
+    """Second derivatives (n, c) below the first of `bands` [Hz], and from each to the next where they exceed its noise.
 
     Noise is what is usual in a band; the share kept is Wiener's, 1 - noise / energy.
     """
     found, *faster = (
-        np.gradient(np.gradient(low_passed(x, cutoff).x, 1.0 / RATE, axis=0), 1.0 / RATE, axis=0) for cutoff in _BANDS
+        np.gradient(np.gradient(low_passed(x, cutoff).x, 1.0 / RATE, axis=0), 1.0 / RATE, axis=0) for cutoff in bands
     )
     for band in np.diff([found, *faster], axis=0):
         energy = uniform_filter1d(band**2, int(_JOLT * RATE), axis=0)

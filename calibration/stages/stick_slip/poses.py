@@ -142,7 +142,8 @@ class Arm(NamedTuple):
 
 def moving_links(lab: Laboratory, arm: Arm, robot: Clock, trial: MeasuredTrial, rest: Rest) -> Load:
     """Inverse dynamics of links that move with the base as it is predicted, or else as its markers show it."""
-    links, T_lab_B = links_of(lab, arm.trains, robot, trial, rest.T_lab_0), arm.moved.get(trial.id, trial.base.T)
+    links, moved = links_of(lab, arm.trains, robot, trial, rest.T_lab_0), arm.moved.get(trial.id)
+    T_lab_B = trial.base.T if moved is None else moved.T_lab_B
     return links.load(trial.t_mocap, T_lab_B @ inverse(rest.T_0_B))
 
 

@@ -156,3 +156,12 @@ def test_a_jolt_of_the_base_stands_above_the_noise_of_its_markers() -> None:
     true = np.gradient(np.gradient(waves[0, :, 0], T), T)
     assert exact @ true > 0.6 * true @ true
     assert np.std(noisy[T > 4.0]) < 0.3 * np.std(derivatives(T, waves[1], 20.0)[2][T > 4.0, 0])
+
+
+def test_a_plate_says_how_a_base_accelerates_that_hardly_moves() -> None:
+    """8 Hz of 10 um, as long as the trial: noise of markers looks like that."""
+    gravity, wave = np.array([0.0, 0.0, -9.81]), np.zeros((len(T), 6))
+    wave[:, 0] = 1e-5 * np.sin(16.0 * np.pi * T)
+    true, inside = -((16.0 * np.pi) ** 2) * wave[:, 0], slice(100, -100)
+    seen, by_plate = (base_acceleration(gravity, T, from_vector(wave), T, by)[inside, 0] for by in (False, True))
+    assert np.std(seen) < 0.2 * np.std(true[inside]) and np.std(by_plate) > 0.6 * np.std(true[inside])

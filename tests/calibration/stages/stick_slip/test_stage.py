@@ -11,6 +11,7 @@ from calibration.recording.schema import Description
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.moved_base import moved_as_predicted
 from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.stage import MovedBase
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
@@ -231,13 +232,14 @@ def test_a_base_moves_slowly_as_its_markers_show_it_and_fast_as_its_wrench_does(
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     (found, rough), (trial, x, t) = moved_as_predicted(sources, shaken, suspension), recorded[0]
     rest = rest_of(DESCRIPTION, shaken[0], sources.T_base_B)
-    at, true = rest.displacement(found[trial.id]), np.interp(trial.t_mocap, t, x[:, 0])
+    at, true = rest.displacement(found[trial.id].T_lab_B), np.interp(trial.t_mocap, t, x[:, 0])
     middle = (trial.t_mocap > t[0] + 1.5) & (trial.t_mocap < t[-1] - 0.5)
     assert np.std((at[:, 0] - true)[middle]) < 0.3 * fast / np.sqrt(2.0)
     drift = at[:, 1] - np.interp(trial.t_mocap, t, x[:, 1])
     wave = slow * np.sin(2.0 * np.pi * 0.2 * trial.t_mocap)
     assert np.std((drift - wave)[middle]) < 0.15 * slow / np.sqrt(2.0)
     none = replace(sources, lab=Laboratory(mjcf.urdf(), rigid_robot.described()))
+    assert all(one.by_plate for one in found.values())
     assert rough is not None and moved_as_predicted(none, shaken, suspension) == ({}, None)
 
 
@@ -252,7 +254,7 @@ def test_links_move_with_the_base_as_it_is_predicted(recorded):
     bare = DriveTrains(robot, (), mjcf.urdf(), DESCRIPTION)
     still, by_markers, predicted = (
         moving_links(sources.lab, Arm(bare, T), ROBOT, of, rest).signal.x
-        for of, T in ((seen, {}), (swaying, {}), (seen, {trial.id: swaying.base.T}))
+        for of, T in ((seen, {}), (swaying, {}), (seen, {trial.id: MovedBase(swaying.base.T, by_plate=True)}))
     )
     np.testing.assert_array_equal(predicted, by_markers)
     assert np.abs(predicted - still).max() > 0.5
