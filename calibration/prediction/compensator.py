@@ -46,6 +46,7 @@ from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, points_of
 from calibration.robot.kinematics import beyond
 from calibration.robot.laboratory import Laboratory
+from calibration.robot.wrist_sensor import UNSEEN
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
@@ -157,7 +158,7 @@ class Compensator:
             T_lab_base_start: (4, 4) pose of the base frame at the start; identity where not given.
             velocity: (n, n_joints) of the motor side [rad/s, m/s], where it is known.
             t_wrench: Times (m,) [s, plate's clock] of a wrench (m, 6) that was not taken at t, then the robot's clock.
-            wrist: (n, 6) of the wrist's sensor at t: a push, or another payload's place, loads joints and base.
+            wrist: (n, 6) of the wrist's sensor at t: a push, another payload, and how the hand moves, load the base.
 
         Raises:
             NotEnoughData: A wrench without a suspension or for less than a second, or without its clock.
@@ -168,7 +169,7 @@ class Compensator:
             raise ShapeError("q_motor", q.shape, (len(t), "n_joints"))
         self._refuse_impossible(q)
         base, moved, spread = self._base(T_lab_base_start), None, None
-        push = None if self.arm is None or wrist is None else self.arm.trains.push(t, q, wrist)
+        hand = UNSEEN if self.arm is None or wrist is None else self.arm.trains.hand(t, q, wrist)
         if wrench is not None:
             w, there = np.asarray(wrench, dtype=float), needed(base)
             if t_wrench is not None:
@@ -176,13 +177,13 @@ class Compensator:
             if self.slipping is None or self.slipping.source != "plate":
                 moved = there.moved(t, w)
             else:
-                moved, spread = self.slipping.moved(there, t, q, w, push)
+                moved, spread = self.slipping.moved(there, t, q, w, hand)
         elif base is not None and self.slipping is not None and self.slipping.source != "plate" and continuous(t):
-            moved, spread = self.slipping.moved(base, t, q, None, push)
+            moved, spread = self.slipping.moved(base, t, q, None, hand)
         known = velocity is not None or continuous(t)
         if self.arm is not None:
             T = placed(T_lab_base_start, moved, len(t))
-            along = partial(self.arm.along, t, q, velocity, T, push, wrench is not None)
+            along = partial(self.arm.along, t, q, velocity, T, hand.joints, wrench is not None)
             found = self._on_links(along() if known else self.arm.at_rest(q, T_lab_base_start))
         else:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
@@ -238,7 +239,7 @@ class Compensator:
         q, base = np.asarray(q_motor, dtype=float)[None], self._base(T_lab_base_start)
         v = None if velocity is None else np.asarray(velocity, dtype=float)[None]
         self._refuse_impossible(q)
-        before, moving, state, variance = before or RobotState(), None, None, None
+        before, moving, state, variance, arm, in_base = before or RobotState(), None, None, None, None, None
         if self.arm is not None:
             moving = self.arm.moving(t, q[0], None if v is None else v[0], before.arm)
         if wrench is not None:
@@ -248,7 +249,6 @@ class Compensator:
             else:
                 state = self.slipping.stepped(there, t, w, None if v is None else moving, before.base)
                 variance = partial(self.slipping.variance, state)
-        arm, in_base = None, None
         if self.arm is not None and moving is not None:
             loads = proper_acceleration(self.arm, state, T_lab_base_start)
             arm = self.arm.stepped(t, moving, before.arm, loads)

@@ -7,10 +7,14 @@ and the declared payload, of weight W, along the readings; w_0: mean of f + w in
 nothing pushes. Zeros of encoders, tolerances of masses and a base that shakes left up to 0.39 W on twenty robots that
 nothing pushed: the hand is pushed in trials in which p's force, averaged over 0.4 s, exceeds 0.75 W.
 
-Or else it shows what hangs there besides: linear in a mass and its first moment, see `drive_trains.hung_load`.
+What hangs on the sensor of a pushed hand is no part of the robot that its joints and its base move: it acts on them by
+w - w_0, as it is pushed and as links and base truly move it, otherwise than the motors do.
 
-f is along the motors. Where joint i's link moves otherwise, p misses I_i times that acceleration about the joint, I_i
-the inertia of what hangs on the sensor. So the link's inertia under the load of p is M_ii - I_i.
+A hand that nothing pushes acts on the floor by
+
+    h = w - [f + w]        [.]: below 1 Hz, of masses, zeros and drift; what is faster is how links and base move it
+
+The sensor shows what hangs there besides, too: linear in a mass and its first moment, see `drive_trains.hung_load`.
 """
 
 from collections.abc import Iterator
@@ -23,7 +27,7 @@ import pinocchio as pin
 from scipy.ndimage import uniform_filter1d
 
 from calibration.errors import NotEnoughData
-from calibration.numerics.signals import RATE, even, interpolate_columns, low_passed
+from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST
 from calibration.robot.chain import Chain
@@ -32,22 +36,43 @@ from calibration.robot.rigid_tree import RigidTree, dynamics_along
 
 _CUTOFF = 20.0  # [Hz]
 _AVERAGE = 0.4  # [s]
+_SLOW = 1.0  # [Hz]
 _SHARE = 0.75  # of the weight: less is no push [-]
 STRIDE = 4  # samples from one to the next where a push is looked for
+_MASSES = "mass", "moment", "inertia"  # of the bodies of a tree
 
 
 class Push(NamedTuple):
-    """What pushes the hand.
+    """What acts on the last body in the place of something that hangs on it.
 
     Attributes:
-        wrench: p (n, 6), axes and origin of the tree's last body [N, N.m].
-        inertia: (n, k) I about each joint [kg.m2, kg].
-        outside: Whether it comes from outside, and is not a load that hangs on the sensor.
+        wrench: w - w_0 (n, 6), or h, axes and origin of the tree's last body [N, N.m].
+        hung: The robot of which only what it replaces has mass.
+        outside: Whether something pushes from outside.
     """
 
     wrench: np.ndarray
-    inertia: np.ndarray
+    hung: RigidTree
     outside: bool = True
+
+    def on(self, tree: RigidTree) -> RigidTree:
+        """The robot without what this replaces."""
+        return tree._replace(**{name: getattr(tree, name) - getattr(self.hung, name) for name in _MASSES})
+
+
+class HandLoads(NamedTuple):
+    """What the wrist's sensor shows of the hand; None: what nominally hangs there, moved as the motors move.
+
+    Attributes:
+        joints: What loads the joints.
+        floor: What loads the floor.
+    """
+
+    joints: Push | None = None
+    floor: Push | None = None
+
+
+UNSEEN = HandLoads()
 
 
 def hung_bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[pin.Inertia]:
@@ -101,29 +126,37 @@ class WristSensor:
         except NotEnoughData:
             return None
         limit = _SHARE * float(self.tree.mass[-1] * np.linalg.norm(self.at_rest[0, 6:9]))
+        few = read.thinned(STRIDE)
+        p = self._moved(few) + few.wrench
+        zero = p[few.t <= few.t[0] + REST].mean(axis=0)
+        force = uniform_filter1d(p[:, :3] - zero[:3], int(_AVERAGE * RATE / STRIDE), axis=0)
+        if np.linalg.norm(force, axis=1).max() <= limit:
+            return None
+        return Push(self._on_body(t, read.t, read.wrench - zero), self.tree)
 
-        def outside(at: SmoothReadings) -> Push:
-            f, inertia = self._moved(at)
-            p = f + at.wrench
-            return Push(p - p[at.t <= at.t[0] + REST].mean(axis=0), inertia)
+    def hand(self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray, nominal: RigidTree) -> Push | None:
+        """h of a hand that nothing pushes, in the place of what nominally hangs there; None without a second of it."""
+        try:
+            read = smoothed(t, q, wrench)
+        except NotEnoughData:
+            return None
+        off = self._moved(read) + read.wrench
+        slow = low_passed(Signal(read.t, off, np.ones(len(off), dtype=bool)), _SLOW).x
+        return Push(self._on_body(t, read.t, read.wrench - slow), nominal, outside=False)
 
-        force = uniform_filter1d(outside(read.thinned(STRIDE)).wrench[:, :3], int(_AVERAGE * RATE / STRIDE), axis=0)
-        return None if np.linalg.norm(force, axis=1).max() <= limit else self._on_body(outside(read), read.t, t)
-
-    def load(self, t: np.ndarray, read: "SmoothReadings") -> Push:
-        """What hangs on the sensor as a load at t (n,) [s] of a robot of which it is no part."""
-        f, inertia = self._moved(read)
-        return self._on_body(Push(-f, -inertia, outside=False), read.t, t)
+    def lacking(self, n: int) -> Push:
+        """What hangs on the sensor where a robot has too much of it, as n samples have it."""
+        return Push(np.zeros((n, 6)), self.tree, outside=False)
 
     def beyond(self, read: "SmoothReadings") -> tuple[np.ndarray, np.ndarray]:
         """-(w + f) (n, 6), and the regressor (n, 6, 4) of -w by mass and first moment, axes of the last body.
 
         Moments about the centre of what nominally hangs there: gears that sag turn its weight, which has none there.
         """
-        Y = np.stack([self.alone(unit)._moved(read)[0] for unit in np.eye(4)], axis=2)
+        Y = np.stack([self.alone(unit)._moved(read) for unit in np.eye(4)], axis=2)
         about = np.eye(6)
         about[3:, :3] = -pin.skew(pin.SE3(self.body).actInv(self.tree.moment[-1] / self.tree.mass[-1]))
-        return -(read.wrench + self._moved(read)[0]) @ about.T, about @ Y
+        return -(read.wrench + self._moved(read)) @ about.T, about @ Y
 
     def carrying(self, more: np.ndarray) -> "WristSensor":
         """The sensor with a further mass and its first moment (4,) on it."""
@@ -134,21 +167,20 @@ class WristSensor:
 
     def alone(self, what: np.ndarray) -> "WristSensor":
         """The sensor with a mass and its first moment (4,) on it alone."""
-        bare = {n: np.zeros_like(getattr(self.tree, n)) for n in ("mass", "moment", "inertia")}
+        bare = {n: np.zeros_like(getattr(self.tree, n)) for n in _MASSES}
         return replace(self, tree=self.tree._replace(**bare)).carrying(what)
 
-    def _on_body(self, found: Push, t: np.ndarray, at: np.ndarray) -> Push:
-        """With its wrench in the last body's axes, at other times."""
-        wrench = interpolate_columns(at, t, found.wrench @ pin.SE3(self.body).dualAction.T)
-        return found._replace(wrench=wrench, inertia=interpolate_columns(at, t, found.inertia))
+    def _on_body(self, t: np.ndarray, at: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+        """A wrench in the last body's axes, at other times."""
+        return interpolate_columns(t, at, wrench @ pin.SE3(self.body).dualAction.T)
 
-    def _moved(self, at: "SmoothReadings") -> tuple[np.ndarray, np.ndarray]:
-        """f (n, 6) in the sensor's axes about its origin, and I (n, k)."""
+    def _moved(self, at: "SmoothReadings") -> np.ndarray:
+        """f (n, 6) in the sensor's axes about its origin."""
         found = dynamics_along(self.tree, at.q, at.v, at.a, self.at_rest)
         T = self.root @ self.chain.poses(at.q[:, self.chain.columns], self.link)
         R, moment = T[:, :3, :3], found.root[:, 3:] - np.cross(T[:, :3, 3], found.root[:, :3])
         f = [(found.root[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]]
-        return np.concatenate(f, axis=1), found.inertia
+        return np.concatenate(f, axis=1)
 
 
 class SmoothReadings(NamedTuple):
@@ -203,7 +235,7 @@ def wrist_sensor(urdf: str, description: Description) -> WristSensor | None:
         box = pin.Inertia(payload.mass, np.array(payload.com), np.zeros((3, 3)))
         hung += data.oMf[whole.getFrameId(payload.link)].act(box)
     hung = frame.placement.act(data.oMf[sensor].actInv(hung))
-    tree = lab.tree._replace(**{n: np.zeros_like(getattr(lab.tree, n)) for n in ("mass", "moment", "inertia")})
+    tree = lab.tree._replace(**{n: np.zeros_like(getattr(lab.tree, n)) for n in _MASSES})
     tree.mass[-1], tree.moment[-1], tree.inertia[-1] = hung.mass, hung.mass * hung.lever, hung.matrix()[3:, 3:]
     base = reduced.frames[reduced.getFrameId(description.base_frame)].placement
     gravity = base.rotation @ np.array(description.gravity)

@@ -20,7 +20,7 @@ import numpy as np
 from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
-from calibration.robot.wrist_sensor import Push
+from calibration.robot.wrist_sensor import HandLoads
 from calibration.stages.drive_trains import link_motion
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_load
@@ -116,8 +116,8 @@ class DriveTrains:
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
         return base_acceleration(self.dynamics.gravity, t, T_lab_root, at, by_plate)
 
-    def push(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> Push | None:
-        """What else loads the hand, see `hand_load`; None where nothing does."""
+    def hand(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> HandLoads:
+        """What the wrist's sensor (n, 6) shows of the hand, see `hand_load`."""
         return hand_load(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist)
 
     def likely(self, loads: LinkLoads) -> np.ndarray:

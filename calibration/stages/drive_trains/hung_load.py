@@ -20,7 +20,15 @@ from calibration.errors import NotEnoughData
 from calibration.numerics.signals import RATE
 from calibration.recording.schema import Description, Tolerances
 from calibration.recording.trial import Trial
-from calibration.robot.wrist_sensor import STRIDE, Push, SmoothReadings, WristSensor, smoothed, wrist_sensor
+from calibration.robot.wrist_sensor import (
+    STRIDE,
+    UNSEEN,
+    HandLoads,
+    SmoothReadings,
+    WristSensor,
+    smoothed,
+    wrist_sensor,
+)
 
 _BLOCK = round(RATE / STRIDE)  # of a mean
 _LEAST = 1e-12  # [kg2, (kg.m)2, m2] of a prior variance
@@ -95,11 +103,12 @@ def hand_load(
     t: np.ndarray,
     q: np.ndarray,
     wrench: np.ndarray,
-) -> Push | None:
-    """What loads the hand in a trial beside what hangs there by calibration; None where nothing does.
+) -> HandLoads:
+    """What the sensor shows of the hand in a trial beside what hangs there by calibration.
 
-    A push, see `robot.wrist_sensor`; or else what the sensor shows of a payload that is not the campaign's, whose
-    centre the calibration does not tell: the same fit to the trial alone, its prior what the calibration found.
+    A push, see `robot.wrist_sensor`; or else, on the floor, how the hand moves; and a payload that is not the
+    campaign's, whose centre the calibration does not tell: the same fit to the trial alone, its prior what the
+    calibration found.
 
     Args:
         urdf: Nominal robot.
@@ -110,20 +119,25 @@ def hand_load(
         wrench: (n, 6) readings of the sensor.
     """
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
-    if sensor is None or hung is None:
-        return None if sensor is None else sensor.push(t, q, wrench)
-    mass = description.payload_of()
-    known = hung.added(mass)
+    if sensor is None:
+        return UNSEEN
+    mass, known = description.payload_of(), np.zeros(4) if hung is None else hung.added(description.payload_of())
     pushed = sensor.carrying(known).push(t, q, wrench)
-    if pushed is not None or mass == hung.payload:
-        return pushed
+    if pushed is not None:
+        return HandLoads(pushed, pushed._replace(hung=sensor.tree))
+    if hung is None:
+        return UNSEEN
+    if mass == hung.payload:
+        return HandLoads(None, sensor.carrying(known).hand(t, q, wrench, sensor.tree))
     try:
         read = smoothed(t, q, wrench)
         row = (*_means(sensor, read), mass)
     except NotEnoughData:
-        return None
+        return UNSEEN
     x, _ = _fitted([row], np.append(hung.links, hung.centre), hung.covariance)
-    return sensor.alone(replace(hung, links=x[:4], centre=x[4:]).added(mass) - known).load(t, read)
+    found = replace(hung, links=x[:4], centre=x[4:]).added(mass)
+    floor = sensor.carrying(found).hand(t, q, wrench, sensor.tree)
+    return HandLoads(sensor.alone(known - found).lacking(len(t)), floor)
 
 
 def _means(sensor: WristSensor, read: SmoothReadings) -> tuple[np.ndarray, np.ndarray]:

@@ -111,7 +111,7 @@ def loads_of_trial(
         T_lab_base = moved.T_lab_B @ inverse(from_vector(hand.base))
         base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t), moved.by_plate)
     own, q = trains.of_trial(trial.id), trial.q_motor[rows]
-    return own.dynamics.loads(trial.id, t, q, base, own.push(t, q, trial.wrist_wrench[rows]))
+    return own.dynamics.loads(trial.id, t, q, base, own.hand(t, q, trial.wrist_wrench[rows]).joints)
 
 
 def motor_zeros(hand: HandModel) -> np.ndarray:

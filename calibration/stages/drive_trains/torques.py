@@ -1,8 +1,8 @@
 """What moves the links in a trial: motor positions, velocities, accelerations, torques and inertias of all joints.
 
     tau = M(q) a + C(q, v) v + g(q) - J' p        nominal inverse dynamics with the trial's payload       [N.m, N]
-                                           p what pushes the hand, by the wrist's sensor, which takes the inertia
-                                           of what hangs on it off M_jj, see `robot.wrist_sensor`
+                                           p what a pushed hand does to the wrist's sensor; what hangs on it is no
+                                           part of the robot then, see `robot.wrist_sensor`
     tau + R(q, v, a) dphi                  of other masses and first moments (m, m c) by body [kg, kg.m], a tilt of the
                                            base about x and y [rad], and bending of the first joint's column [rad/(N.m)]
 
@@ -51,7 +51,7 @@ class LinkLoads:
         v: Motor velocities.
         a: Motor accelerations.
         torque: tau [N.m, N].
-        inertia: M_jj [kg.m2, kg]; while the hand is pushed, less what hangs on the wrist's sensor.
+        inertia: M_jj [kg.m2, kg]; of a pushed hand, without what hangs on the wrist's sensor.
         regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
     """
@@ -108,11 +108,10 @@ class Dynamics:
         self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: Push | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Torques and inertias (n, k), regressors (n, k, p), moments (n, 2) at readings and derivatives (n, k)."""
-        root = self.root(base)
+        root, tree = self.root(base), self.tree
         if push is not None:
-            root = np.concatenate([np.broadcast_to(root, (len(q), 12)), push.wrench], axis=1)
-        found = dynamics_along(self.tree, q - self.offset, v, a, root, True)
-        inertia = found.inertia if push is None else found.inertia - push.inertia
+            root, tree = np.concatenate([np.broadcast_to(root, (len(q), 12)), push.wrench], axis=1), push.on(tree)
+        found = dynamics_along(tree, q - self.offset, v, a, root, True)
         a_0, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
         tilt = np.stack(
             [
@@ -122,7 +121,7 @@ class Dynamics:
             axis=2,
         )
         bending = -(tilt @ found.moment[..., None])
-        return found.torque, inertia, np.concatenate([found.regressor, tilt, bending], axis=2), found.moment
+        return found.torque, found.inertia, np.concatenate([found.regressor, tilt, bending], axis=2), found.moment
 
     def root(self, base: np.ndarray | None) -> np.ndarray:
         """Twist, zero, and proper acceleration (n, 12) of the base; `base` (n, 6) as of `loads`."""

@@ -20,7 +20,8 @@ from calibration.numerics.signals import RATE, Signal
 from calibration.recording.clock import Clock
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.wrist_sensor import Push, hand_push
+from calibration.robot.wrist_sensor import UNSEEN, HandLoads, hand_push
+from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
 from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
 from calibration.stages.stick_slip.kernel.lifted import on_wheels, vertical
@@ -154,15 +155,15 @@ class Readings(NamedTuple):
     Attributes:
         t: (n,) [s, mocap clock].
         q: (n, k) [rad, m].
-        push: What pushes the hand; None where nothing does.
+        hand: What the wrist's sensor shows of the hand.
     """
 
     t: np.ndarray
     q: np.ndarray
-    push: Push | None = None
+    hand: HandLoads = UNSEEN
 
 
-def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wrenches:
+def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray, arm: DriveTrains | None = None) -> Wrenches:
     """What the instruments of a trial show of its wrench, by the nominal robot with the payload of the trial."""
     start, plate, lab = float(trial.t_mocap[0]), None, sources.lab.of_trial(trial.id)
     if sources.plate is not None and len(trial.t_plate):
@@ -170,8 +171,9 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray) -> Wr
     if sources.robot is None or not len(trial.t_robot):
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)), wheels_of(lab))
     t, q, wrench = readings_of(sources.robot, trial)
-    readings = Readings(t, q, hand_push(lab.urdf, lab.description, t, q, wrench))
-    return replace(wrenches_along(lab, readings, plate, T_lab_0), trial_id=trial.id, start=start)
+    pushed = None if arm else hand_push(lab.urdf, lab.description, t, q, wrench)
+    hand = arm.of_trial(trial.id).hand(t, q, wrench) if arm else HandLoads(floor=pushed)
+    return replace(wrenches_along(lab, Readings(t, q, hand), plate, T_lab_0), trial_id=trial.id, start=start)
 
 
 def readings_of(robot: Clock, trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -182,9 +184,9 @@ def readings_of(robot: Clock, trial: Trial) -> tuple[np.ndarray, np.ndarray, np.
 
 def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_lab_0: np.ndarray) -> Wrenches:
     """The wrench of the plate, and that of readings."""
-    t, q = readings.t, readings.q
-    dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, readings.push), composite_inertia(lab, t, q, CUTOFF)
-    pushed = readings.push is not None and readings.push.outside
+    t, q, (_, hand) = readings
+    dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, hand), composite_inertia(lab, t, q, CUTOFF, hand)
+    pushed = hand is not None and hand.outside
     return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab), pushed=pushed)
 
 
@@ -210,13 +212,13 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
         first, last = max(first, dynamics.signal.t[0]), min(last, dynamics.signal.t[-1])
     fine = first + np.arange(int((last - first) * RATE + 1e-6) * STEPS) * STEP
     t, rest = fine[STEPS - 1 :: STEPS], fine <= wrenches.start + REST
-    tilt, load = heave(fine), _at(main.signal, fine)
+    tilt, load = heave(fine), CubicSpline(main.signal.t, main.signal.x)(fine)
     rows, drive = np.zeros((len(t), 15)), np.zeros((len(fine), COLUMNS))
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
         M = _resampled(wrenches.t, wrenches.M, t)
         shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], heave(fine, 2))
-        drive[:, :3] = (_at(dynamics.signal, fine) - shift)[:, PLANE]
+        drive[:, :3] = (CubicSpline(dynamics.signal.t, dynamics.signal.x)(fine) - shift)[:, PLANE]
         drive[:, :3] -= drive[rest, :3].mean(axis=0)
         rows[:, :6] = _inertia(M)[:, :6]
         if main is dynamics:
@@ -290,11 +292,6 @@ def _inertia(M: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _at(signal: Signal, t: np.ndarray) -> np.ndarray:
-    return np.asarray(CubicSpline(signal.t, signal.x)(t))
-
-
 def _resampled(t: np.ndarray, M: np.ndarray, at: np.ndarray) -> np.ndarray:
     """M (n, 6, 6) at times (n,), linear."""
-    columns = [np.interp(at, t, c) for c in M.reshape(len(M), 36).T]
-    return np.stack(columns, axis=1).reshape(len(at), 6, 6)
+    return np.stack([np.interp(at, t, c) for c in M.reshape(len(M), 36).T], axis=1).reshape(len(at), 6, 6)

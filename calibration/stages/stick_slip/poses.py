@@ -83,7 +83,7 @@ def slipping_base_poses(
         NoSuchElement: The model was not fitted from that source.
     """
     rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-    wrenches, links = wrenches_of(sources, trial, rest.T_lab_0), None
+    wrenches, links = wrenches_of(sources, trial, rest.T_lab_0, trains), None
     if trains is not None and sources.robot is not None and len(trial.t_robot):
         links = links_of(sources.lab, trains, sources.robot, trial, rest.T_lab_0)
     forcing = forced(model, wrenches, source, links)
@@ -111,21 +111,21 @@ class Links(NamedTuple):
 
     def load(self, t: np.ndarray, T_lab_base: np.ndarray) -> Load:
         """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known."""
-        at, q, push = self.readings
+        at, q, hand = self.readings
         moving = self.trains.base_acceleration(t, T_lab_base, at)
-        loads = self.trains.dynamics.loads("", at, q, moving, push)
+        loads = self.trains.dynamics.loads("", at, q, moving, hand.joints)
         angles, twist = (
             self.trains.likely(loads) - self.trains.dynamics.offset,
             planar_twist(t, T_lab_base, self.T_lab_0, at),
         )
-        return motion_load(self.lab, at, angles, self.T_lab_0, CUTOFF, push, twist)
+        return motion_load(self.lab, at, angles, self.T_lab_0, CUTOFF, hand.floor, twist)
 
 
 def links_of(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, T_lab_0: np.ndarray) -> Links:
     """The links in a whole trial with its payload, and what else loads the hand."""
     lab, trains = lab.of_trial(trial.id), trains.of_trial(trial.id)
     t, q, wrench = readings_of(robot, trial)
-    return Links(lab, trains, Readings(t, q, trains.push(t, q, wrench)), T_lab_0)
+    return Links(lab, trains, Readings(t, q, trains.hand(t, q, wrench)), T_lab_0)
 
 
 class Arm(NamedTuple):

@@ -137,7 +137,7 @@ def _read_one(sources: WrenchSources, trial: Trial, suspension: Suspension, arm:
     try:
         seen = MeasuredTrial.of(sources.lab.description, trial)
         rest = rest_of(sources.lab.description, seen, sources.T_base_B)
-        wrenches = wrenches_of(sources, seen, rest.T_lab_0)
+        wrenches = wrenches_of(sources, seen, rest.T_lab_0, None if arm is None else arm.trains)
         if wrenches.plate is not None:
             far = slid(sources.lab.description, seen, rest, wrenches.plate, suspension)
             wrenches = replace(wrenches, slid=far)

@@ -82,14 +82,14 @@ def motion_load(
     description = lab.description
     q = low_passed(even(t, q_motor), cutoff)
     spline, T_0_root = CubicSpline(q.t, q.x), root_in_base(lab.floating, description)
-    root = root_at_rest(lab, T_lab_0)
+    root, tree = root_at_rest(lab, T_lab_0), lab.tree if push is None else push.on(lab.tree)
     if twist is not None:
         moving = interpolate_columns(q.t, t, twist) @ T_0_root.inverse().action.T
         root = np.concatenate([moving, np.broadcast_to(root[:, 6:], moving.shape)], axis=1)
     if push is not None:
         pushed = interpolate_columns(q.t, t, push.wrench)
         root = np.concatenate([np.broadcast_to(root, (len(pushed), 12)), pushed], axis=1)
-    along = dynamics_along(lab.tree, q.x, spline(q.t, 1), spline(q.t, 2), root)
+    along = dynamics_along(tree, q.x, spline(q.t, 1), spline(q.t, 2), root)
     w = along.root @ T_0_root.dualAction.T
     rows = np.linspace(0, len(q.t) - 1, _MASS_SAMPLES).astype(int)
     M = T_0_root.dualAction @ along.composite[rows].mean(axis=0) @ T_0_root.inverse().action
@@ -99,13 +99,13 @@ def motion_load(
 
 
 def composite_inertia(
-    lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, cutoff: float
+    lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, cutoff: float, push: Push | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (k,) [s, mocap clock] and M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes."""
     q = low_passed(even(t, q_motor), cutoff)
     T_0_root, rows = root_in_base(lab.floating, lab.description), q.x[::_INERTIA_STRIDE]
-    none = np.zeros_like(rows)
-    M = dynamics_along(lab.tree, rows, none, none, np.zeros((1, 12))).composite
+    none, tree = np.zeros_like(rows), lab.tree if push is None else push.on(lab.tree)
+    M = dynamics_along(tree, rows, none, none, np.zeros((1, 12))).composite
     return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
 
 

@@ -6,8 +6,9 @@ import pytest
 
 import mjcf
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.wrist_sensor import hand_push, hung_bodies
+from calibration.robot.wrist_sensor import hand_push, hung_bodies, wrist_sensor
 from calibration.stages.drive_trains.torques import dynamics
+from calibration.stages.suspension.floor_wrench import motion_load, root_in_base
 from calibration.stages.wrist_load import expected_load
 from tests.doubles import rigid_robot
 
@@ -43,7 +44,7 @@ def test_a_push_is_the_reading_less_the_weight_and_loads_the_joints_by_its_power
         turn = np.array([there[2, 1], there[0, 2], there[1, 0]])
         power = outside[250] @ np.concatenate([there[:3, 3], turn]) / h
         assert loaded[250, j] - bare[250, j] == pytest.approx(-power, abs=2e-3)
-    np.testing.assert_allclose(push.wrench[:150], 0.0, atol=1e-6)
+    np.testing.assert_allclose(loaded[:150], bare[:150], atol=1e-5)
 
 
 def hung():
@@ -70,6 +71,40 @@ def test_what_hangs_on_the_sensor_does_not_hold_a_link_in_its_gap_back_twice(j):
     rows = slice(120, 380)
     own = pushed.torque[:, j] + bare.inertia[:, j] * a
     np.testing.assert_allclose((held.torque[:, j] + held.inertia[:, j] * a)[rows], own[rows], atol=0.02)
+
+
+def shaken(hertz):
+    """The base's acceleration (n, 6) [m/s2, rad/s2, root's axes], and what a hand at Q does to the sensor by it."""
+    a = np.outer(np.sin(2.0 * np.pi * hertz * T) * (T > 1.0), [0.5, -0.3, 0.0, 0.0, 0.0, 2.0])
+    T_root_sensor = root_in_base(LAB.floating, HUNG).inverse() * pin.SE3(LAB.chain.poses(Q[None], LINK)[0])
+    return a, -a @ T_root_sensor.inverse().action.T @ hung().matrix().T
+
+
+def test_a_base_that_accelerates_under_a_pushed_hand_loads_the_joints_once():
+    q, w, _ = readings(np.array([5.0, -18.0, 7.0]))
+    a, seen = shaken(2.0)
+    robot = dynamics(LAB.urdf, HUNG, np.zeros(8))
+    still = np.tile(robot.root(None)[:, 6:], (len(T), 1))
+    at_rest, moving = (robot.loads("", T, q, base=still + x).torque for x in (0.0, a))
+    pushed = robot.loads("", T, q, push=hand_push(LAB.urdf, HUNG, T, q, w)).torque - at_rest
+    both = robot.loads("", T, q, base=still + a, push=hand_push(LAB.urdf, HUNG, T, q, w + seen)).torque
+    rows = slice(120, 380)
+    np.testing.assert_allclose((both - moving)[rows], pushed[rows], atol=0.02)
+
+
+@pytest.mark.parametrize(("hertz", "share"), [(4.0, 1.0), (0.2, 0.0)])
+def test_a_hand_acts_on_the_floor_as_the_sensor_shows_it_to_move(hertz, share):
+    """What is slow is taken for masses and drift."""
+    q, w, _ = readings(np.zeros(3))
+    _, seen = shaken(hertz)
+    sensor = wrist_sensor(LAB.urdf, HUNG)
+    hand = sensor.hand(T, q, w + seen, sensor.tree)
+    nominal, moved = (motion_load(LAB, T, q, np.eye(4), 20.0, push).signal.x for push in (None, hand))
+    acts = seen @ pin.SE3(LAB.chain.poses(Q[None], LINK)[0]).dualAction.T
+    rows = slice(150, 350)
+    off = (moved - nominal)[rows] - share * acts[rows]
+    assert (np.abs(off).max(axis=0) < 0.15 * np.abs(acts).max()).all()
+    assert not hand.outside and sensor.hand(T[:50], q[:50], w[:50], sensor.tree) is None
 
 
 def test_a_small_force_is_no_push_and_without_a_sensor_there_is_none():

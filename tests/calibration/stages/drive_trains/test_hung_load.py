@@ -11,7 +11,7 @@ import mjcf
 from calibration.estimate.plain_values import plain, restored
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import Laboratory, floating_model
-from calibration.robot.wrist_sensor import wrist_sensor
+from calibration.robot.wrist_sensor import UNSEEN, wrist_sensor
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_load, hung_load, inertial_tolerance
 from calibration.stages.drive_trains.stage import fit_drive_trains
 from calibration.stages.drive_trains.torques import dynamics, inertial_tolerances
@@ -145,8 +145,8 @@ def test_a_payload_that_no_trial_had_is_weighed_where_it_is_carried():
     description = described(None)
     known = hung_load(mjcf.urdf(), description, OFFSET, trials(description))
     other, q = description.carrying(2.0), angles(5)
-    push = hand_load(mjcf.urdf(), other, known, T, q, readings(description, q, 2.0))
-    assert not push.outside  # the band of a pushed base is not that of one that carries more
+    push, floor = hand_load(mjcf.urdf(), other, known, T, q, readings(description, q, 2.0))
+    assert not push.outside and not floor.outside  # the band of a pushed base is not that of one that carries more
     robot = dynamics(mjcf.urdf(), other, np.zeros(8), known)
     true = dynamics(mjcf.urdf(), other, np.zeros(8), replace(known, links=LINKS, centre=CENTRE))
     bare, loaded, expected = (r.loads("", T, q, push=p).torque for r, p in ((robot, None), (robot, push), (true, None)))
@@ -158,14 +158,15 @@ def test_a_payload_that_no_trial_had_is_weighed_where_it_is_carried():
 def test_the_campaigns_payload_is_not_weighed_again_and_a_push_is_one(weighed):
     description, q = described(None), angles(5)
     w = readings(description, q, None)
-    assert hand_load(mjcf.urdf(), description, weighed, T, q, w) is None
-    assert hand_load(mjcf.urdf(), description, weighed, T, q, np.full_like(w, np.nan)) is None
+    found = hand_load(mjcf.urdf(), description, weighed, T, q, w)
+    assert found.joints is None and not found.floor.outside
+    assert hand_load(mjcf.urdf(), description, weighed, T, q, np.full_like(w, np.nan)) == UNSEEN
     short = slice(0, 100)
-    assert hand_load(mjcf.urdf(), description.carrying(2.0), weighed, T[short], q[short], w[short]) is None
-    pushed = hand_load(mjcf.urdf(), description, weighed, T, q, readings(description, q, None, push=20.0))
-    assert pushed.outside
-    assert np.linalg.norm(pushed.wrench[500, :3]) == pytest.approx(20.0, abs=0.5)
-    assert np.linalg.norm(pushed.wrench[250, :3]) < 0.5
+    assert hand_load(mjcf.urdf(), description.carrying(2.0), weighed, T[short], q[short], w[short]) == UNSEEN
+    pushed, floor = hand_load(mjcf.urdf(), description, weighed, T, q, readings(description, q, None, push=20.0))
+    assert pushed.outside and floor.outside
+    outside = pushed.wrench[:, :3] - found.floor.wrench[:, :3]
+    assert np.linalg.norm(outside[500]) == pytest.approx(20.0, abs=0.5) and np.linalg.norm(outside[250]) < 0.5
 
 
 def test_nothing_is_weighed_without_a_sensor_or_beside_a_push(weighed):
