@@ -173,4 +173,4 @@ def _held_out(trials: Trials, errors: np.ndarray) -> HeldOut:
         e, x, before = errors[own][motion.valid], motion.x[motion.valid], own.stop
         rows.append(((e**2).sum(axis=0), (x**2).sum(axis=0), len(e) * motion.noise**2, len(e)))
     error, moved, noise, count = (np.array(a, dtype=float) for a in zip(*rows, strict=True))
-    return HeldOut(error, moved, noise, count)
+    return HeldOut(error, moved, noise, count, trials.ids)

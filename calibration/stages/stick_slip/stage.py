@@ -169,13 +169,15 @@ def linear_where(direction: Direction, suspension: Suspension) -> Direction:
     No wheel slides where, on trials left out, the compliance explains most of yaw and leaves less than slip of x, y and
     yaw together (geometric mean of what is left, noise taken off). A valley of the fit may explain one axis by slip of
     a base that is anchored; x and y, moved by the same wheels, and trials in which it predicts a slip then speak
-    against it.
+    against it. In a trial after which the base rested elsewhere, which no compliance was tried on, it explains nothing.
     """
-    tried = dict(suspension.held_out).get(direction.source)
+    tried, own = dict(suspension.held_out).get(direction.source), direction.held_out
     if tried is None:
         return direction
-    axes = np.ones(6, dtype=bool)
-    left, plane = direction.held_out.variance(axes[: len(PLANE)]), tried.variance(axes)[list(PLANE)]
+    moved = own.only(~np.isin(own.ids, tried.ids) if own.ids and tried.ids else np.zeros(len(own.count), dtype=bool))
+    axes, share = np.ones(6, dtype=bool), moved.count.sum() / own.count.sum()
+    plane = (1.0 - share) * tried.variance(axes)[list(PLANE)] + share * moved.variance(~axes[: len(PLANE)])
+    left = own.variance(axes[: len(PLANE)])
     slides = tried.r2[PLANE[2]] < _MOST or np.log(plane).mean() > np.log(_BETTER * left).mean()
     return direction if slides else replace(direction, linear=tried.moves[list(PLANE)])
 

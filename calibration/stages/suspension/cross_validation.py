@@ -33,12 +33,14 @@ class HeldOut:
         motion: (n_trials, axes) squared displacement.
         noise: (n_trials, axes) squared noise to be expected.
         count: (n_trials,) samples.
+        ids: Of the trials; none in estimates of earlier versions.
     """
 
     error: np.ndarray
     motion: np.ndarray
     noise: np.ndarray
     count: np.ndarray
+    ids: tuple[str, ...] = ()
 
     @property
     def r2(self) -> np.ndarray:
@@ -61,7 +63,8 @@ class HeldOut:
 
     def only(self, trials: np.ndarray) -> "HeldOut":
         """Of some trials (n_trials,) bool."""
-        return HeldOut(self.error[trials], self.motion[trials], self.noise[trials], self.count[trials])
+        ids = tuple(name for name, one in zip(self.ids, trials, strict=False) if one)
+        return HeldOut(self.error[trials], self.motion[trials], self.noise[trials], self.count[trials], ids)
 
     def farthest(self, axis: int) -> tuple[int, "HeldOut | None"]:
         """The trial that moves an axis most, and the others if it moves it more than all of those together."""
@@ -111,4 +114,4 @@ def held_out(responses: Sequence[BaseResponse], without: Callable[[int], tuple[n
             ((e**2).sum(axis=0), (response.x[response.valid] ** 2).sum(axis=0), len(e) * response.noise, len(e))
         )
     error, motion, noise, count = (np.array(a, dtype=float) for a in zip(*rows, strict=True))
-    return HeldOut(error, motion, noise, count)
+    return HeldOut(error, motion, noise, count, tuple(response.trial_id for response in responses))

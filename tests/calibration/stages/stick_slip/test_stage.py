@@ -149,16 +149,18 @@ def test_where_no_wheel_slides_slip_explains_yaw_alone(recorded, suspension):
     (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
     sums, yaw = np.ones((8, 6)), np.arange(6) == 5
 
-    def linear(of_yaw, along):
-        left = np.where(yaw, of_yaw, 0.2e-6) * sums
-        tried = replace(suspension, held_out=(("plate", HeldOut(left, 1e-6 * sums, 1e-10 * sums, np.ones(8))),))
+    def linear(of_yaw, along, used="abcdefgh"):
+        left, n = np.where(yaw, of_yaw, 0.2e-6) * sums, len(used)
+        seen = HeldOut(left[:n], 1e-6 * sums[:n], 1e-10 * sums[:n], np.ones(n), tuple(used))
         own = np.repeat([[along, 0.1e-6, 0.1e-6]], 8, axis=0)
-        found = replace(direction, held_out=HeldOut(own, 1e-6 * sums[:, :3], 1e-10 * sums[:, :3], np.ones(8)))
-        return linear_where(found, tried).linear
+        known = HeldOut(own, 1e-6 * sums[:, :3], 1e-10 * sums[:, :3], np.ones(8), tuple("abcdefgh"))
+        return linear_where(replace(direction, held_out=known), replace(suspension, held_out=(("plate", seen),))).linear
 
     assert linear(of_yaw=0.2e-6, along=10e-6).all()
     assert not linear(of_yaw=0.2e-6, along=0.5e-6).any()  # springs leave less along x, and more of all three
     assert not linear(of_yaw=0.7e-6, along=1e-4).any()  # they hardly explain yaw: wheels yield otherwise
+    assert linear(of_yaw=0.2e-6, along=3e-6).all()
+    assert not linear(of_yaw=0.2e-6, along=3e-6, used="abcd").any()  # after the others it rested elsewhere
 
 
 def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
