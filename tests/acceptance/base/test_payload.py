@@ -4,7 +4,7 @@ Row `full`, seed 4, the short campaign, per component [mm]; with 2 kg both back 
 and how far a drive slides depends on a few newtons of its load:
 
     plate: usual     0 kg         2 kg          push         measured: usual     2 kg         push
-    .28              .29          .42           .31          .36                 .35          .39
+    .29              .28          .45           .38          .34                 .37          .48
 """
 
 import json
@@ -35,6 +35,7 @@ def test_a_declared_payload_is_known_to_both(trials):
 
 
 LOADED = pytest.mark.xfail(reason="a base that slides with half of its wheels: docs/models.md", strict=True)
+STOPS = pytest.mark.xfail(reason="arm_1's link, released, stops elsewhere in its gap: docs/limits.md", strict=True)
 
 
 @pytest.mark.parametrize(
@@ -42,10 +43,10 @@ LOADED = pytest.mark.xfail(reason="a base that slides with half of its wheels: d
     [
         ("xyz_0kg", "measured"),
         ("xyz_2kg", "measured"),
-        ("push", "measured"),
+        pytest.param("push", "measured", marks=STOPS),
         ("xyz_0kg", "plate"),
         pytest.param("xyz_2kg", "plate", marks=LOADED),
-        ("push", "plate"),
+        pytest.param("push", "plate", marks=STOPS),
     ],
 )
 def test_row_full_knows_what_loads_it(trials, trial, base):
