@@ -93,10 +93,10 @@ def whole_run(tmp_path_factory):
 @pytest.mark.parametrize(
     ("factor", "campaign"),
     [
-        pytest.param(3.0, "quick_run", marks=ARM_1),
-        (3.0, "whole_run"),
-        pytest.param(1.0 / 3.0, "quick_run", marks=ARM_1),
-        pytest.param(1.0 / 3.0, "whole_run", marks=ARM_1),
+        (3.0, "quick_run"),
+        pytest.param(3.0, "whole_run", marks=ARM_1),
+        (1.0 / 3.0, "quick_run"),
+        (1.0 / 3.0, "whole_run"),
     ],
 )
 def test_the_headline_moves_by_a_tenth_at_most_when_all_priors_are_wider_or_narrower(
