@@ -395,3 +395,26 @@ def test_links_that_inverse_dynamics_let_stop_elsewhere_widen_the_band_of_their_
     np.testing.assert_array_equal(*(of["full", "plate"] for of in rows))
     narrow, wider = (np.nanmax(np.trace(of["full", "dynamics"], axis1=1, axis2=2)) for of in rows)
     assert wider > 2.0 * narrow
+
+
+def test_it_is_the_row_by_the_wrist_s_sensor_too(result, compensator, swing):
+    """It shows how the hand moves, which moves the base."""
+    t, q, w, start, rows, *_ = swing
+    dataset = calibration.load(result.folder / "dataset")
+    entry = dataset.entries("validation", "swing")[0]
+    trial, predict = dataset.read(entry), predictor(result.estimate, dataset)
+    ok, nothing = np.isin(trial.t_mocap, t), np.full_like(q, np.nan)
+    wrist = readings_at(trial, predict.robot, t, trial.wrist_wrench)
+    same = replace(
+        trial, t_mocap=t, marker_position=trial.marker_position[ok], t_robot=t, q_motor=q, q_link=nothing,
+        v_motor=nothing, effort=nothing, q_command=nothing, t_plate=t, plate_wrench=w[:, None], wrist_wrench=wrist,
+    )  # fmt: skip
+    found = next(
+        p.T_lab_hand
+        for p in replace(predict, robot=SAME, plate=SAME)(entry, same).rows
+        if (p.model, p.base, p.encoder) == ("full", "plate", "motor")
+    )
+    seen = compensator.predict(t, q, w, start, wrist=wrist).T
+    if compensator.arm is not None:
+        np.testing.assert_allclose(seen, found, rtol=0.0, atol=1e-12)
+        assert np.abs(seen - rows["full", "plate"]).max() > 1e-7
