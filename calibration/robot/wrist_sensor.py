@@ -114,7 +114,7 @@ class WristSensor:
     at_rest: np.ndarray
 
     def push(self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> Push | None:
-        """What pushes the hand at t (n,) [s]; None: nothing does.
+        """What a hand that is pushed does to the sensor at t (n,) [s]; None: nothing pushes it.
 
         Args:
             t: Times.

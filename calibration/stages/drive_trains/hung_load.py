@@ -121,7 +121,8 @@ def hand_load(
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
     if sensor is None:
         return UNSEEN
-    mass, known = description.payload_of(), np.zeros(4) if hung is None else hung.added(description.payload_of())
+    mass = description.payload_of()
+    known = np.zeros(4) if hung is None else hung.added(mass)
     pushed = sensor.carrying(known).push(t, q, wrench)
     if pushed is not None:
         return HandLoads(pushed, pushed._replace(hung=sensor.tree))
