@@ -1,12 +1,11 @@
 """Dynamics of a tree of rigid bodies on a moving root, compiled: one sample or all at once, in the root's axes.
 
     A_i = A_parent + S_i ddq_i + V_parent x S_i dq_i     f_i = I_i A_i + V_i x* I_i V_i + sum_children f_c
-    tau_i = S_i' f_i,   M_ii = S_i' I^c_i S_i            I^c_i what joint i carries, f_0 the wrench on the root
+    tau_i = S_i' f_i,   M_ij = S_i' I^c_j S_j            i carries j, I^c_j what j carries; f_0 the wrench on the root
 
 Twists and wrenches are about the root's origin. A_0 is the root's proper acceleration, gravity taken off. What pushes
 the last body from outside is taken off its f. The regressor is how tau changes with masses and first moments of the
-bodies, second moments left alone.
-Reference: Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 5 and 6.
+bodies, second moments left alone. Reference: Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 5 and 6.
 """
 
 from typing import NamedTuple
@@ -48,7 +47,7 @@ class TreeDynamics(NamedTuple):
 
     Attributes:
         torque: (n, k) [N.m, N].
-        inertia: (n, k) M_ii [kg.m2, kg].
+        inertia: (n, k, k) M, symmetric [kg.m2, kg.m, kg].
         root: (n, 6) wrench on the root [N, N.m].
         moment: (n, 2) about x and y of the first joint's frame, of the force it passes on [N.m].
         composite: (n, 6, 6) inertia of the whole about the root's origin.
@@ -101,7 +100,7 @@ _R, _P, _S, _V, _A, _F, _X, _I, _ROW = np.array([0, 9, 12, 18, 24, 30, 36, 42, 7
 def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
     """What dynamics of n samples of k joints are written to."""
     return TreeDynamics(
-        np.empty((n, k)), np.empty((n, k)), np.empty((n, 6)), np.empty((n, 2)), np.empty((n, 6, 6)),
+        np.empty((n, k)), np.zeros((n, k, k)), np.empty((n, 6)), np.empty((n, 2)), np.empty((n, 6, 6)),
         np.empty((n, k, 3)), np.zeros((n, k, 4 * k if regressors else 0)),
     )  # fmt: skip
 
@@ -165,9 +164,8 @@ def _move(me: np.ndarray, up: np.ndarray, v: float, a: float) -> None:
 @njit(cache=True, error_model="numpy")
 def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
     """Inertia of body b about the root's origin, and the wrench that moves it."""
-    m, inertia, h = tree.mass[b], tree.inertia[b], np.zeros(3)
+    m, inertia, h, square, at = tree.mass[b], tree.inertia[b], np.zeros(3), 0.0, _I + 21  # where the angular part is
     turned(me, tree.moment[b], h, _R)
-    square, at = 0.0, _I + 21  # of the angular part
     for i in range(36):
         me[_I + i] = 0.0
     for i in range(3):
@@ -267,15 +265,24 @@ def sample(
         if out.regressor.shape[2]:
             _regress(tree, work, out.regressor[i])
         for j in range(k - 1, -1, -1):
-            me, up, column = work[j + 1], work[tree.parent[j]], tree.column[j]
-            out.torque[i, column] = dot(me, _S, me, _F)
-            _times(me, _S, me, _X)
-            out.inertia[i, column] = dot(me, _S, me, _X)
-            for c in range(3):
-                out.coupling[i, column, c] = me[_X + c]
-            for c in range(_F, _ROW):  # the twist between is scratch
-                up[c] += me[c]
+            _gather(tree, work, j, out, i)
         _borne(work, out, i)
+
+
+@njit(cache=True, error_model="numpy")
+def _gather(tree: RigidTree, work: np.ndarray, j: int, out: TreeDynamics, i: int) -> None:
+    """What joint j bears into sample i of `out`, and to the body that carries it."""
+    me, up, column, b = work[j + 1], work[tree.parent[j]], tree.column[j], j + 1
+    out.torque[i, column] = dot(me, _S, me, _F)
+    _times(me, _S, me, _X)
+    while b > 0:  # the joints that carry this one
+        other = tree.column[b - 1]
+        out.inertia[i, other, column] = out.inertia[i, column, other] = dot(work[b], _S, me, _X)
+        b = tree.parent[b - 1]
+    for c in range(3):
+        out.coupling[i, column, c] = me[_X + c]
+    for c in range(_F, _ROW):  # the twist between is scratch
+        up[c] += me[c]
 
 
 @njit(cache=True, error_model="numpy")

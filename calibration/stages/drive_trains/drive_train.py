@@ -101,19 +101,19 @@ class DriveTrain:
 
     def backlash(self, drive: "DriveMotion") -> "Deflection":
         """delta in trials."""
-        torque, likely = drive.torque + self.link_inertia * drive.a, self.likely(drive)
+        torque, (likely, acceleration) = drive.torque + self.link_inertia * drive.a, self.likely(drive)
         others = [likely]
         for off in (-2.0 * self.torque_sigma, 2.0 * self.torque_sigma):
             shift = self.values[COMPLIANCE] * off  # of a mesh in contact, and no doubt about its side
             for start in self.ends(torque[drive.begins[:-1]] + off):
                 others.append(self.deltas(drive, torque + off, start) - shift)
-        return Deflection(likely, np.min(others, axis=0), np.max(others, axis=0))
+        return Deflection(likely, np.min(others, axis=0), np.max(others, axis=0), acceleration)
 
     def likely(self, drive: "DriveMotion") -> np.ndarray:
-        """Most likely delta (n,) [rad] in trials."""
+        """Most likely delta and its acceleration (2, n) in trials, as `moved` has them."""
         torque = drive.torque + self.link_inertia * drive.a
         low, high = self.ends(torque[drive.begins[:-1]])
-        return self.deltas(drive, torque, low + self.start[0] * (high - low))
+        return self.moved(drive, torque, low + self.start[0] * (high - low))
 
     def variance(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Variance (n,) [rad2] of a link in motion that is between low and high (n,) [rad]."""
@@ -143,11 +143,19 @@ class DriveTrain:
         self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
     ) -> np.ndarray:
         """delta (n,) [rad] under torques (n,) [N.m], from `starts` (m,) where trials begin; steps of `longest` [s]."""
+        return np.asarray(self.moved(drive, torque, starts, longest)[0])
+
+    def moved(
+        self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
+    ) -> np.ndarray:
+        """`deltas`, and their mean accelerations since the sample before [rad/s2]; 0 of a play operator; (2, n)."""
+        coupled = np.zeros(len(drive.q)) if drive.coupled is None else drive.coupled
         if not self.dynamic and self.form == "dead_zone":
-            own = Drive(drive.t, drive.q, drive.v, torque, drive.inertia)
-            return np.asarray(played(own, drive.begins, starts, self.values))
+            own = Drive(drive.t, drive.q, drive.v, torque, drive.inertia, coupled)
+            delta = played(own, drive.begins, starts, self.values)
+            return np.array([delta, np.zeros(len(delta))])
         inertia = self.moved_inertia(drive.inertia)
-        own = Drive(drive.t, drive.q, drive.v, torque, inertia)
+        own = Drive(drive.t, drive.q, drive.v, torque, inertia, coupled)
         return np.asarray(simulated(own, drive.begins, starts, longest, self.simulated_values))
 
     def moved_inertia(self, nominal: np.ndarray) -> np.ndarray:
@@ -175,6 +183,7 @@ class DriveMotion:
         torque: Of the link's motion if it followed the motor [N.m].
         inertia: The mesh moves [kg.m2].
         begins: (m + 1,) first sample of each trial, and n.
+        coupled: Torque by how other links depart from their motors [N.m], each even since the sample before; or None.
     """
 
     t: np.ndarray
@@ -184,6 +193,7 @@ class DriveMotion:
     torque: np.ndarray
     inertia: np.ndarray
     begins: np.ndarray
+    coupled: np.ndarray | None = None
 
 
 def drive_motion(loads: Sequence[LinkLoads], column: int, inertials: np.ndarray | None = None) -> DriveMotion:
@@ -193,10 +203,11 @@ def drive_motion(loads: Sequence[LinkLoads], column: int, inertials: np.ndarray 
         return np.concatenate([getattr(of_trial, name)[:, column] for of_trial in loads])
 
     t, torque = np.concatenate([of_trial.t for of_trial in loads]), joined("torque")
+    inertia = np.concatenate([of_trial.inertia[:, column, column] for of_trial in loads])
     if inertials is not None:
         torque = torque + joined("regressor") @ inertials
     begins = np.cumsum([0, *(len(of_trial.t) for of_trial in loads)])
-    return DriveMotion(t, joined("q"), joined("v"), joined("a"), torque, joined("inertia"), begins)
+    return DriveMotion(t, joined("q"), joined("v"), joined("a"), torque, inertia, begins)
 
 
 @dataclass(frozen=True)
@@ -207,11 +218,13 @@ class Deflection:
         value: (n,) most likely [rad].
         low: (n,) least.
         high: (n,) largest.
+        acceleration: (n,) of the most likely, as `DriveTrain.moved` has it [rad/s2].
     """
 
     value: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    acceleration: np.ndarray
 
 
 def harmonic_terms(angle: np.ndarray) -> np.ndarray:

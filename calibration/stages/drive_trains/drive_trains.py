@@ -1,6 +1,7 @@
 """The drive trains of a robot in use: motor readings in, link angles and their intervals out.
 
     q_link = q_motor - offset - e_m - delta           what the geometry is asked with:  q_motor - e_m - delta
+    tau_j <- tau_j - sum_i M_ji d2 delta_i / dt2      i nearer to the hand than j: links load those that carry them
 
 The geometry keeps the zeros of the readings; it is the one fitted to corrected readings (`geometry_refit`).
 
@@ -22,7 +23,7 @@ from calibration.recording.schema import Description
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
 from calibration.robot.wrist_sensor import HandLoads
 from calibration.stages.drive_trains import link_motion
-from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
+from calibration.stages.drive_trains.drive_train import LONGEST, DriveMotion, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_load
 from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Drives
 from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, dynamics, inertials
@@ -76,6 +77,12 @@ class DriveTrains:
         """Of all joints."""
         return tuple(q for train in self.trains for q in train.parameters)
 
+    @property
+    def inwards(self) -> tuple[DriveTrain, ...]:
+        """The drive trains, those nearer to the hand first: how their links move loads those that carry them."""
+        order = {self.joints[column]: i for i, column in enumerate(self.dynamics.tree.column)}
+        return tuple(sorted(self.trains, key=lambda train: -order[train.joint]))
+
     def by_joint(self, of_trains: np.ndarray) -> np.ndarray:
         """(k,) of all joints from values (m,) of the drive trains; 0 of joints without one."""
         found = np.zeros(len(self.joints))
@@ -122,25 +129,31 @@ class DriveTrains:
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
-        q = loads.q.astype(float).copy()
-        for train in self.trains:
+        q, departs = loads.q.astype(float).copy(), np.zeros(loads.q.shape)
+        for train in self.inwards:
             j = self.joints.index(train.joint)
-            delta = train.likely(drive_motion([loads], j, train.inertials if len(train.inertials) else None))
+            delta, departs[:, j] = train.likely(_driven(train, j, loads, departs))
             q[:, j] = loads.q[:, j] - train.harmonics(loads.angle[:, j]) - delta
         return q
 
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""
         q = loads.q.astype(float).copy()
-        low, high, variance = q.copy(), q.copy(), np.zeros(q.shape)
-        for train in self.trains:
+        low, high, variance, departs = q.copy(), q.copy(), np.zeros(q.shape), np.zeros(q.shape)
+        for train in self.inwards:
             j = self.joints.index(train.joint)
-            inertials = train.inertials if len(train.inertials) else None
-            delta = train.backlash(drive_motion([loads], j, inertials))
+            delta = train.backlash(_driven(train, j, loads, departs))
+            departs[:, j] = delta.acceleration
             bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
             q[:, j], low[:, j], high[:, j] = bare - delta.value, bare - delta.high, bare - delta.low
             variance[:, j] = train.variance(delta.low, delta.high)
         return LinkAngles(q, low, high, variance)
+
+
+def _driven(train: DriveTrain, j: int, loads: LinkLoads, departs: np.ndarray) -> DriveMotion:
+    """The motion of column j, loaded by links whose deltas accelerate by `departs` (n, k) [rad/s2] as well."""
+    bare = drive_motion([loads], j, train.inertials if len(train.inertials) else None)
+    return replace(bare, coupled=-(loads.inertia[:, j] * departs).sum(axis=1))
 
 
 class StreamState(NamedTuple):
@@ -225,6 +238,7 @@ def stream_of(trains: DriveTrains) -> Stream:
     offs = np.array([[0.0, -s, -s, s, s] for s in (2.0 * t.torque_sigma for t in of)]).reshape(-1, _RUNS)
     prepared = Drives(
         np.array([trains.joints.index(t.joint) for t in of], dtype=np.int64),
+        np.array([[t.joint for t in of].index(t.joint) for t in trains.inwards], dtype=np.int64),
         np.array([t.simulated_values for t in of]).reshape(-1, 7),
         np.array([t.inertials if len(t.inertials) else np.zeros(p) for t in of]).reshape(-1, p),
         np.array([t.link_inertia for t in of], dtype=float),

@@ -96,7 +96,8 @@ class JointData:
         low, high = torque - f, torque + f
         low, high = c * low + g * np.sign(low), c * high + g * np.sign(high)
         starts = np.clip(np.where(np.isfinite(seen)[:, None], seen[:, None], 0.5 * (low + high)), low, high)
-        drive, lanes = Drive(m.t, m.q, m.v, base, m.inertia), np.ascontiguousarray(values.T)
+        drive = Drive(m.t, m.q, m.v, base, m.inertia, np.zeros(len(m.q)))
+        lanes = np.ascontiguousarray(values.T)
         found = _played_means(drive, m.a, self.modes, m.begins, self.first, starts, lanes, np.ascontiguousarray(shift))
         return np.asarray(found.T)
 

@@ -41,6 +41,7 @@ class Drive(NamedTuple):
         v: Motor velocities [rad/s].
         torque: [N.m].
         inertia: [kg.m2].
+        coupled: Torque by other links, even over the interval that ends at a sample [N.m].
     """
 
     t: np.ndarray
@@ -48,6 +49,7 @@ class Drive(NamedTuple):
     v: np.ndarray
     torque: np.ndarray
     inertia: np.ndarray
+    coupled: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
@@ -135,8 +137,8 @@ def advanced(
     dt = b.t[j] - a.t[i]
     n = max(1, int(np.ceil(dt / longest - 1e-6)))
     p, r, d, before = a.v[i] * dt, b.v[j] * dt, b.q[j] - a.q[i], 0.0
-    torque, inertia = a.torque[i], a.inertia[i]
-    more, heavier = b.torque[j] - torque, b.inertia[j] - inertia
+    torque, inertia = a.torque[i] + b.coupled[j], a.inertia[i]
+    more, heavier = b.torque[j] - a.torque[i], b.inertia[j] - inertia
     if abs(d) < _STILL and abs(p) < _STILL and abs(r) < _STILL and abs(rate) * dt < _STILL:
         n = 1
     for k in range(n):
@@ -151,25 +153,26 @@ def advanced(
 
 @njit(cache=True, error_model="numpy")
 def simulated(drive: Drive, begins: np.ndarray, starts: np.ndarray, longest: float, values: np.ndarray) -> np.ndarray:
-    """delta (n,) [rad] of one joint in several trials in a row.
+    """delta [rad] and its mean acceleration since the sample before [rad/s2], (2, n), of one joint in trials in a row.
 
     `begins` (m + 1,) are their first samples and n, `starts` (m,) delta there [rad], at rest; steps as of `advanced`.
     `values` (7,) are g, c, f_c, f_v, T, k, t.
     """
-    out, c = np.empty(len(drive.q)), contact(values)
+    out, c = np.zeros((2, len(drive.q))), contact(values)
     for m in range(len(starts)):
         x, rate, slider = starts[m], 0.0, starts[m]
-        out[begins[m]] = x
+        out[0, begins[m]] = x
         for i in range(begins[m], begins[m + 1] - 1):
+            before = rate
             x, rate, slider = advanced(x, rate, slider, drive, i, drive, i + 1, longest, c)
-            out[i + 1] = x
+            out[0, i + 1], out[1, i + 1] = x, (rate - before) / (drive.t[i + 1] - drive.t[i])
     return out
 
 
 @njit(cache=True, error_model="numpy")
 def carried(delta: float, drive: Drive, i: int, values: np.ndarray) -> float:
     """delta [rad] clipped to what the play operator holds at sample i."""
-    t = drive.torque[i] + values[3] * drive.v[i]
+    t = drive.torque[i] + drive.coupled[i] + values[3] * drive.v[i]
     low, high = deflection(t - values[2], values[0], values[1]), deflection(t + values[2], values[0], values[1])
     return min(max(delta, low), high)
 
@@ -190,6 +193,7 @@ class Drives(NamedTuple):
 
     Attributes:
         columns: (m,) column of each in the readings.
+        inwards: (m,) their numbers, those nearer to the hand first.
         values: (m, 7) as simulated.
         inertials: (m, p) of each load.
         link_inertia: (m,) [kg.m2].
@@ -203,6 +207,7 @@ class Drives(NamedTuple):
     """
 
     columns: np.ndarray
+    inwards: np.ndarray
     values: np.ndarray
     inertials: np.ndarray
     link_inertia: np.ndarray
@@ -231,36 +236,42 @@ def loaded(
     x, y, z, p = root[0, 6], root[0, 7], root[0, 8], found.regressor.shape[2]
     for i in range(len(drives.columns)):
         c, phi, pull = drives.columns[i], drives.inertials[i], found.coupling[0, drives.columns[i]]
-        torque = found.torque[0, c] + drives.link_inertia[i] * a[0, c]
+        torque, inertia = found.torque[0, c] + drives.link_inertia[i] * a[0, c], found.inertia[0, c, c]
         for k in range(p):
             torque += found.regressor[0, c, k] * phi[k]
         tilt_x, tilt_y = pull[1] * z - pull[2] * y, pull[2] * x - pull[0] * z
         torque += tilt_x * (phi[p] - found.moment[0, 0] * phi[p + 2])
         torque += tilt_y * (phi[p + 1] - found.moment[0, 1] * phi[p + 2])
         samples[Q, i], samples[V, i], samples[TORQUE, i] = moving[0, c], v[0, c], torque
-        samples[INERTIA, i] = max(found.inertia[0, c] + drives.link_inertia[i], LIGHT) if drives.dynamic[i] else LIGHT
+        samples[INERTIA, i] = max(inertia + drives.link_inertia[i], LIGHT) if drives.dynamic[i] else LIGHT
 
 
 @njit(cache=True, error_model="numpy")
 def streamed(
-    states: np.ndarray, before: np.ndarray, samples: np.ndarray, dt: float, longest: float, drives: Drives
-) -> None:
-    """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`."""
-    m, torques = samples.shape[1], np.empty((2, samples.shape[1]))
-    times = np.zeros((2, m))
-    for j in range(states.shape[1]):
-        for i in range(m):
-            times[1, i] = dt
-            torques[0, i] = before[TORQUE, i] + drives.offs[i, j]
-            torques[1, i] = samples[TORQUE, i] + drives.offs[i, j]
-        a = Drive(times[0], before[Q], before[V], torques[0], before[INERTIA])
-        b = Drive(times[1], samples[Q], samples[V], torques[1], samples[INERTIA])
-        for i in range(m):
+    states: np.ndarray, before: np.ndarray, samples: np.ndarray, M: np.ndarray, dt: float, longest: float,
+    drives: Drives,
+) -> None:  # fmt: skip
+    """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`.
+
+    M (k, k) is the inertia of all joints at `samples`: by it likely motions of links load those nearer to the base.
+    """
+    m, columns = samples.shape[1], drives.columns
+    room, departs = np.zeros((5, m)), np.zeros(m)
+    room[1] = dt
+    a = Drive(room[0], before[Q], before[V], room[2], before[INERTIA], room[4])
+    b = Drive(room[1], samples[Q], samples[V], room[3], samples[INERTIA], room[4])
+    for i in drives.inwards:
+        for other in range(m):
+            b.coupled[i] -= M[columns[i], columns[other]] * departs[other]
+        c, rate = contact(drives.values[i]), states[i, 0, 1]
+        for j in range(states.shape[1]):
+            a.torque[i], b.torque[i] = before[TORQUE, i] + drives.offs[i, j], samples[TORQUE, i] + drives.offs[i, j]
+            x = states[i, j]
             if drives.plays[i]:
-                states[i, j, 0] = carried(states[i, j, 0] + b.q[i] - a.q[i], b, i, drives.values[i])
+                x[0] = carried(x[0] + b.q[i] - a.q[i], b, i, drives.values[i])
             else:
-                c, x = contact(drives.values[i]), states[i, j]
                 x[0], x[1], x[2] = advanced(x[0], x[1], x[2], a, i, b, i, longest, c)
+        departs[i] = (states[i, 0, 1] - rate) / dt
 
 
 @njit(cache=True, error_model="numpy")
@@ -288,5 +299,5 @@ def advanced_drives(
 ) -> None:  # fmt: skip
     """`loaded`, `streamed` and `link_angles` of a sample dt [s] after `before`."""
     loaded(tree, drives, root, work, found, moving, samples)
-    streamed(states, before, samples, dt, longest, drives)
+    streamed(states, before, samples, found.inertia[0], dt, longest, drives)
     link_angles(states, moving[0], drives, angles)

@@ -51,7 +51,7 @@ class LinkLoads:
         v: Motor velocities.
         a: Motor accelerations.
         torque: tau [N.m, N].
-        inertia: M_jj [kg.m2, kg]; of a pushed hand, without what hangs on the wrist's sensor.
+        inertia: (n, k, k) M [kg.m2, kg.m, kg]; of a pushed hand, without what hangs on the wrist's sensor.
         regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
     """
@@ -107,7 +107,7 @@ class Dynamics:
     def evaluated(
         self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: Push | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Torques and inertias (n, k), regressors (n, k, p), moments (n, 2) at readings and derivatives (n, k)."""
+        """Torques (n, k), inertias (n, k, k), regressors (n, k, p), moments (n, 2) at readings and derivatives."""
         root, tree = self.root(base), self.tree
         if push is not None:
             root, tree = np.concatenate([np.broadcast_to(root, (len(q), 12)), push.wrench], axis=1), push.on(tree)

@@ -69,8 +69,8 @@ def test_what_hangs_on_the_sensor_does_not_hold_a_link_in_its_gap_back_twice(j):
         robot.loads("", T, q, push=p) for p in (None, *(hand_push(LAB.urdf, HUNG, T, q, x) for x in (w, seen)))
     )
     rows = slice(120, 380)
-    own = pushed.torque[:, j] + bare.inertia[:, j] * a
-    np.testing.assert_allclose((held.torque[:, j] + held.inertia[:, j] * a)[rows], own[rows], atol=0.02)
+    own = pushed.torque[:, j] + bare.inertia[:, j, j] * a
+    np.testing.assert_allclose((held.torque[:, j] + held.inertia[:, j, j] * a)[rows], own[rows], atol=0.02)
 
 
 def shaken(hertz):

@@ -62,7 +62,9 @@ def test_gravity_and_inertia_of_a_pendulum() -> None:
     still = np.zeros((1, 2))
     torque, inertia, _, _ = robot.evaluated(q, still, still, None)
     assert torque[0, 1] == pytest.approx(2.0 * 9.81 * 0.3 * np.sin(0.3), rel=1e-12)
-    assert inertia[0, 1] == pytest.approx(0.02 + 2.0 * 0.3**2, rel=1e-12)
+    own, above = 0.02 + 2.0 * 0.3**2, 2.0 * 0.3 * 0.6 * np.cos(0.0)
+    expected = [[0.02 + 2.0 * 0.3**2 + 2.0 * 0.6**2 + 2.0 * above + own, own + above], [own + above, own]]
+    np.testing.assert_allclose(inertia[0], expected, rtol=1e-12)
 
 
 def test_regressors_are_what_other_masses_do() -> None:
