@@ -39,14 +39,14 @@ class ArmPositions(NamedTuple):
         variance: (n, k) of them [rad2]; 0 of joints without a drive train.
         moment: (n, 2) on the column [N.m].
         torque: (n, k) on the joints [N.m, N].
-        rests: (n, k) whether a joint is at rest.
+        velocity: (n, k) of the joints [rad/s, m/s].
     """
 
     q: np.ndarray
     variance: np.ndarray
     moment: np.ndarray
     torque: np.ndarray
-    rests: np.ndarray
+    velocity: np.ndarray
 
 
 class ArmState(NamedTuple):
@@ -100,14 +100,14 @@ class BundledArm:
             found = robot.evaluated(q_motor, velocity, a, base, push)
             loads = LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
         angles = self.trains.of_loads(loads)
-        return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, np.abs(loads.v) < RESTS)
+        return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, loads.v)
 
     def at_rest(self, q_motor: np.ndarray, T_lab_base: np.ndarray | None = None) -> ArmPositions:
         """Of readings (n, k) at rest, each for itself; the base (4, 4) where it is known.
 
         A link trails its motor and stops on a flank: its variance is that of the two ends, not of what is between.
         """
-        still, base = np.zeros(q_motor.shape[1]), self.proper(T_lab_base)
+        still, base = np.zeros(q_motor.shape[1]), self.root(T_lab_base)
         states, angles = zip(
             *(self._stream.begin(0.0, np.array([q, still, still]), base) for q in q_motor), strict=True
         )
@@ -116,7 +116,7 @@ class BundledArm:
         left_out = np.array([residual.get(joint, 0.0) for joint in self.trains.joints])
         variance = 0.25 * (high - low) ** 2 + left_out**2
         moment, torque = (np.concatenate([getattr(s, name) for s in states]) for name in ("moment", "torque"))
-        return ArmPositions(q, variance, moment, torque, np.ones(q.shape, dtype=bool))
+        return ArmPositions(q, variance, moment, torque, np.zeros(q.shape))
 
     def moving(self, t: float, q_motor: np.ndarray, velocity: np.ndarray | None, before: ArmState | None) -> np.ndarray:
         """(3, k) readings, velocities and accelerations of one sample, differences of the velocities.
@@ -134,23 +134,22 @@ class BundledArm:
     def stepped(
         self, t: float, moving: np.ndarray, before: ArmState | None, base: np.ndarray | None = None
     ) -> ArmState:
-        """One sample on, `moving` (3, k) as of `moving`, `base` (6,) as of `proper`."""
+        """One sample on, `moving` (3, k) as of `moving`, `base` (1, 12) as of `root`."""
         if before is None:
             drives, angles = self._stream.begin(t, moving, base)
         else:
             drives, angles = self._stream.step(before.drives, t, moving, base)
-        rests = np.abs(moving[1:2]) < RESTS
-        return ArmState(drives, ArmPositions(angles.q, angles.variance, drives.moment, drives.torque, rests))
+        return ArmState(drives, ArmPositions(angles.q, angles.variance, drives.moment, drives.torque, moving[1:2]))
 
-    def proper(self, T_lab_base: np.ndarray | None, accelerations: np.ndarray | None = None) -> np.ndarray | None:
-        """Proper acceleration (6,) of the root, the base frame at T_lab_base (4, 4); None where that is not known.
+    def root(self, T_lab_base: np.ndarray | None, accelerations: np.ndarray | None = None) -> np.ndarray | None:
+        """The root (1, 12) as `Dynamics.root` has it, the base frame at T_lab_base (4, 4); None if that is not known.
 
         `accelerations` (2, 3) of the base frame, linear and angular, lab axes [m/s2, rad/s2]; at rest where not given.
         """
         if T_lab_base is None:
             return None
         a = _AT_REST if accelerations is None else accelerations
-        return np.asarray(_proper(T_lab_base, self._T_base_root, self.trains.dynamics.gravity, a))
+        return np.asarray(_root(T_lab_base, self._T_base_root, self.trains.dynamics.gravity, a))
 
     def bends(self, hand: HandModel, positions: ArmPositions) -> np.ndarray:
         """Q (n, 4, 4) in the base's marker body."""
@@ -166,7 +165,8 @@ class BundledArm:
         What parameters of a drive train err by, what it leaves of trials left out says; beyond their loads its
         compliance's standard deviation.
         """
-        own = np.maximum(positions.variance, np.where(positions.rests, self.rest_sigma**2, 0.0))
+        rests = np.abs(positions.velocity) < RESTS
+        own = np.maximum(positions.variance, np.where(rests, self.rest_sigma**2, 0.0))
         found = np.zeros(own.shape)
         for train in self.trains.trains:
             j = self.trains.joints.index(train.joint)
@@ -193,9 +193,9 @@ class BundledArm:
 
 
 @njit(cache=True, error_model="numpy")
-def _proper(T_lab_base: np.ndarray, T_base_root: np.ndarray, gravity: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """R' (a_base + alpha x p - gravity) and R' alpha (6,) of the root, p its place beside the base frame [m]."""
-    push, R, p, found = np.empty(3), np.zeros((3, 3)), np.zeros(3), np.zeros(6)
+def _root(T_lab_base: np.ndarray, T_base_root: np.ndarray, gravity: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """R' (a_base + alpha x p - gravity) and R' alpha of the root after 6 zeros, p its place beside the base [m]."""
+    push, R, p, found = np.empty(3), np.zeros((3, 3)), np.zeros(3), np.zeros((1, 12))
     for i in range(3):
         for k in range(3):
             p[i] += T_lab_base[i, k] * T_base_root[k, 3]
@@ -206,6 +206,6 @@ def _proper(T_lab_base: np.ndarray, T_base_root: np.ndarray, gravity: np.ndarray
         push[i] = a[0, i] + a[1, j] * p[k] - a[1, k] * p[j] - gravity[i]
     for c in range(3):
         for i in range(3):
-            found[c] += R[i, c] * push[i]
-            found[3 + c] += R[i, c] * a[1, i]
+            found[0, 6 + c] += R[i, c] * push[i]
+            found[0, 9 + c] += R[i, c] * a[1, i]
     return found

@@ -35,7 +35,6 @@ from calibration.prediction.hand_pose import (
     in_lab,
     needed,
     placed,
-    proper_acceleration,
     uncertain,
 )
 from calibration.prediction.slipping_base import SlippingBase
@@ -181,13 +180,13 @@ class Compensator:
         elif base is not None and self.slipping is not None and self.slipping.source != "plate" and continuous(t):
             moved, spread = self.slipping.moved(base, t, q, None, hand)
         known = velocity is not None or continuous(t)
+        T = placed(T_lab_base_start, moved, len(t))
         if self.arm is not None:
-            T = placed(T_lab_base_start, moved, len(t))
             along = partial(self.arm.along, t, q, velocity, T, hand.joints, wrench is not None)
             found = self._on_links(along() if known else self.arm.at_rest(q, T_lab_base_start))
         else:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)
-        return in_lab(found, base, moved, T_lab_base_start, None if spread is None else partial(np.asarray, spread))
+        return in_lab(found, base, T, moved is not None, None if spread is None else partial(np.asarray, spread))
 
     def base_from_markers(self, markers: np.ndarray) -> np.ndarray:
         """T_lab_base (4, 4) of the estimated base frame, for `predict`, from its markers at rest.
@@ -249,13 +248,13 @@ class Compensator:
             else:
                 state = self.slipping.stepped(there, t, w, None if v is None else moving, before.base)
                 variance = partial(self.slipping.variance, state)
+        moved, a = (None, None) if state is None else (state.moved, state.acceleration)
+        T = placed(T_lab_base_start, moved, 1)
         if self.arm is not None and moving is not None:
-            loads = proper_acceleration(self.arm, state, T_lab_base_start)
-            arm = self.arm.stepped(t, moving, before.arm, loads)
+            arm = self.arm.stepped(t, moving, before.arm, self.arm.root(None if T is None else T[0], a))
             in_base = self._on_links(arm.positions)
         in_base = in_base or self._hand(np.array([t]), q, v)
-        moved = None if state is None else state.moved
-        return in_lab(in_base, base, moved, T_lab_base_start, variance, RobotState(arm, state))
+        return in_lab(in_base, base, T, moved is not None, variance, RobotState(arm, state))
 
     def _refuse_impossible(self, q: np.ndarray) -> None:
         if beyond(q, *self.hand.nominal.limits) and (wrong := list(implausible_readings(self.hand.nominal, q))):

@@ -11,7 +11,7 @@ from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model
 from calibration.numerics.signals import interpolate_columns
 from calibration.prediction.base_pose import BaseState, LoadedBase
-from calibration.prediction.bundled_arm import ArmState, BundledArm
+from calibration.prediction.bundled_arm import ArmState
 from calibration.recording.clock import Clock
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import AXES, PREFIX, first_joint, placement_derivative
@@ -85,22 +85,21 @@ def at_readings(t: np.ndarray, clocks: Sequence[Clock], t_wrench: np.ndarray, wr
 def in_lab(
     in_base: HandPose,
     base: LoadedBase | None,
-    moved: np.ndarray | None,
     T_lab_base: np.ndarray | None,
+    moved: bool,
     variance: Callable[[], np.ndarray] | None = None,
     state: RobotState | None = None,
 ) -> HandPose:
-    """A pose in the base frame from where the base is, which may have moved (n, 4, 4), of variance (6,) or (n, 6)."""
+    """A pose in the base frame from where the base is (n, 4, 4), which may have `moved`, of variance (6,) or (n, 6)."""
 
     def covariance() -> np.ndarray:
         if base is not None and variance is not None:
             return in_base.covariance + base.carried(variance(), in_base.T)
-        if base is not None and (moved is not None or T_lab_base is not None):
-            return in_base.covariance + base.covariance(in_base.T, moved is not None)
+        if base is not None and T_lab_base is not None:
+            return in_base.covariance + base.covariance(in_base.T, moved)
         return in_base.covariance
 
-    T = in_base.T if T_lab_base is None else np.asarray(T_lab_base, dtype=float) @ in_base.T
-    return HandPose(T if moved is None else moved @ T, covariance, state)
+    return HandPose(in_base.T if T_lab_base is None else T_lab_base @ in_base.T, covariance, state)
 
 
 def uncertain(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarray]:
@@ -118,21 +117,13 @@ def uncertain(hand: HandModel, model: Model) -> tuple[tuple[str, ...], np.ndarra
 
 def placed(T_lab_base: np.ndarray | None, moved: np.ndarray | None, n: int) -> np.ndarray | None:
     """The base (n, 4, 4) from its pose at the start and how it moved in the lab; None where neither is known."""
-    if moved is None and T_lab_base is None:
-        return None
-    start = np.eye(4) if T_lab_base is None else np.asarray(T_lab_base, dtype=float)
-    return np.broadcast_to(start, (n, 4, 4)) if moved is None else moved @ start
+    if T_lab_base is None:
+        return moved
+    start = np.asarray(T_lab_base, dtype=float)
+    return start[None].repeat(n, axis=0) if moved is None else moved @ start
 
 
 def continuous(t: np.ndarray) -> bool:
     """Whether readings are many and close enough to have velocities."""
     steps = np.diff(t)
     return len(t) > 1 and steps.min() > 0.0 and steps.max() <= _SPACING and t[-1] - t[0] >= _SPAN
-
-
-def proper_acceleration(arm: BundledArm, state: BaseState | None, T_lab_base: np.ndarray | None) -> np.ndarray | None:
-    """Proper acceleration (6,) of the root after a sample, the base at the start at T_lab_base (4, 4)."""
-    if state is None:
-        return arm.proper(T_lab_base)
-    T = state.moved[0] if T_lab_base is None else state.moved[0] @ T_lab_base
-    return arm.proper(T, state.acceleration)

@@ -35,6 +35,7 @@ from calibration.stages.stick_slip.stream import (
     UNDRIVEN,
     Fitted,
     Sample,
+    SlipState,
     SlipStream,
     mean_of,
     slip_stream,
@@ -149,7 +150,8 @@ class SlippingBase:
             wrench, motion, t - before.t, earlier, slip.bases, place, stream.fitted, tree, *actions, work, room
         )
         bases = Bases(state, wheels, slip.bases.lanes)
-        slip = slip._replace(t=t, before=row, bases=bases, found=found, x=found[1] * stream.fitted.moves)
+        x_now = found[1] * stream.fitted.moves
+        slip = SlipState(slip.start, t, slip.rest, slip.n, slip.noise, row, bases, found, slip.band, x_now)
         return BaseState(before.start, t, w, before.rest, before.n, u, y, x, moved, a, slip, lags)
 
     def variance(self, state: BaseState) -> np.ndarray:

@@ -166,8 +166,10 @@ class HandModel:
         return np.asarray(sum(block.reading_error(q, tau) for block in self.blocks) + np.zeros_like(q))
 
     @cached_property
-    def _columns(self) -> np.ndarray:
-        return np.array(self.nominal.columns)
+    def _columns(self) -> np.ndarray | slice:
+        """Of the chain's joints in the readings, a slice where that says all."""
+        found = np.array(self.nominal.columns)
+        return slice(found[0], found[-1] + 1) if len(found) and (np.diff(found) == 1).all() else found
 
     @cached_property
     def _constant(self) -> np.ndarray | None:
@@ -175,7 +177,7 @@ class HandModel:
         if any(block.varies and block.values.any() for block in self.blocks):
             return None
         constant = np.zeros(len(self.nominal.measured))
-        constant[self._columns] = self._reading_error(*np.zeros((2, 1, len(self._columns))))[0]
+        constant[self._columns] = self._reading_error(*np.zeros((2, 1, len(self.nominal.columns))))[0]
         return constant
 
     @cached_property

@@ -46,7 +46,7 @@ class ColumnBending:
     def turns(self, moment: np.ndarray) -> np.ndarray:
         """Rotation vectors (n, 3) [rad] of what the column carries, in its frame, under moments (n, 2) [N.m]."""
         turn = np.zeros((len(moment), 3))
-        turn[:, :2] = -self.compliance * moment
+        np.multiply(moment, -self.compliance, out=turn[:, :2])
         return turn
 
     def parameters(self, link: str, off: float) -> tuple[Quantity, ...]:

@@ -198,7 +198,7 @@ class Stream:
         """The state at a first sample q, v, a (3, k) of an unknown history, and its link angles (1, k)."""
         state, found, angles = self._room(t, moving)
         robot, drives, states = self.trains.dynamics, self.prepared, state.states
-        root = self.at_rest if base is None else robot.root(base[None])
+        root = self.at_rest if base is None else base
         link_motion.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
         for i, (train, torque) in enumerate(zip(self.trains.trains, state.samples[TORQUE], strict=True)):
             low, high = train.ends(torque + drives.offs[i, ::2])
@@ -210,11 +210,11 @@ class Stream:
     def step(
         self, before: StreamState, t: float, moving: np.ndarray, base: np.ndarray | None = None
     ) -> tuple[StreamState, LinkAngles]:
-        """The state one sample q, v, a (3, k) later and its link angles (1, k); base (6,) as `link_angles` has it."""
+        """The state one sample q, v, a (3, k) later, link angles (1, k); `base` (1, 12) as `Dynamics.root` has it."""
         state, found, angles = self._room(t, moving)
         robot, drives = self.trains.dynamics, self.prepared
         state.states[:] = before.states
-        root = self.at_rest if base is None else robot.root(base[None])
+        root = self.at_rest if base is None else base
         link_motion.advanced_drives(
             robot.tree, drives, root, self.work, found, state.moving, before.samples, state.states, t - before.t,
             LONGEST, state.samples, angles,

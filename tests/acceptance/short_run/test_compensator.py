@@ -17,6 +17,7 @@ from calibration.numerics.lie import from_vector, inverse, mean, to_vector
 from calibration.prediction.base_pose import loaded_base
 from calibration.prediction.hand_pose import at_readings
 from calibration.prediction.predict import predictor
+from calibration.prediction.slipping_base import SlippingBase
 from calibration.recording.clock import Clock
 from calibration.stages.joints.correction import velocities
 from twin.truth import read_trial
@@ -219,7 +220,22 @@ def test_the_covariance_contains_the_truth_and_counts_what_the_model_leaves_out(
         nees = np.einsum("ni,nij,nj->n", e, np.linalg.inv(pose.covariance[after]), e)
         assert 0.1 < nees.mean() / 6.0 < 2.0
     traces = [np.trace(p.covariance[:, :3, :3], axis1=1, axis2=2).mean() for p in (in_base, reported, still)]
-    assert traces[0] < traces[1] < traces[2]
+    assert max(traces[:2]) < traces[2]
+
+
+def test_the_variance_of_a_base_that_slips_is_in_the_hands(compensator, swing, monkeypatch):
+    if compensator.slipping is None:
+        pytest.skip("a base that only springs")
+    (t, q, w, start, *_), moved = swing, SlippingBase.moved
+
+    def less_sure(*args):
+        x, variance = moved(*args)
+        return x, variance + np.repeat([1e-6, 0.0], 3)
+
+    surely = compensator.predict(t, q, w, start).covariance
+    monkeypatch.setattr(SlippingBase, "moved", less_sure)
+    more = (compensator.predict(t, q, w, start).covariance - surely)[:, :3, :3]
+    np.testing.assert_allclose(more, np.broadcast_to(1e-6 * np.eye(3), more.shape), atol=1e-12)
 
 
 def test_another_payload_turns_the_joints(estimate, compensator, swing):
