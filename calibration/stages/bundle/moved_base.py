@@ -15,10 +15,10 @@ from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import even, interpolate_columns, low_passed
 from calibration.recording.trial import Trial
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved, MovedBase
-from calibration.stages.stick_slip.fit import rough_direction
+from calibration.stages.stick_slip.fit import linear_where, rough_direction
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import forced
-from calibration.stages.stick_slip.stage import campaign_of, linear_where
+from calibration.stages.stick_slip.stage import campaign_of
 from calibration.stages.stick_slip.standing import Read
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Suspension

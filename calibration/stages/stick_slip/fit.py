@@ -13,18 +13,21 @@ A wheel that all but slides bounds its friction on one side: the optimum is wher
 that of the other side. So a friction's sigma is at least half of how far it may go, alone, before the cost rises by 4.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.stages.stick_slip.band import Band, LeftOut, block_means, ensemble_of, fitted_band, reached
+from calibration.stages.stick_slip.forcing import PLANE
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.model import Direction
 from calibration.stages.stick_slip.search import FRICTIONS, Point, settled, sketched, tried
 from calibration.stages.stick_slip.wheels import SlipParameters, preloads
 from calibration.stages.suspension.cross_validation import HeldOut
-from calibration.stages.suspension.model import Source
+from calibration.stages.suspension.model import Source, Suspension
 
+BETTER = 0.8  # mean square over another's, below which a prediction takes its place
+_MOST = 0.5  # R2 of yaw above which springs may be all that moves the base
 _RISE = 4.0  # of -2 log of the posterior: two standard deviations
 _PARTS = (1.0, 0.5, 0.25)  # of a step without a trial
 _REACH = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.4])  # of a friction's logarithm
@@ -145,6 +148,35 @@ def rough_direction(source: Source, trials: Trials) -> Direction:
         held_out,
         by_plate=trials.corrected or source != "plate",
     )
+
+
+def linear_where(direction: Direction, suspension: Suspension) -> Direction:
+    """The direction, linear where no wheel slides: on the axes that the compliance moves.
+
+    No wheel slides where, on trials left out, the compliance explains most of yaw and leaves less than slip of x, y and
+    yaw together (geometric mean of what is left, noise taken off). A valley of the fit may explain one axis by slip of
+    a base that is anchored; x and y, moved by the same wheels, and trials in which it predicts a slip then speak
+    against it. A trial that turns the base farther than all others together, which is hard to predict from those,
+    speaks as much as they do, and no more.
+    """
+    springs, slip = dict(suspension.held_out).get(direction.source), direction.held_out
+    if springs is None or springs.r2[PLANE[2]] < _MOST:
+        return direction
+    far, others = slip.farthest(2)
+    parts = (slip,) if others is None else (slip.only(np.arange(len(slip.count)) == far), others)
+    slides = np.mean([_excess(part, springs) for part in parts]) < -np.log(BETTER)
+    return direction if slides else replace(direction, linear=springs.moves[list(PLANE)])
+
+
+def _excess(slip: HeldOut, springs: HeldOut) -> float:
+    """Logarithm of what slip leaves of trials over what springs do, mean of x, y, yaw.
+
+    Of a trial after which the base rested elsewhere, which springs were not tried on, they explain nothing.
+    """
+    seen, elsewhere = springs.only(np.isin(springs.ids, slip.ids)), slip.only(~np.isin(slip.ids, springs.ids))
+    axes, share = np.ones(6, dtype=bool), elsewhere.count.sum() / slip.count.sum()
+    left = (1.0 - share) * seen.variance(axes)[list(PLANE)] + share * elsewhere.variance(~axes[: len(PLANE)])
+    return float(np.log(slip.variance(axes[: len(PLANE)]) / left).mean())
 
 
 def _over_trials(trials: Trials, x: np.ndarray) -> np.ndarray:

@@ -19,9 +19,8 @@ from calibration.numerics.side_by_side import side_by_side
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.stages.stick_slip.band import PlainBand, heave_band, plain_band, reached
-from calibration.stages.stick_slip.fit import fit_direction
+from calibration.stages.stick_slip.fit import BETTER, fit_direction, linear_where
 from calibration.stages.stick_slip.forcing import (
-    PLANE,
     PlanarForcing,
     Tilting,
     heave_apart,
@@ -43,8 +42,6 @@ from calibration.verdict import Verdict
 STAGE = "stick_slip"
 _AXES = ("x", "y", "yaw")
 _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
-_BETTER = 0.8  # mean square over another's, below which a prediction takes its place
-_MOST = 0.5  # R2 of yaw above which springs may be all that moves the base
 _LESS = 0.1  # by which R2 of the plate may be less
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
@@ -163,25 +160,6 @@ def _rows(
     return [found for found in side_by_side(row, read) if found is not None]
 
 
-def linear_where(direction: Direction, suspension: Suspension) -> Direction:
-    """The direction, linear where no wheel slides: on the axes that the compliance moves.
-
-    No wheel slides where, on trials left out, the compliance explains most of yaw and leaves less than slip of x, y and
-    yaw together (geometric mean of what is left, noise taken off). A valley of the fit may explain one axis by slip of
-    a base that is anchored; x and y, moved by the same wheels, and trials in which it predicts a slip then speak
-    against it. In a trial after which the base rested elsewhere, which no compliance was tried on, it explains nothing.
-    """
-    tried, own = dict(suspension.held_out).get(direction.source), direction.held_out
-    if tried is None:
-        return direction
-    moved = own.only(~np.isin(own.ids, tried.ids) if own.ids and tried.ids else np.zeros(len(own.count), dtype=bool))
-    axes, share = np.ones(6, dtype=bool), moved.count.sum() / own.count.sum()
-    plane = (1.0 - share) * tried.variance(axes)[list(PLANE)] + share * moved.variance(~axes[: len(PLANE)])
-    left = own.variance(axes[: len(PLANE)])
-    slides = tried.r2[PLANE[2]] < _MOST or np.log(plane).mean() > np.log(_BETTER * left).mean()
-    return direction if slides else replace(direction, linear=tried.moves[list(PLANE)])
-
-
 def _heaved(direction: Direction, wheels: WheelSet, tilting: Tilting, read: Sequence[Read]) -> Direction:
     """By inverse dynamics: heave and tilt err as the plate's do, and as they differ from those.
 
@@ -256,7 +234,7 @@ def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
     tried = fit_direction("plate", alone, warmed(alone, fits[1].logarithms))
     calm = _calm((fits[0], tried))
     left = [np.log(d.held_out.only(calm).variance(np.ones(3, dtype=bool))).mean() for d in (fits[0], tried)]
-    return tried if left[1] < left[0] + np.log(_BETTER) else fits[0]
+    return tried if left[1] < left[0] + np.log(BETTER) else fits[0]
 
 
 def _moved(direction: Direction, names: Sequence[str]) -> Iterator[Verdict]:

@@ -14,9 +14,10 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.stage import MovedBase
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
+from calibration.stages.stick_slip.fit import linear_where
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
 from calibration.stages.stick_slip.poses import Arm, moving_links
-from calibration.stages.stick_slip.stage import _behind, _judged, _misplaced, linear_where
+from calibration.stages.stick_slip.stage import _behind, _judged, _misplaced
 from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -132,7 +133,8 @@ def test_a_base_that_was_moved_is_named(recorded, suspension):
 
 def test_axes_that_the_compliance_predicts_better_are_linear(recorded, suspension):
     sums = np.ones((3, 6))
-    better = (("plate", HeldOut(1e-14 * sums, 1e-6 * sums, 0.0 * sums, np.ones(3))),)
+    ids = tuple(r[0].id for r in recorded[:3])
+    better = (("plate", HeldOut(1e-14 * sums, 1e-6 * sums, 0.0 * sums, np.ones(3), ids)),)
     model, said = fit([r[0] for r in recorded[:3]], replace(suspension, held_out=better), robot=None)
     assert model.directions[0].linear.all() and "linear" in said[0].message
 
@@ -161,6 +163,20 @@ def test_where_no_wheel_slides_slip_explains_yaw_alone(recorded, suspension):
     assert not linear(of_yaw=0.7e-6, along=1e-4).any()  # they hardly explain yaw: wheels yield otherwise
     assert linear(of_yaw=0.2e-6, along=3e-6).all()
     assert not linear(of_yaw=0.2e-6, along=3e-6, used="abcd").any()  # after the others it rested elsewhere
+
+
+def test_a_trial_that_alone_turns_the_base_says_as_much_of_sliding_as_all_others(recorded, suspension):
+    (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    names, motion = tuple("abcdefgh"), np.append(20.0, np.ones(7))[:, None] * 1e-6 * np.ones((8, 6))
+
+    def linear(of_far, of_others):
+        seen = HeldOut(0.2 * motion, motion, 1e-10 * np.ones((8, 6)), np.ones(8), names)
+        own = np.append(of_far, np.repeat(of_others, 7))[:, None] * motion[:, :3]
+        known = HeldOut(own, motion[:, :3], 1e-10 * np.ones((8, 3)), np.ones(8), names)
+        return linear_where(replace(direction, held_out=known), replace(suspension, held_out=(("plate", seen),))).linear
+
+    assert not linear(of_far=1.0, of_others=0.02).any()  # without it slip is not known, and explains what is left
+    assert linear(of_far=50.0, of_others=0.2).all() and linear(of_far=50.0, of_others=0.02).all()
 
 
 def test_a_trial_that_slipped_too_far_decides_nothing(recorded, suspension):
