@@ -79,9 +79,7 @@ class Contact(NamedTuple):
 def contact(values: np.ndarray) -> Contact:
     """The contact of `values` (7,)."""
     k = 1.0 / values[1]
-    return Contact(
-        values[0], k, k * values[4], values[2], values[3], values[5], values[6], values[6] / values[5]
-    )  # fmt: skip
+    return Contact(values[0], k, k * values[4], values[2], values[3], values[5], values[6], values[6] / values[5])
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,9 +142,7 @@ def advanced(
     for k in range(n):
         s = (k + 1) / n
         at = s * (p + s * (3.0 * d - 2.0 * p - r + s * (p + r - 2.0 * d)))
-        x, rate, slider = stepped(
-            x, rate, slider, at - before, torque + s * more, inertia + s * heavier, dt / n, c
-        )  # fmt: skip
+        x, rate, slider = stepped(x, rate, slider, at - before, torque + s * more, inertia + s * heavier, dt / n, c)
         before = at
     return x, rate, slider
 
