@@ -150,8 +150,8 @@ class SlippingBase:
             wrench, motion, t - before.t, earlier, slip.bases, place, stream.fitted, tree, *actions, work, room
         )
         bases = Bases(state, wheels, slip.bases.lanes)
-        x_now = found[1] * stream.fitted.moves
-        slip = SlipState(slip.start, t, slip.rest, slip.n, slip.noise, row, bases, found, slip.band, x_now)
+        slid = found[1] * stream.fitted.moves
+        slip = SlipState(slip.start, t, slip.rest, slip.n, slip.noise, row, bases, found, slip.band, slid)
         return BaseState(before.start, t, w, before.rest, before.n, u, y, x, moved, a, slip, lags)
 
     def variance(self, state: BaseState) -> np.ndarray:

@@ -4,7 +4,7 @@ Row `full`, seed 4, the short campaign, per component [mm]; with 2 kg both back 
 and how far a drive slides depends on a few newtons of its load:
 
     plate: usual     0 kg         2 kg          push         measured: usual     2 kg         push
-    .29              .28          .45           .38          .34                 .37          .48
+    .28              .28          .41           .33          .34                 .36          .40
 """
 
 import json
