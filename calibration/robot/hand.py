@@ -167,7 +167,7 @@ class HandModel:
 
     @cached_property
     def _columns(self) -> np.ndarray | slice:
-        """Of the chain's joints in the readings, a slice where that says all."""
+        """Of the chain's joints in the readings; a slice, which copies nothing, where they are side by side."""
         found = np.array(self.nominal.columns)
         return slice(found[0], found[-1] + 1) if len(found) and (np.diff(found) == 1).all() else found
 

@@ -110,10 +110,10 @@ class DriveTrain:
         return Deflection(likely, np.min(others, axis=0), np.max(others, axis=0), acceleration)
 
     def likely(self, drive: "DriveMotion") -> np.ndarray:
-        """Most likely delta and its acceleration (2, n) in trials, as `moved` has them."""
+        """Most likely delta and its acceleration (2, n) in trials, as `delta_motion` has them."""
         torque = drive.torque + self.link_inertia * drive.a
         low, high = self.ends(torque[drive.begins[:-1]])
-        return self.moved(drive, torque, low + self.start[0] * (high - low))
+        return self.delta_motion(drive, torque, low + self.start[0] * (high - low))
 
     def variance(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Variance (n,) [rad2] of a link in motion that is between low and high (n,) [rad]."""
@@ -143,9 +143,9 @@ class DriveTrain:
         self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
     ) -> np.ndarray:
         """delta (n,) [rad] under torques (n,) [N.m], from `starts` (m,) where trials begin; steps of `longest` [s]."""
-        return np.asarray(self.moved(drive, torque, starts, longest)[0])
+        return np.asarray(self.delta_motion(drive, torque, starts, longest)[0])
 
-    def moved(
+    def delta_motion(
         self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
     ) -> np.ndarray:
         """`deltas`, and their mean accelerations since the sample before [rad/s2]; 0 of a play operator; (2, n)."""
@@ -183,7 +183,7 @@ class DriveMotion:
         torque: Of the link's motion if it followed the motor [N.m].
         inertia: The mesh moves [kg.m2].
         begins: (m + 1,) first sample of each trial, and n.
-        coupled: Torque by how other links depart from their motors [N.m], each even since the sample before; or None.
+        coupled: Torque by how links nearer to the hand depart from their motors [N.m], even since the sample before.
     """
 
     t: np.ndarray
@@ -218,7 +218,7 @@ class Deflection:
         value: (n,) most likely [rad].
         low: (n,) least.
         high: (n,) largest.
-        acceleration: (n,) of the most likely, as `DriveTrain.moved` has it [rad/s2].
+        acceleration: (n,) of the most likely, as `DriveTrain.delta_motion` has it [rad/s2].
     """
 
     value: np.ndarray

@@ -129,31 +129,31 @@ class DriveTrains:
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
-        q, departs = loads.q.astype(float).copy(), np.zeros(loads.q.shape)
+        q, acceleration = loads.q.astype(float).copy(), np.zeros(loads.q.shape)
         for train in self.inwards:
             j = self.joints.index(train.joint)
-            delta, departs[:, j] = train.likely(_driven(train, j, loads, departs))
+            delta, acceleration[:, j] = train.likely(_driven(train, j, loads, acceleration))
             q[:, j] = loads.q[:, j] - train.harmonics(loads.angle[:, j]) - delta
         return q
 
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""
         q = loads.q.astype(float).copy()
-        low, high, variance, departs = q.copy(), q.copy(), np.zeros(q.shape), np.zeros(q.shape)
+        low, high, variance, acceleration = q.copy(), q.copy(), np.zeros(q.shape), np.zeros(q.shape)
         for train in self.inwards:
             j = self.joints.index(train.joint)
-            delta = train.backlash(_driven(train, j, loads, departs))
-            departs[:, j] = delta.acceleration
+            delta = train.backlash(_driven(train, j, loads, acceleration))
+            acceleration[:, j] = delta.acceleration
             bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
             q[:, j], low[:, j], high[:, j] = bare - delta.value, bare - delta.high, bare - delta.low
             variance[:, j] = train.variance(delta.low, delta.high)
         return LinkAngles(q, low, high, variance)
 
 
-def _driven(train: DriveTrain, j: int, loads: LinkLoads, departs: np.ndarray) -> DriveMotion:
-    """The motion of column j, loaded by links whose deltas accelerate by `departs` (n, k) [rad/s2] as well."""
+def _driven(train: DriveTrain, j: int, loads: LinkLoads, acceleration: np.ndarray) -> DriveMotion:
+    """The motion of column j, loaded by links whose deltas have accelerations (n, k) [rad/s2] as well."""
     bare = drive_motion([loads], j, train.inertials if len(train.inertials) else None)
-    return replace(bare, coupled=-(loads.inertia[:, j] * departs).sum(axis=1))
+    return replace(bare, coupled=-(loads.inertia[:, j] * acceleration).sum(axis=1))
 
 
 class StreamState(NamedTuple):

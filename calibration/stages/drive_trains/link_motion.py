@@ -41,7 +41,7 @@ class Drive(NamedTuple):
         v: Motor velocities [rad/s].
         torque: [N.m].
         inertia: [kg.m2].
-        coupled: Torque by other links, even over the interval that ends at a sample [N.m].
+        coupled: Torque by links nearer to the hand, even over the interval that ends at a sample [N.m].
     """
 
     t: np.ndarray
@@ -249,16 +249,16 @@ def streamed(
 ) -> None:  # fmt: skip
     """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`.
 
-    M (k, k) is the inertia of all joints at `samples`: by it likely motions of links load those nearer to the base.
+    M (k, k) is the inertia of all joints at `samples`: by it links, as they likely move, load those that carry them.
     """
     m, columns = samples.shape[1], drives.columns
-    room, departs = np.zeros((5, m)), np.zeros(m)
+    room, acceleration = np.zeros((5, m)), np.zeros(m)
     room[1] = dt
     a = Drive(room[0], before[Q], before[V], room[2], before[INERTIA], room[4])
     b = Drive(room[1], samples[Q], samples[V], room[3], samples[INERTIA], room[4])
     for i in drives.inwards:
         for other in range(m):
-            b.coupled[i] -= M[columns[i], columns[other]] * departs[other]
+            b.coupled[i] -= M[columns[i], columns[other]] * acceleration[other]
         c, rate = contact(drives.values[i]), states[i, 0, 1]
         for j in range(states.shape[1]):
             a.torque[i], b.torque[i] = before[TORQUE, i] + drives.offs[i, j], samples[TORQUE, i] + drives.offs[i, j]
@@ -267,7 +267,7 @@ def streamed(
                 x[0] = carried(x[0] + b.q[i] - a.q[i], b, i, drives.values[i])
             else:
                 x[0], x[1], x[2] = advanced(x[0], x[1], x[2], a, i, b, i, longest, c)
-        departs[i] = (states[i, 0, 1] - rate) / dt
+        acceleration[i] = (states[i, 0, 1] - rate) / dt
 
 
 @njit(cache=True, error_model="numpy")
