@@ -132,7 +132,8 @@ class Compensator:
         arm = BundledArm(trains, robot.bending, robot.at_rest)
         if robot.stick_slip is not None:
             source: Source = "plate" if robot.knows("plate") else "dynamics"
-            slipping = SlippingBase(robot.stick_slip, Laboratory(urdf, laboratory.carrying(payload)), source, trains)
+            lab = Laboratory(trains.urdf, laboratory.carrying(payload))
+            slipping = SlippingBase(robot.stick_slip, lab, source, trains)
         return replace(self, joints=None, arm=arm, slipping=slipping)
 
     def predict(  # noqa: PLR0913  what the instruments show

@@ -75,6 +75,11 @@ class Laboratory:
         description = self.description.carrying(mass)
         return self if description is self.description else replace(self, description=description)
 
+    @cached_property
+    def unloaded(self) -> "Laboratory":
+        """Without its payload."""
+        return self.carrying(0.0)
+
     def of_trial(self, trial_id: str) -> "Laboratory":
         """With the payload of one trial of the dataset; of another trial, the campaign's."""
         return self.carrying(self._payloads.get(trial_id))

@@ -15,6 +15,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
+from calibration.robot.link_masses import LinkMasses
 from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains
@@ -41,7 +42,8 @@ class BundleParts:
         stick_slip: The base; None where it was not identified.
         at_rest: (m,) s_j of each train's angle in dwells, see `geometry_refit` [rad]; 0 where not known, or empty.
         at_rest_by_dynamics: The same where inverse dynamics move the base that else a plate moves; empty without.
-        hung: What the wrist's sensor weighed beside nominal links and payload; None where nothing was.
+        hung: What the wrist's sensor weighed beside links and payload; None where nothing was.
+        links: What a plate weighed; None where none did, and the links are nominal.
     """
 
     trains: tuple[DriveTrain, ...]
@@ -51,6 +53,7 @@ class BundleParts:
     at_rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
     at_rest_by_dynamics: np.ndarray = field(default_factory=lambda: np.zeros(0))
     hung: HungLoad | None = None
+    links: LinkMasses | None = None
 
     @property
     def by_dynamics(self) -> "BundleParts":
@@ -78,7 +81,8 @@ class BundledRobot:
 
     @classmethod
     def of(cls, hand: HandModel, parts: BundleParts, urdf: str, description: Description) -> "BundledRobot":
-        """The robot from what was saved of it."""
+        """The robot from what was saved of it, and the nominal one."""
+        urdf = urdf if parts.links is None else parts.links.on(urdf)
         robot = dynamics(urdf, description, parts.offset, parts.hung)
         trains = DriveTrains(robot, parts.trains, urdf, description, parts.hung)
         at_rest = trains.by_joint(parts.at_rest) if len(parts.at_rest) else np.zeros(len(parts.offset))
@@ -132,4 +136,5 @@ class BundledRobot:
         """
         if self.stick_slip is None:
             raise NotEnoughData(f"{trial.id}: no base that slips was identified")
+        sources = replace(sources, lab=replace(sources.lab, urdf=self.trains.urdf))
         return slipping_base_poses(self.stick_slip, sources, trial, source, self.trains)

@@ -44,6 +44,7 @@ from calibration.stages.stick_slip.stage import fit_stick_slip
 from calibration.stages.stick_slip.standing import SOURCES
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.weighing import weighed_links
 from calibration.verdict import Verdict
 
 STAGE = "bundle"
@@ -98,6 +99,10 @@ def fit_bundle(
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
     sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
+    links = weighed_links(sources, trials, None if suspension is None else suspension.K, motor_zeros(hand))
+    if links is not None:
+        lab = replace(lab, urdf=links.on(lab.urdf))
+        sources = replace(sources, lab=lab)
     rough = RoughBase(AS_SEEN) if suspension is None else moved_as_predicted(sources, trials, suspension)
     trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, rough.moved)
     bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
@@ -116,7 +121,7 @@ def fit_bundle(
         base, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)
         found += more
     other = _at_rest_by_dynamics(base, sources, trials, trains, hand) if len(at_rest) else np.zeros(0)
-    parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, other, trains.hung)
+    parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, other, trains.hung, links)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
 
 

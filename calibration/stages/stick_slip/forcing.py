@@ -24,20 +24,20 @@ from calibration.robot.wrist_sensor import UNSEEN, HandLoads, hand_push
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
 from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
-from calibration.stages.stick_slip.kernel.lifted import on_wheels, vertical
+from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import Forcing, WrenchSources, forcing_of
-from calibration.stages.suspension.floor_wrench import Load, composite_inertia, motion_load, plate_load
+from calibration.stages.suspension.floor_wrench import Load, composite_inertia, motion_load, plate_load, vertical
 from calibration.stages.suspension.lifting_response import predicted_lifting
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source
+from calibration.stages.suspension.weighing import leans
 
 CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
-FARTHEST = 0.02  # [rad] that a base leans
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,7 @@ class Tilting:
 
     def leans(self, load: np.ndarray) -> np.ndarray:
         """(rx, ry) [rad] from the vertical under a load (-Fz, My, -Mx) at rest, by springs of the same length."""
-        h = np.linalg.solve(self.K[np.ix_(HEAVE, HEAVE)], load[[0, 2, 1]] * (-1.0, -1.0, 1.0))
-        return np.asarray(np.clip(h[1:], -FARTHEST, FARTHEST))
+        return leans(self.K, load)
 
     def standing(self, wheels: WheelSet, source: Source) -> np.ndarray:
         """Rows (m, 10) of wheels, see `WheelSet.standing`, as the source's wrench counts their places."""

@@ -109,6 +109,11 @@ def composite_inertia(
     return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
 
 
+def vertical(wrench: np.ndarray) -> np.ndarray:
+    """(-Fz, My, -Mx) (n, 3) of wrenches (n, 6)."""
+    return np.asarray(wrench[:, (2, 4, 3)] * (-1.0, 1.0, -1.0))
+
+
 def root_in_base(model: pin.Model, description: Description) -> pin.SE3:
     """T_base_root, root = the body of the free flyer."""
     return model.frames[model.getFrameId(description.base_frame)].placement.inverse()

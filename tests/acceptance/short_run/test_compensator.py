@@ -59,6 +59,23 @@ def test_a_model_with_a_joint_less_than_the_others_is_refused(result, tmp_path):
         load_estimate(folder)
 
 
+def test_a_body_less_than_the_links_that_were_weighed_is_refused(result, tmp_path):
+    folder = shutil.copytree(result.folder / "estimate", tmp_path / "estimate")
+    content = json.loads((folder / "estimate.json").read_text("utf-8"))
+    content["bundle"]["links"]["share"].pop()
+    (folder / "estimate.json").write_text(json.dumps(content), "utf-8")
+    with pytest.raises(InputError, match="shift has shape"):
+        load_estimate(folder)
+
+
+def test_base_and_drive_trains_are_of_the_robot_as_weighed(result):
+    estimate, found = load_estimate(result.folder / "estimate"), Compensator.load(result.folder / "estimate")
+    weighed = estimate.bundle.links.on(estimate.urdf)
+    assert found.arm.trains.urdf == found.slipping.lab.urdf == weighed != estimate.urdf
+    prepared = predictor(estimate, calibration.load(result.folder / "dataset"))
+    assert prepared.bundled.trains.urdf == weighed
+
+
 def at_pictures(trial, t, q, w=None):
     """A trial with motor readings q (n, k), and a plate's w (n, 6), at times t (n,) of its pictures; nothing else."""
     nothing, ok = np.full_like(q, np.nan), np.isin(trial.t_mocap, t)

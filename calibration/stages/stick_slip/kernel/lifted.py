@@ -82,11 +82,6 @@ def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
         s[at + k * LANES] += c[k]
 
 
-def vertical(wrench: np.ndarray) -> np.ndarray:
-    """(-Fz, My, -Mx) (n, 3) of wrenches (n, 6)."""
-    return np.asarray(wrench[:, (2, 4, 3)] * (-1.0, 1.0, -1.0))
-
-
 def on_wheels(load: Load, standing: np.ndarray, slid: Signal | None) -> Load:
     """A plate's load as the wheels bear it, rows (m, 10), of a base that has slid."""
     t, x = load.signal.t, load.signal.x

@@ -16,7 +16,6 @@ from calibration.stages.stick_slip import wrenches_of
 from calibration.stages.stick_slip.band import Band
 from calibration.stages.stick_slip.forcing import (
     CUTOFF,
-    FARTHEST,
     STEPS,
     Readings,
     Tilting,
@@ -29,6 +28,7 @@ from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.floor_wrench import motion_load, root_in_base
+from calibration.stages.suspension.weighing import FARTHEST
 from tests.calibration.stages.stick_slip.slipping import TRUTH
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import T_LAB_BASE, WHEELS

@@ -7,14 +7,13 @@ import mjcf
 from calibration.numerics.signals import Signal
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip.forcing import Tilting, Wrenches
-from calibration.stages.stick_slip.kernel.lifted import vertical
 from calibration.stages.stick_slip.measured import slid
-from calibration.stages.stick_slip.standing import Read, plate_place, tilting_of, weighed
+from calibration.stages.stick_slip.standing import Read, plate_place, tilting_of
 from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import base_response_of, laboratory
 from calibration.stages.suspension.compliance_fit import fit_compliance
 from calibration.stages.suspension.cross_validation import HeldOut
-from calibration.stages.suspension.floor_wrench import Load
+from calibration.stages.suspension.floor_wrench import Load, vertical
 from calibration.stages.suspension.model import Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 from tests.doubles import rigid_robot
@@ -65,21 +64,6 @@ def stood(postures, masses, off, start=0.0):
     return trial, Wrenches("a", float(t[0]), *loads, np.zeros(0), np.zeros((0, 6, 6)), wheels)
 
 
-def test_what_bodies_change_of_the_load_is_its_derivative():
-    q, step = rigid_robot.CENTRE, 1e-4
-    lab = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE).lab
-    v = load(robot(), q[None])[0]
-    found, place = weighed(lab, q, v)
-    for i in (0, 3, 6):
-        more = load(robot(step * np.eye(8)[i]), q[None])[0]
-        np.testing.assert_allclose(found[:, 4 * (i + 1)], (more - v) / step, rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(place @ OFF, [0.0, *(v[0] * OFF)])
-    model, i = robot(), 5
-    body = model.inertias[i]
-    model.inertias[i] = pin.Inertia(body.mass, body.lever + [0.0, step, 0.0], body.inertia)
-    np.testing.assert_allclose(found[:, 4 * (i - 1) + 2], (load(model, q[None])[0] - v) / step, atol=1e-6)
-
-
 def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
     """Links 15 % off at most."""
     rng = np.random.default_rng(3)
@@ -87,9 +71,9 @@ def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     postures = rigid_robot.random_angles(rng, 12)
     trial, wrench = stood(postures, masses, OFF)
-    many, known, _ = plate_place(sources, [Read(trial, REST, wrench)])
+    many, known, _ = plate_place(sources, [Read(trial, REST, wrench)], None)
     trial, wrench = stood(np.repeat(postures[:1], 12, axis=0), masses, OFF)
-    one, unknown, _ = plate_place(sources, [Read(trial, REST, wrench)])
+    one, unknown, _ = plate_place(sources, [Read(trial, REST, wrench)], None)
     assert np.linalg.norm(many - OFF) < 0.7e-3
     assert np.linalg.norm(one - OFF) > 2e-3
     assert np.all(np.abs(many - OFF) < 2.0 * known) and np.all(known < unknown)
@@ -99,10 +83,12 @@ def test_postures_tell_what_the_links_weigh_from_where_the_plate_is():
 def test_a_plate_in_its_place_and_nominal_links_leave_nothing():
     sources = laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, PLATE)
     trial, wrench = stood(rigid_robot.random_angles(np.random.default_rng(3), 4), None, np.zeros(2))
-    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)])[0], 0.0, atol=1e-6)
-    np.testing.assert_array_equal(plate_place(sources, [Read(trial, REST, replace(wrench, dynamics=None))])[0], 0.0)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)], None)[0], 0.0, atol=1e-5)
+    np.testing.assert_array_equal(
+        plate_place(sources, [Read(trial, REST, replace(wrench, dynamics=None))], None)[0], 0.0
+    )
     trial, wrench = stood(rigid_robot.random_angles(np.random.default_rng(3), 4), None, OFF)
-    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)])[2], OFF, atol=1e-6)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)], None)[2], OFF, atol=1e-5)
 
 
 def test_seconds_in_which_a_joint_moves_do_not_count():
@@ -116,7 +102,7 @@ def test_seconds_in_which_a_joint_moves_do_not_count():
     loads = signal(t, u + moves[:, None] * [5.0, 20.0, -20.0]), signal(t, u)
     wrench = Wrenches("a", 0.0, *loads, np.zeros(0), none, wheels)
     assert 0.3 < moves.mean() < 0.95
-    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)])[0], 0.0, atol=1e-5)
+    np.testing.assert_allclose(plate_place(sources, [Read(trial, REST, wrench)], None)[0], 0.0, atol=1e-5)
 
 
 PLANE = 1e5  # [N/m, N.m/rad]
