@@ -93,7 +93,7 @@ class SlippingBase:
 
     Attributes:
         model: Fitted from `source`.
-        lab: The nominal robot with the payload in its hand.
+        lab: The robot, nominal or as weighed, with the payload in its hand.
         source: What moves it: a plate's wrench, or inverse dynamics of the readings.
         trains: Drive trains of the arm, with the same payload, where they are known.
     """

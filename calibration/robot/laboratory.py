@@ -34,7 +34,7 @@ class Laboratory:
     """The nominal robot and what dataset.json declares about it.
 
     Attributes:
-        urdf: Text of nominal.urdf.
+        urdf: Text of nominal.urdf, or of the robot as weighed.
         description: The whole of dataset.json.
     """
 

@@ -4,7 +4,7 @@
     vertical load (-Fz, My, -Mx) of the plate, or of inverse dynamics less M_h. d2/dt2 (z, rx, ry)
 
 all about the base frame's origin, in its axes, a plate's in frame 0; p: x, y, yaw, h: z, rx, ry; M(q) the composite
-inertia of the nominal robot with the payload of the trial. Heave and tilt are those of the 6x6 compliance under that
+inertia of the robot as weighed, with the payload of the trial. Heave and tilt are the 6x6 compliance's under that
 source. Forces in the floor's plane count from their mean in the first second. The last of STEPS steps is at its sample.
 Where there are no joint readings the base has no inertia: then the plate alone moves it, at the rate of the correction.
 """
@@ -163,7 +163,7 @@ class Readings(NamedTuple):
 
 
 def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray, arm: DriveTrains | None = None) -> Wrenches:
-    """What the instruments of a trial show of its wrench, by the nominal robot with the payload of the trial."""
+    """What the instruments of a trial show of its wrench, by the robot with the payload of the trial."""
     start, plate, lab = float(trial.t_mocap[0]), None, sources.lab.of_trial(trial.id)
     if sources.plate is not None and len(trial.t_plate):
         plate = plate_load(trial, sources.plate, T_lab_0, CUTOFF)

@@ -152,10 +152,10 @@ def plate_place(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """How far (2,) [m] the plate seems from its declared place under the base, and sigma (2,); 0 without readings.
 
-    And how far it seems by an upright nominal robot, were its links what they nominally are.
+    And how far it seems by an upright robot, were its links what they are taken for.
 
     Args:
-        sources: The nominal robot and the clock of its readings.
+        sources: The robot and the clock of its readings.
         read: Calibration trials.
         K: As of `weighed`.
     """

@@ -142,7 +142,7 @@ class WrenchSources:
     """The instruments that show the wrench on the floor.
 
     Attributes:
-        lab: The nominal robot and its setup.
+        lab: The robot, nominal or as weighed, and its setup.
         robot: Clock of the encoders, None where there are none.
         plate: Clock of the force plate, None where there is none.
         T_base_B: (4, 4) the base's marker body on the base.

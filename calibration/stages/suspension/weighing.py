@@ -65,7 +65,7 @@ class Weighed:
         links: What the robot weighs.
         off: (2,) o [m].
         sigma: (2,) of it.
-        seems: (2,) o of an upright robot, were its links what they nominally are.
+        seems: (2,) o of an upright robot, were its links what they are taken for.
     """
 
     links: LinkMasses
