@@ -99,13 +99,13 @@ def fit_bundle(
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
     sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
-    links = weighed_links(sources, trials, None if suspension is None else suspension.K, motor_zeros(hand))
+    links, unlikely = weighed_links(sources, trials, None if suspension is None else suspension.K, motor_zeros(hand))
     if links is not None:
         lab = replace(lab, urdf=links.on(lab.urdf))
         sources = replace(sources, lab=lab)
     rough = RoughBase(AS_SEEN) if suspension is None else moved_as_predicted(sources, trials, suspension)
     trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, rough.moved)
-    bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, list(findings), np.zeros(0)
+    bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, [*unlikely, *findings], np.zeros(0)
     geometry = replace(geometry, name="full")
     refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings, rough.moved)
     found += more

@@ -10,7 +10,9 @@ height h:
     u <- u + |u_1| (0, x + ry h, y - rx h) + yaw (0, -u_3, u_2)
 
 All of them normal: o as a marker body is on its link, links as `Tolerances` has them; the centre of mass of the root,
-which stands as it was built, to 2 mm. Postures tell the links' masses from the plate's place.
+which stands as it was built, to 2 mm. Postures tell the links' masses from the plate's place. Links that one robot in a
+thousand is as far from nominal as are not believed: s' S^-2 s of what was found, of tr(1 - C) degrees of freedom, C the
+covariance over the tolerances' S^2.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from scipy.stats import chi2
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
@@ -32,13 +35,19 @@ from calibration.robot.link_masses import LinkMasses
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.floor_wrench import root_in_base, vertical
 from calibration.stages.suspension.rest_frame import Rest, rest_of
+from calibration.verdict import Verdict
 
 FARTHEST = 0.02  # [rad] that a base leans
 _ROOT = 2e-3  # [m]
 _STILL, _CALM = 0.01, 2.0  # [rad, m] of a joint in a second; of the plate's load over that of the first one
 _FEWEST = 20  # readings in it
+_UNLIKELY = 1e-3
 _FORCE, _LEVER = 2.0, 3e-4  # [N], [m] of the weight: what a second at rest leaves unexplained
 _PLANE, _HEAVE = (0, 1, 5), (2, 3, 4)
+_OTHERS = (
+    "the plate weighs links otherwise than their tolerances let expect: not used; check the payload, "
+    "and the plate's scale, place and axes"
+)
 
 
 class Second(NamedTuple):
@@ -66,12 +75,14 @@ class Weighed:
         off: (2,) o [m].
         sigma: (2,) of it.
         seems: (2,) o of an upright robot, were its links what they are taken for.
+        likely: Whether tolerances let expect such links.
     """
 
     links: LinkMasses
     off: np.ndarray
     sigma: np.ndarray
     seems: np.ndarray
+    likely: bool
 
 
 def leans(K: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -95,10 +106,13 @@ def weighed(seconds: Sequence[tuple[Laboratory, Second]], K: np.ndarray | None) 
     sigma = _tolerances(lab.floating.njoints - 1, lab.description.tolerances)
     A = A * sigma / noise[:, None]
     covariance = np.linalg.inv(A.T @ A + np.eye(len(sigma)))
-    found, left = sigma * (covariance @ A.T @ ((upright - moved) / noise)), sigma * np.sqrt(np.diag(covariance))
+    found = covariance @ A.T @ ((upright - moved) / noise)
+    likely = (found[:-2] ** 2).sum() < chi2.isf(_UNLIKELY, (1.0 - np.diag(covariance)[:-2]).sum())
+    found, left = sigma * found, sigma * np.sqrt(np.diag(covariance))
     bodies = found[:-2].reshape(-1, 4)
     links = LinkMasses(tuple(lab.floating.names)[1:], bodies[:, 0].copy(), bodies[:, 1:].copy())
-    return Weighed(links, found[-2:], left[-2:], upright.reshape(-1, 3).mean(axis=0)[1:] / weight)
+    seems = upright.reshape(-1, 3).mean(axis=0)[1:] / weight
+    return Weighed(links, found[-2:], left[-2:], seems, bool(likely))
 
 
 def _row(lab: Laboratory, second: Second, K: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -175,8 +189,8 @@ def seconds_at_rest(
 
 def weighed_links(
     sources: WrenchSources, trials: Sequence[Trial], K: np.ndarray | None, zeros: np.ndarray
-) -> LinkMasses | None:
-    """What the robot weighs by calibration trials; None where no plate shows it.
+) -> tuple[LinkMasses | None, tuple[Verdict, ...]]:
+    """What the robot weighs by calibration trials, None where no plate shows it, and the finding where it is unlikely.
 
     Args:
         sources: The nominal robot, its clocks, its base's markers.
@@ -186,7 +200,7 @@ def weighed_links(
     """
     lab, robot, found = sources.lab, sources.robot, []
     if robot is None:
-        return None
+        return None, ()
     for trial in trials:
         with suppress(NotEnoughData):
             seen = MeasuredTrial.of(lab.description, trial)
@@ -194,4 +208,7 @@ def weighed_links(
             plate, own = sources.plate_load(seen, rest.T_lab_0).signal, lab.of_trial(trial.id)
             seconds = seconds_at_rest(seen, rest, robot, plate) if len(trial.t_robot) else ()
             found += [(own, second._replace(q=second.q - zeros)) for second in seconds]
-    return weighed(found, K).links if found else None
+    if not found:
+        return None, ()
+    of = weighed(found, K)
+    return (of.links, ()) if of.likely else (None, (Verdict("weighing", "warning", _OTHERS),))

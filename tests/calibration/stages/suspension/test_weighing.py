@@ -41,7 +41,9 @@ def load(lab, q, pose=AT_HOME):
 
 def other(rng):
     """A robot as far from the nominal one as its tolerances."""
-    share, shift = 0.1 * rng.normal(size=len(JOINTS)), 0.01 * rng.normal(size=(len(JOINTS), 3))
+    known = DESCRIPTION.tolerances
+    share = known.link_mass * rng.normal(size=len(JOINTS))
+    shift = known.link_com * rng.normal(size=(len(JOINTS), 3))
     share[0], shift[0] = 0.0, 0.0
     return replace(LAB, urdf=LinkMasses(JOINTS, share, shift).on(LAB.urdf))
 
@@ -110,6 +112,21 @@ def test_the_load_of_other_postures_is_known_to_a_third():
     assert np.median(known / nominal) < 1.0 / 3.0
 
 
+@pytest.mark.parametrize("scale", [1.0, -1.0])
+def test_a_plate_that_is_turned_weighs_no_links(scale):
+    seconds = [(LAB, Second(q, load(LAB, q) * [1.0, scale, scale], np.zeros(3)))
+               for q in rigid_robot.random_angles(np.random.default_rng(5), 20)]  # fmt: skip
+    assert weighed(seconds, None).likely == (scale > 0.0)
+
+
+def test_robots_within_their_tolerances_are_likely():
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        true = other(rng)
+        seconds = [(LAB, Second(q, load(true, q), np.zeros(3))) for q in rigid_robot.random_angles(rng, 20)]
+        assert weighed(seconds, None).likely
+
+
 def swung(at, change):
     """A trial, and a plate's wrench along it whose load swings by `change` (3,) after a time `at` [s]."""
     motor, _ = rigid_robot.through(np.repeat(rigid_robot.CENTRE[None], 2, axis=0), dwell=4.0)
@@ -132,9 +149,9 @@ def test_a_base_that_swings_is_not_at_rest():
 def test_nothing_is_weighed_without_a_plate():
     trial, _ = swung(99.0, np.zeros(3))
     no_clock, clock = (laboratory(mjcf.urdf(), DESCRIPTION, ROBOT, plate) for plate in (None, PLATE))
-    assert weighed_links(no_clock, [trial], None, np.zeros(8)) is None
+    assert weighed_links(no_clock, [trial], None, np.zeros(8)) == (None, ())
     none = replace(trial, t_plate=np.zeros(0), plate_wrench=np.zeros((0, 1, 6)))
-    assert weighed_links(clock, [none], None, np.zeros(8)) is None
+    assert weighed_links(clock, [none], None, np.zeros(8)) == (None, ())
 
 
 def test_readings_count_from_their_zeros_and_the_base_from_where_a_trial_begins():
@@ -149,5 +166,6 @@ def test_readings_count_from_their_zeros_and_the_base_from_where_a_trial_begins(
     trial = moved(replace(trial, q_motor=trial.q_motor + zeros), x, trial.t_mocap)
     on_plate = w @ pin.SE3(rest_of(DESCRIPTION, trial, sources.T_base_B).T_lab_0).dualAction.T
     trial = replace(trial, t_plate=trial.t_robot, plate_wrench=on_plate[:, None], plate_centre=np.zeros((1, 3)))
-    np.testing.assert_allclose(weighed_links(sources, [trial], None, zeros).share, 0.0, atol=2e-3)
-    assert np.abs(weighed_links(sources, [trial], None, np.zeros(8)).share).max() > 2e-2
+    right, wrong = (weighed_links(sources, [trial], None, own)[0].share for own in (zeros, np.zeros(8)))
+    np.testing.assert_allclose(right, 0.0, atol=2e-3)
+    assert np.abs(wrong).max() > 2e-2
