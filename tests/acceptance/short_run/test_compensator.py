@@ -3,6 +3,8 @@
 import json
 import shutil
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 
 import numpy as np
 import pytest
@@ -50,21 +52,19 @@ def test_the_main_row_is_loaded(result):
     assert Compensator.load(result.folder / "estimate").arm is not None
 
 
-def test_a_model_with_a_joint_less_than_the_others_is_refused(result, tmp_path):
+@pytest.mark.parametrize(
+    ("at", "message"),
+    [
+        (("models", "model_2", "reading_error"), "model_2: reading_error has"),
+        (("bundle", "links", "share"), "shift has shape"),
+    ],
+)
+def test_an_estimate_with_a_joint_less_than_the_others_is_refused(result, tmp_path, at, message):
     folder = shutil.copytree(result.folder / "estimate", tmp_path / "estimate")
     content = json.loads((folder / "estimate.json").read_text("utf-8"))
-    content["models"]["model_2"]["reading_error"].pop()
+    reduce(getitem, at, content).pop()
     (folder / "estimate.json").write_text(json.dumps(content), "utf-8")
-    with pytest.raises(InputError, match="model_2: reading_error has"):
-        load_estimate(folder)
-
-
-def test_a_body_less_than_the_links_that_were_weighed_is_refused(result, tmp_path):
-    folder = shutil.copytree(result.folder / "estimate", tmp_path / "estimate")
-    content = json.loads((folder / "estimate.json").read_text("utf-8"))
-    content["bundle"]["links"]["share"].pop()
-    (folder / "estimate.json").write_text(json.dumps(content), "utf-8")
-    with pytest.raises(InputError, match="shift has shape"):
+    with pytest.raises(InputError, match=message):
         load_estimate(folder)
 
 
