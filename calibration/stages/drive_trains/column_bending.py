@@ -19,6 +19,7 @@ from calibration.numerics.lie import compose, from_vector, inverse, rotation_vec
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import Trial
+from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.drive_train import Quantity
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -88,6 +89,16 @@ def column_bending(
     turn, M = np.array(rows)[:, :2], np.array(rows)[:, 2:]
     found = [_line(-M[:, k], turn[:, k]) for k in range(2)]
     return ColumnBending(joint, np.array([c for c, _ in found]), np.array([s for _, s in found]), M.mean(axis=0))
+
+
+def leaning(bending: ColumnBending, chain: Chain, description: Description) -> np.ndarray:
+    """(2,) [rad] standard deviations of how far the column leans in all postures alike, unknown to M.
+
+    Its own weight acts at a centre of mass that is known to a tolerance. Geometry takes that lean for a placement.
+    """
+    own = chain.nominal.inertias[chain.nominal.getJointId(bending.joint)]
+    moment = own.mass * np.linalg.norm(description.gravity) * description.tolerances.link_com
+    return np.asarray(bending.compliance * moment)
 
 
 def bent(hand: HandModel, bending: ColumnBending, q: np.ndarray, moment: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.robot.nominal_frames import nominal_frames
-from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, moved
+from calibration.stages.drive_trains.column_bending import ColumnBending, bent, column_bending, leaning, moved
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved, MovedBase, loads_of_trial
@@ -135,6 +135,7 @@ def refit_geometry(
         _sigma(trains, chain, "gear.{}.compliance"),
         0.5 * _sigma(trains, chain, "backlash.{}.gap"),
         _known(bending.sigma),
+        leaning(bending, chain, description),
         _have_link_encoders(trains)[chain.columns],
     )
     geared = with_gears(robot_hand, parameters, found.fit, used, known)

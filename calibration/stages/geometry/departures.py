@@ -70,29 +70,34 @@ class TakenForKnown:
         compliance: (k,) of the joints' gears [rad/(N.m)].
         half_gap: (k,) of half their backlash [rad].
         bending: (2,) of the first joint's column [rad/(N.m)].
+        leaning: (2,) how far the column leans about x and y in all postures alike, the place of its own centre of mass
+            being known to a tolerance [rad].
         read: (k,) whether a link encoder reads the joint: of its drive train the zero of the motor alone is used.
     """
 
     compliance: np.ndarray
     half_gap: np.ndarray
     bending: np.ndarray
+    leaning: np.ndarray
     read: np.ndarray
 
 
 def with_gears(hand: HandModel, parameters: ParameterSet, fit: Fit, postures: Postures, known: TakenForKnown) -> Fit:
     """The fit with what it takes for known counted in its covariance, C + sum s^2 (K N) (K N)', K = H^-1 J'.
 
-    N: in postures, deflection of each joint by the torque of gravity, and of the first joint's column by its moments;
-    each joint on the side of its gap where its load has it, which a load that never changes its sign makes a zero. Of
-    a joint that a link encoder reads, their mean: what its motor's zero is off by.
+    N: in postures, deflection of each joint by the torque of gravity, and of the first joint's column by its moments,
+    by those too that no posture changes; each joint on the side of its gap where its load has it, which a load that
+    never changes its sign makes a zero. Of a joint that a link encoder reads, their mean: what its motor's zero is off
+    by.
     """
     chain, at = hand.nominal, hand.with_theta(fit.theta, parameters.names)
     tau, M = chain.gravity_torques(postures.q), chain.gravity_moments(postures.q)
     found = at.kinematics(postures.q, tau)
-    column = _turned(found.J_frame[:, :, 1:], chain, found.q)[:, :, 0, :2] * (M[:, 0, :2] * known.bending)[:, None]
+    column = _turned(found.J_frame[:, :, 1:], chain, found.q)[:, :, 0, :2]
+    bent = [column * (M[:, 0, :2] * known.bending)[:, None], column * known.leaning]
     deflections = [tau * known.compliance, np.sign(tau) * known.half_gap]
     gears = [found.J_joint * np.where(known.read, s.mean(axis=0), s)[:, None] for s in deflections]
-    N = (fit.whitener @ _as_residuals(np.concatenate([*gears, column], axis=2), found.T, postures)).reshape(
+    N = (fit.whitener @ _as_residuals(np.concatenate([*gears, *bent], axis=2), found.T, postures)).reshape(
         fit.r_white.size, -1
     )
     H = fit.J_white.T @ fit.J_white + np.diag(parameters.prior.precision(fit.widths.prior))

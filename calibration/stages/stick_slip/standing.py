@@ -8,7 +8,8 @@ depends on the plate's place, too: 2 mm of 730 N lift a caster, or do not. So bo
 
     min sum_t (h(k, o) - h)' S^-2 (h(k, o) - h) / c + prior        K = sum_i k_i a_i a_i',  a_i = (1, y_i, -x_i)
 
-h are heave and tilt, S the markers' noise; c samples hang together.
+h are heave and tilt, S the markers' noise, c samples hang together. All n samples of a trial share the noise of its
+reference, m independent samples of the first second: of e = h(k, o) - h counts e - (1 - (1 + n / (c m))^-1/2) mean e.
 """
 
 from collections.abc import Sequence
@@ -28,7 +29,13 @@ from calibration.recording.trial import Trial
 from calibration.stages.stick_slip.forcing import HEAVE, Tilting, Wrenches
 from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import LENGTH, LOADS, PRIOR_SIGMA, WIDE, Prior, WheelSet, prior_by_tilt
-from calibration.stages.suspension.base_response import BaseResponse, WrenchSources, base_response_of, forcing_of
+from calibration.stages.suspension.base_response import (
+    INDEPENDENT,
+    BaseResponse,
+    WrenchSources,
+    base_response_of,
+    forcing_of,
+)
 from calibration.stages.suspension.floor_wrench import Load, vertical
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source, Suspension
@@ -89,13 +96,16 @@ class _Rocked(NamedTuple):
     load: Load
     seen: BaseResponse
 
-    def left(self, K: np.ndarray, C: np.ndarray, standing: np.ndarray) -> np.ndarray:
-        """Predicted less measured heave and tilt (3 n,) [noise], 0 where not measured."""
+    def left(self, noise: np.ndarray, K: np.ndarray, C: np.ndarray, standing: np.ndarray) -> np.ndarray:
+        """Predicted less measured heave and tilt (3 n,) [noise (3,)], 0 where not measured."""
         forcing = forcing_of(on_wheels(self.load, standing, self.one.wrenches.slid), self.one.wrenches.start)
         x = interpolate_columns(self.seen.forcing.t, forcing.t, predicted(K, C, forcing)[:, HEAVE])
-        noise = np.sqrt(_TOGETHER * self.seen.noise[[*HEAVE]])
-        off = np.where(self.seen.valid[:, None], (x - self.seen.x[:, HEAVE]) / noise, 0.0)
-        return np.asarray(np.nan_to_num(off, nan=_LOST, posinf=_LOST, neginf=-_LOST).ravel())
+        off = np.nan_to_num((x - self.seen.x[:, HEAVE]) / noise, nan=_LOST, posinf=_LOST, neginf=-_LOST)
+        off, valid = np.where(self.seen.valid[:, None], off, 0.0), self.seen.valid
+        if valid.any():
+            less = 1.0 - (1.0 + valid.sum() / (_TOGETHER * INDEPENDENT)) ** -0.5
+            off[valid] -= less * off[valid].mean(axis=0)
+        return np.asarray(off.ravel())
 
 
 def _rocked(description: Description, read: Sequence[Read], loads: Sequence[Load]) -> list[_Rocked]:
@@ -117,6 +127,7 @@ def _on_springs(
         linear: On springs that pull.
         place: (2,) sigma of the plate's place [m].
     """
+    noise = np.sqrt(_TOGETHER * np.mean([one.seen.noise[[*HEAVE]] for one in rocked], axis=0))
 
     def stiffness(k: np.ndarray, off: np.ndarray) -> np.ndarray:
         K = linear.K.copy()
@@ -126,7 +137,7 @@ def _on_springs(
     def residuals(theta: np.ndarray) -> np.ndarray:
         k, off = np.exp(theta[:3]), theta[3:] * LENGTH
         K, standing = stiffness(k, off), wheels.standing(k[[0, 2]] / k[1], off)
-        left = side_by_side(lambda one: one.left(K, linear.C, standing), rocked)
+        left = side_by_side(lambda one: one.left(noise, K, linear.C, standing), rocked)
         ratios, moved = theta[[0, 2]] - theta[1], off - linear.off
         return np.concatenate([*left, ratios / PRIOR_SIGMA[LOADS], moved / place])
 
@@ -139,7 +150,7 @@ def _on_springs(
     start = np.append(np.log(k), linear.off / LENGTH)
     found = least_squares(residuals, start, jac=jacobian, method="lm", ftol=1e-3, xtol=_SAME)
     pulling = linear.K, linear.C, linear.standing(wheels, "plate")
-    if 2.0 * found.cost > sum(float((one.left(*pulling) ** 2).sum()) for one in rocked) - _WORTH:
+    if 2.0 * found.cost > sum(float((one.left(noise, *pulling) ** 2).sum()) for one in rocked) - _WORTH:
         return None
     K, off = stiffness(np.exp(found.x[:3]), found.x[3:] * LENGTH), found.x[3:] * LENGTH
     sigma = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[3:] * LENGTH

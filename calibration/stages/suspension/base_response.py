@@ -34,8 +34,9 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 
-_INDEPENDENT = 2.0 * CUTOFF * REST  # samples of low-passed noise in the first second
-_RESTLESS = (_INDEPENDENT + 1.0) / (_INDEPENDENT - 1.0)  # of x minus its mean over that second, over variance in it
+INDEPENDENT = 2.0 * CUTOFF * REST
+"""Samples of low-passed noise in the first second."""
+_RESTLESS = (INDEPENDENT + 1.0) / (INDEPENDENT - 1.0)  # of x minus its mean over that second, over variance in it
 _log = logging.getLogger(__name__)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mjcf
-from calibration.numerics.lie import adjoint, inverse, jlog6, log6
+from calibration.numerics.lie import adjoint, from_vector, inverse, jlog6, log6
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
 from calibration.robot.nominal_frames import nominal_frames
@@ -48,7 +48,7 @@ def test_what_was_taken_for_known_moves_the_geometry_as_its_interval_says(what):
     delta = off * (tau if what == "compliance" else np.sign(tau))
     bent = replace(rigid_robot.postures(truth, q + delta), q=seen.q, covariance=seen.covariance)
     before, after = (fit(hand, parameters, some, tiny, tiny) for some in (seen, bent))
-    none = TakenForKnown(np.zeros(8), np.zeros(8), np.zeros(2), np.zeros(8, dtype=bool))
+    none = TakenForKnown(np.zeros(8), np.zeros(8), np.zeros(2), np.zeros(2), np.zeros(8, dtype=bool))
     wider = with_gears(hand, parameters, before, seen, replace(none, **{what: off}))
     added = np.sqrt(np.diag(wider.covariance - before.covariance).clip(0.0))
     np.testing.assert_allclose(added, np.abs(after.theta - before.theta), atol=0.03 * added.max())
@@ -57,3 +57,22 @@ def test_what_was_taken_for_known_moves_the_geometry_as_its_interval_says(what):
     only = np.array(parameters.names) == "encoder.arm_4_joint.motor.offset"
     added = np.sqrt(np.diag(read.covariance - before.covariance).clip(0.0))
     np.testing.assert_allclose(added, zero * only, atol=0.03 * zero)
+
+
+def test_a_column_that_leans_in_all_postures_moves_the_placements_as_its_interval_says():
+    description, rng, tiny = rigid_robot.described(), np.random.default_rng(0), np.full(8, 1e-4)
+    chain = chain_of(mjcf.urdf(), description)
+    hand, parameters = nominal_hand(chain, nominal_frames(chain, description)), geometry_parameters(chain, description)
+    parameters = replace(parameters, group=())
+    seen = rigid_robot.postures(rigid_robot.defects(0), rigid_robot.random_angles(rng, 30))
+    column = chain.poses(hand.angles(seen.q), chain.joints[0])
+    B = from_vector(hand.base)
+    lean = inverse(B) @ column @ from_vector(np.array([0, 0, 0, 5e-5, 0, 0])) @ inverse(column) @ B
+    leaning = replace(seen, T_base_hand=lean @ seen.T_base_hand)
+    before, after = (fit(hand, parameters, some, tiny, tiny) for some in (seen, leaning))
+    known = TakenForKnown(np.zeros(8), np.zeros(8), np.zeros(2), np.array([5e-5, 0.0]), np.zeros(8, dtype=bool))
+    wider = with_gears(hand, parameters, before, seen, known)
+    added = np.sqrt(np.diag(wider.covariance - before.covariance).clip(0.0))
+    moved = np.abs(after.theta - before.theta)
+    assert moved[list(parameters.names).index("geometry.arm_1_joint.ry")] > 1e-5
+    np.testing.assert_allclose(added, moved, atol=0.05 * added.max())
