@@ -97,9 +97,13 @@ class Tilting:
     over: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def placed(self, load: Load) -> Load:
-        """A load of inverse dynamics with the weight where the wheels bear it: moments are less by `over` -Fz."""
+        """A load of inverse dynamics as the base's markers have it, the weight where the wheels bear it.
+
+        Moments are less by `over` -Fz; a force across the floor acts `off` from the origin of the markers' frame.
+        """
         x = load.signal.x.copy()
         x[:, 4], x[:, 3] = x[:, 4] + x[:, 2] * self.over[0], x[:, 3] - x[:, 2] * self.over[1]
+        x[:, 5] += self.off[0] * x[:, 1] - self.off[1] * x[:, 0]
         return replace(load, signal=replace(load.signal, x=x))
 
     def leans(self, load: np.ndarray) -> np.ndarray:

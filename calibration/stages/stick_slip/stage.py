@@ -116,6 +116,7 @@ def campaign_of(
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials, suspension, arm)
     tilting, prior = tilting_of(sources, read, wheels, suspension)
+    wheels = replace(wheels, shift=tilting.off)
     by_source = ((source, _rows(description, read, tilting, source)) for source in SOURCES)
     shown = ((source, rows) for source, rows in by_source if len(rows) >= _LEAST_TRIALS)
     usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in islice(shown, most)]

@@ -9,7 +9,7 @@ to all wheels. A wheel that would pull is off the floor. Casters are front or ba
 are log-normal and wide, but for the shares of the load where the tilt shows them: nothing here is of one robot.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -142,12 +142,14 @@ class WheelSet:
         types: `drive`, `front` or `back`.
         position: (m, 2) contact points [m, base frame].
         weight: (m,) their own [N].
+        shift: (2,) how far they are from there in the base frame as its markers show it [m].
     """
 
     names: tuple[str, ...]
     types: tuple[str, ...]
     position: np.ndarray
     weight: np.ndarray
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def __post_init__(self) -> None:
         if not len(self.names) == len(self.types) == len(self.weight):
@@ -171,9 +173,8 @@ class WheelSet:
         position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
-        mass = np.broadcast_to(self.mass, n.shape)
-        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, mass[..., None])
-        return np.concatenate([position, *parts], axis=2)
+        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, np.broadcast_to(self.mass, n.shape)[..., None])
+        return np.concatenate([position + self.shift, *parts], axis=2)
 
     def _typed(self, drive: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
         """(k, m) of each wheel, by numbers (k,) of its type."""

@@ -47,6 +47,21 @@ def test_loads_about_a_moved_base_are_those_of_wheels_that_moved():
     np.testing.assert_allclose(slipping.about(x, np.array([N.sum(), *(N @ at)])), [N.sum(), *(N @ POSITION)])
 
 
+def test_markers_that_are_elsewhere_on_the_base_see_the_same_wheels_slip():
+    """Of a base whose middle is `off` in the frame of its markers, all wrenches about that frame's origin."""
+    off, free = np.array([4e-3, -6e-3]), replace(TRUTH, body_c=1e-9)
+    w = slipping.push(np.random.default_rng(3), size=1.5)
+    seen = w + np.outer(w[:, 1] * off[0] - w[:, 0] * off[1], [0.0, 0.0, 1.0])
+    A = np.array([[1.0, 0.0, -off[1]], [0.0, 1.0, off[0]], [0.0, 0.0, 1.0]])
+    x, _ = slipping.slid(w, free)
+    there, _ = slipping.slid(seen, free, of=replace(WHEELS, shift=off), mass=A.T @ MASS @ A)
+    c, s = np.cos(there[:, 2]), np.sin(there[:, 2])
+    middle = there[:, :2] + np.column_stack([c * off[0] - s * off[1], s * off[0] + c * off[1]]) - off
+    assert np.abs(x[:, 2]).max() > 5e-3 and np.abs(x[-1, 2]) > 1e-3
+    np.testing.assert_allclose(there[:, 2], x[:, 2], atol=1e-7)
+    np.testing.assert_allclose(middle, x[:, :2], atol=1e-7)
+
+
 @pytest.mark.parametrize("load", [(730.0, 75.0, 20.0), (730.0, 95.0, 0.0), (730.0, -120.0, 30.0)])
 def test_where_wheels_are_off_the_floor_the_others_bear_the_load(load):
     ((state,), (wheels,), (lanes,)), rows = bases_of(WHEELS, STUCK.logarithms[None], False), WHEELS.rows(STUCK)

@@ -203,6 +203,14 @@ def test_a_load_of_inverse_dynamics_is_where_the_wheels_bear_it():
     np.testing.assert_array_equal(moved[:, [0, 1, 2, 5]], x[:, [0, 1, 2, 5]])
 
 
+def test_inverse_dynamics_turn_a_base_about_where_its_markers_have_it():
+    x = np.tile([10.0, 20.0, -700.0, 4.0, -3.0, 2.0], (3, 1))
+    load = Load(Signal(np.arange(3.0), x, np.ones(3, dtype=bool)), np.zeros((6, 6)), 730.0, np.zeros(3), np.eye(4))
+    moved = Tilting(np.eye(6), np.eye(6), off=np.array([2e-3, -1e-3])).placed(load).signal.x
+    np.testing.assert_allclose(moved[:, 5], 2.0 + (2e-3 * 20.0 + 1e-3 * 10.0))
+    np.testing.assert_array_equal(moved[:, :5], x[:, :5])
+
+
 def test_casters_that_lift_off_a_base_that_slides_do_not_either():
     """A plate stands still: 730 N that are 6 mm from where they were make 4 N.m."""
     far = (6e-3, -4e-3, 0.03)
