@@ -30,11 +30,11 @@ from calibration.stages.stick_slip.forcing import HEAVE, Tilting, Wrenches
 from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import LENGTH, LOADS, PRIOR_SIGMA, WIDE, Prior, WheelSet, prior_by_tilt
 from calibration.stages.suspension.base_response import (
-    INDEPENDENT,
     BaseResponse,
     WrenchSources,
     base_response_of,
     forcing_of,
+    without_reference,
 )
 from calibration.stages.suspension.floor_wrench import Load, vertical
 from calibration.stages.suspension.modal_response import predicted
@@ -101,10 +101,8 @@ class _Rocked(NamedTuple):
         forcing = forcing_of(on_wheels(self.load, standing, self.one.wrenches.slid), self.one.wrenches.start)
         x = interpolate_columns(self.seen.forcing.t, forcing.t, predicted(K, C, forcing)[:, HEAVE])
         off = np.nan_to_num((x - self.seen.x[:, HEAVE]) / noise, nan=_LOST, posinf=_LOST, neginf=-_LOST)
-        off, valid = np.where(self.seen.valid[:, None], off, 0.0), self.seen.valid
-        if valid.any():
-            less = 1.0 - (1.0 + valid.sum() / (_TOGETHER * INDEPENDENT)) ** -0.5
-            off[valid] -= less * off[valid].mean(axis=0)
+        off = np.where(self.seen.valid[:, None], off, 0.0)
+        off[self.seen.valid] = without_reference(off[self.seen.valid], _TOGETHER)
         return np.asarray(off.ravel())
 
 

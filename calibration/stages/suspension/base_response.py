@@ -34,9 +34,8 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.suspension.floor_wrench import Load, motion_load, plate_load
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 
-INDEPENDENT = 2.0 * CUTOFF * REST
-"""Samples of low-passed noise in the first second."""
-_RESTLESS = (INDEPENDENT + 1.0) / (INDEPENDENT - 1.0)  # of x minus its mean over that second, over variance in it
+_INDEPENDENT = 2.0 * CUTOFF * REST  # samples of low-passed noise in the first second
+_RESTLESS = (_INDEPENDENT + 1.0) / (_INDEPENDENT - 1.0)  # of x minus its mean over that second, over variance in it
 _log = logging.getLogger(__name__)
 
 
@@ -227,3 +226,14 @@ def read_responses(wrenches: WrenchSources, trials: Sequence[Trial]) -> BaseResp
     rows = [row for row in side_by_side(found, trials) if row is not None]
     columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(sources)}
     return BaseResponses(columns.get("plate", ()), columns.get("dynamics", ()))
+
+
+def without_reference(e: np.ndarray, together: float) -> np.ndarray:
+    """Errors e (n, c) of x in one trial, whitened of their reference's noise, which all of them share.
+
+        e - (1 - (1 + n / (together m))^-1/2) mean e
+
+    In units of sqrt(together) standard deviations of a sample, m samples of the reference being independent.
+    """
+    n = len(e)
+    return e - (1.0 - (1.0 + n / (together * _INDEPENDENT)) ** -0.5) * e.sum(axis=0) / max(n, 1)

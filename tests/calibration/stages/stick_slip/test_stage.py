@@ -13,12 +13,12 @@ from calibration.stages.bundle.moved_base import moved_as_predicted
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.stage import MovedBase
 from calibration.stages.drive_trains.torques import dynamics
-from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, wrenches_of
+from calibration.stages.stick_slip import fit_stick_slip, slipping_base_poses, stage, wrenches_of
 from calibration.stages.stick_slip.fit import linear_where
 from calibration.stages.stick_slip.forcing import Tilting, planar_forcing
 from calibration.stages.stick_slip.poses import Arm, moving_links
 from calibration.stages.stick_slip.stage import _behind, _judged, _misplaced
-from calibration.stages.stick_slip.wheels import SlipParameters, wheel_set
+from calibration.stages.stick_slip.wheels import WIDE, SlipParameters, wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.modal_response import modes_of
@@ -120,6 +120,15 @@ def test_the_load_counts_from_where_the_plate_seems_to_be(recorded):
     )
     np.testing.assert_allclose(corrected, true, atol=1e-6)
     assert np.abs(seen - true).max() > 5.0
+
+
+def test_wheels_slip_where_the_base_s_markers_have_them(recorded, suspension, monkeypatch):
+    off = np.array([2e-3, -1e-3])
+    monkeypatch.setattr(stage, "tilting_of", lambda *_: (Tilting(suspension.K, suspension.C, off), WIDE))
+    sources = laboratory(mjcf.urdf(), DESCRIPTION, None, PLATE)
+    found = stage.campaign_of(sources, [r[0] for r in recorded[:2]], suspension)
+    for wheels in (found.wheels, found.by_source[0][2].wheels):
+        np.testing.assert_array_equal(wheels.shift, off)
 
 
 def test_a_base_that_was_moved_is_named(recorded, suspension):
