@@ -41,8 +41,6 @@ OPEN = {  # lines that do not hold, with their sizes in docs/limits.md
     "fixed, ladder of registration plate motor dynamic",
     "fixed, ladder of model_2 plate motor dynamic",
     "fixed, band of registration plate dynamic",
-    "fixed, errors of parameters",
-    "sampled, errors of parameters",
 }
 SKILL = {"fixed": (0.95, 0.90), "sampled": (0.88, 0.78)}  # median, worst
 

@@ -93,9 +93,9 @@ def whole_run(tmp_path_factory):
 @pytest.mark.parametrize(
     ("factor", "campaign"),
     [
-        pytest.param(3.0, "quick_run", marks=ARM_1),
+        (3.0, "quick_run"),
         pytest.param(3.0, "whole_run", marks=ARM_1),
-        pytest.param(1.0 / 3.0, "quick_run", marks=ARM_1),
+        (1.0 / 3.0, "quick_run"),
         (1.0 / 3.0, "whole_run"),
     ],
 )
