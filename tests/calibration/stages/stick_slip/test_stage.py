@@ -122,7 +122,7 @@ def test_the_load_counts_from_where_the_plate_seems_to_be(recorded):
     assert np.abs(seen - true).max() > 5.0
 
 
-def test_wheels_slip_where_the_base_s_markers_have_them(recorded, suspension, monkeypatch):
+def test_wheels_slip_where_markers_have_the_base(recorded, suspension, monkeypatch):
     off = np.array([2e-3, -1e-3])
     monkeypatch.setattr(stage, "tilting_of", lambda *_: (Tilting(suspension.K, suspension.C, off), WIDE))
     sources = laboratory(mjcf.urdf(), DESCRIPTION, None, PLATE)
