@@ -32,6 +32,7 @@ Status = Literal["estimated", "not_identifiable"]
 VALUES = ("half_gap", "compliance", "coulomb", "viscous", "relaxation", "spring", "slip")
 HARMONICS = ("cos1", "sin1", "cos2", "sin2")
 LONGEST = 3.4e-3  # [s] step of the link's motion
+_FRICTIONLESS = 1e-9  # [N.m] friction that holds nothing
 _RIGID = 1e-7  # [rad/(N.m)] least compliance that is simulated
 
 
@@ -69,7 +70,8 @@ class DriveTrain:
         dynamic: Whether the link's inertia counts; else delta follows the torque at once.
         motor: (4,) eccentricity of the motor encoder at the joint, cos1, sin1, cos2, sin2 [rad].
         link: (5,) offset of the link encoder from the motor's, and its eccentricity [rad]; NaN without one.
-        start: Share of [D(tau - f_c), D(tau + f_c)] at which trials start, mean and standard deviation [-].
+        start: Share of [D(tau - f_c), D(tau + f_c)] at which trials start, mean and standard deviation [-]; NaN where
+            no trial shows it, see `begun`.
         torque_sigma: Standard deviation of the torque at which the side changes [N.m].
         residual: Rms of what the model left of trials left out, in motion, where the side of the mesh is certain [rad].
         doubt: The same where it is not, over the standard deviation of an even distribution between both ends [-].
@@ -86,7 +88,7 @@ class DriveTrain:
     dynamic: bool = True
     motor: np.ndarray = field(default_factory=lambda: np.zeros(4))
     link: np.ndarray = field(default_factory=lambda: np.full(5, np.nan))
-    start: tuple[float, float] = (0.5, 0.3)
+    start: tuple[float, float] = (np.nan, np.nan)
     torque_sigma: float = 0.05
     residual: float = 0.0
     doubt: float = 1.0
@@ -112,8 +114,19 @@ class DriveTrain:
     def likely(self, drive: "DriveMotion") -> np.ndarray:
         """Most likely delta and its acceleration (2, n) in trials, as `delta_motion` has them."""
         torque = drive.torque + self.link_inertia * drive.a
-        low, high = self.ends(torque[drive.begins[:-1]])
-        return self.delta_motion(drive, torque, low + self.start[0] * (high - low))
+        return self.delta_motion(drive, torque, self.begun(torque[drive.begins[:-1]]))
+
+    def begun(self, torque: np.ndarray) -> np.ndarray:
+        """Expected delta (m,) [rad] where trials begin under torques (m,) [N.m].
+
+        Where no trial shows the share it is c tau + g tau / f_c in the gap: a load that wandered to tau was last beyond
+        +f_c, not beyond -f_c, and left the link there, with probability (1 + tau / f_c) / 2 (gambler's ruin).
+        """
+        if np.isfinite(self.start[0]):
+            low, high = self.ends(torque)
+            return np.asarray(low + self.start[0] * (high - low))
+        side = np.clip(torque / max(self.values[COULOMB], _FRICTIONLESS), -1.0, 1.0)
+        return np.asarray(self.values[COMPLIANCE] * torque + self.values[HALF_GAP] * side)
 
     def variance(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Variance (n,) [rad2] of a link in motion that is between low and high (n,) [rad]."""

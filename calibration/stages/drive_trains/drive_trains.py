@@ -202,7 +202,7 @@ class Stream:
         link_motion.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
         for i, (train, torque) in enumerate(zip(self.trains.trains, state.samples[TORQUE], strict=True)):
             low, high = train.ends(torque + drives.offs[i, ::2])
-            starts = [low[0] + train.start[0] * (high[0] - low[0]), *np.column_stack([low, high])[1:].ravel()]
+            starts = [*train.begun(torque[None]), *np.column_stack([low, high])[1:].ravel()]
             states[i, :, 0] = states[i, :, 2] = starts
         link_motion.link_angles(states, state.moving[0], drives, angles)
         return state, LinkAngles(*angles)

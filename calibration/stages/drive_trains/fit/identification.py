@@ -128,7 +128,7 @@ def residual_and_doubt(chosen: Candidate) -> tuple[float, float]:
 
 
 def _start(fit: TrainFit) -> tuple[float, float]:
-    """Share of the gap at which trials start, mean and standard deviation."""
+    """Share of the gap at which trials start, mean and standard deviation; NaN where fewer than two show it."""
     data, train = fit.problem.data, fit.problem.train(fit.theta)
     torque = data.loaded(fit.problem.modes(fit.theta)).torque[data.motion.begins[:-1]]
     low, high = train.ends(torque)
@@ -136,7 +136,7 @@ def _start(fit: TrainFit) -> tuple[float, float]:
     share = (data.started(fit.gamma) - low)[wide] / (high - low)[wide]
     share = np.clip(share[np.isfinite(share)], 0.0, 1.0)
     if len(share) < 2:
-        return 0.5, 0.3
+        return np.nan, np.nan
     return float(share.mean()), max(_SPREAD, float(share.std()))
 
 
