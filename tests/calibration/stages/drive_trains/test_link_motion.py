@@ -1,5 +1,7 @@
 """The play operator and the link behind a dead zone, against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -112,3 +114,28 @@ def test_several_trials_are_as_each_alone() -> None:
     found = of.deltas(both, both.torque, starts)
     alone = [of.deltas(d, d.torque, s) for d, s in ((one, starts[:1]), (other, starts[1:]))]
     assert (found == np.concatenate(alone)).all()
+
+
+def test_a_link_is_expected_where_a_load_that_wandered_left_it() -> None:
+    """Under random loads the play operator is where `begun` expects it, on average over what they did before."""
+    n = 500_000
+    walk = np.cumsum(0.02 * np.random.default_rng(1).normal(size=n))
+    load = np.arcsin(np.sin(np.pi * walk)) / np.pi  # between walls far beyond the friction
+    own, still = train(0.02, 1e-3, 0.2), np.zeros(n)
+    drive = DriveMotion(0.01 * np.arange(n), still, still, still, load, still, np.array([0, n]))
+    delta = own.deltas(drive, load, np.zeros(1))
+    for low in np.arange(-0.3, 0.3, 0.05):
+        there = (load > low) & (load < low + 0.05)
+        assert abs((delta - own.begun(load))[there].mean()) < 1e-3  # a tenth of half the gap
+    assert abs(delta[(load > 0.15) & (load < 0.2)].mean()) > 6e-3
+
+
+@pytest.mark.parametrize("torque", [-3.0, 0.0, 3.0])
+def test_trials_that_began_so_before_tell_where_a_link_begins(torque: float) -> None:
+    own = replace(train(0.02, 1e-3, 0.2), start=(0.3, 0.1))
+    low, high = own.ends(np.array([torque]))
+    np.testing.assert_allclose(own.begun(np.array([torque])), low + 0.3 * (high - low))
+
+
+def test_without_friction_the_load_alone_decides_where_a_link_begins() -> None:
+    np.testing.assert_allclose(train(0.02, 1e-3, 0.0).begun(np.array([-3.0, 3.0])), [-0.013, 0.013])
