@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.acceptance.series import SAMPLED, Key, kept_series
+from tests.acceptance.series import MANY, SAMPLED, Key, kept_series
 
 pytestmark = pytest.mark.slow
 MM, DEG = "position_rmse_component_mm", "orientation_rmse_deg"
@@ -45,11 +45,11 @@ OPEN = {  # lines that do not hold, with their sizes in docs/limits.md
 SKILL = {"fixed": (0.95, 0.90), "sampled": (0.88, 0.78)}  # median, worst
 
 
-def judge(name, holds):
-    """Fail where a line does not hold, or holds though it is listed as open."""
+def judge(found, name, holds):
+    """Fail where a line does not hold, or holds though it is listed as open; on fewer than MANY robots it may."""
     if name in OPEN and not holds:
         pytest.xfail(f"{name}: docs/limits.md")
-    assert holds and name not in OPEN, name
+    assert holds and (name not in OPEN or len(found.seeds) < MANY), name
 
 
 @pytest.fixture(scope="module", params=["fixed", "sampled"])
@@ -69,6 +69,7 @@ def test_each_row_lies_in_its_band(robots, key, claim):
             median, worst = SPREAD * median, SPREAD * worst
         if arms == "fixed" or key.model == "full":
             judge(
+                found,
                 f"{arms}, {quantity} of {key.model} {key.base} {key.encoder} {key.trials}",
                 np.median(error) <= median and error.max() <= worst,
             )
@@ -93,7 +94,7 @@ def test_errors_of_the_delivered_parameters_are_as_their_covariance_has_them(rob
     arms, found = robots
     nees = found.nees("full")
     claim(f"nees/{arms}/full", nees)
-    judge(f"{arms}, errors of parameters", nees.max() <= 2.0)
+    judge(found, f"{arms}, errors of parameters", nees.max() <= 2.0)
 
 
 @pytest.mark.parametrize("key", INSIDE, ids=lambda key: "-".join((key.model, key.base, key.trials)))
@@ -102,7 +103,7 @@ def test_the_band_on_the_hand_holds_the_share_it_promises(robots, key, claim):
     share = found.figures(key, "inside_95")
     claim(f"band/{arms}/{key.model}/{key.base}/{key.trials}", share)
     holds = INSIDE[key][0] <= round(share.mean(), 9) <= INSIDE[key][1]
-    judge(f"{arms}, band of {key.model} {key.base} {key.trials}", holds)
+    judge(found, f"{arms}, band of {key.model} {key.base} {key.trials}", holds)
 
 
 def test_the_rows_keep_their_order_on_every_robot(robots):
@@ -120,4 +121,4 @@ def test_the_tilt_of_the_base_is_predicted_from_the_plate(robots, axis, least, c
     arms, found = robots
     r2 = found.base_r2(axis)
     claim(f"base/{arms}/{axis}_r2", r2)
-    judge(f"{arms}, {axis}", r2.min() >= least)
+    judge(found, f"{arms}, {axis}", r2.min() >= least)

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.acceptance.base.base_lines import lines
-from tests.acceptance.series import SAMPLED, kept_series
+from tests.acceptance.series import MANY, SAMPLED, kept_series
 
 pytestmark = pytest.mark.slow
 OPEN = {  # lines that do not hold, with their sizes in docs/limits.md
@@ -17,9 +17,9 @@ ROBOTS = {"fixed": ("humanoids2024", ()), "sampled": ("humanoids2024", SAMPLED),
 @pytest.mark.parametrize("robots", ROBOTS)
 def test_every_line_holds(robots, tmp_path_factory, claim):
     scenario, overrides = ROBOTS[robots]
-    broken = []
-    for line in lines(kept_series(robots, tmp_path_factory.mktemp, overrides, scenario).scores):
+    broken, found = [], kept_series(robots, tmp_path_factory.mktemp, overrides, scenario)
+    for line in lines(found.scores):
         claim(f"slip/{robots}/{line.name}", line.figures or (line.value,))
         if not line.holds:
             broken.append(line.name)
-    assert broken == OPEN[robots]
+    assert broken == OPEN[robots] or (len(found.seeds) < MANY and set(broken) <= set(OPEN[robots]))
