@@ -155,6 +155,19 @@ def test_an_axis_that_is_linear_from_dynamics_alone_speaks_against_no_plate(reco
     assert _behind((half, plate)) == ["x", "y", "yaw"]
 
 
+@pytest.mark.parametrize(
+    ("yaw", "y", "behind"), [(0.95, 0.7, []), (0.95, 0.5, ["y"]), (0.6, 0.7, ["y"]), (0.6, 0.85, [])]
+)
+def test_an_axis_of_few_trials_speaks_against_no_plate_that_explains_yaw(recorded, suspension, yaw, y, behind):
+    (plate,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
+    motion = 1e-6 * np.ones((8, 3))
+
+    def explaining(*r2):
+        return replace(plate, held_out=HeldOut((1.0 - np.array(r2)) * motion, motion, 1e-12 * motion, np.ones(8)))
+
+    assert _behind((explaining(0.9, y, yaw), explaining(0.9, 0.9, 0.65))) == behind
+
+
 def test_where_no_wheel_slides_slip_explains_yaw_alone(recorded, suspension):
     """An anchored base: a valley of the fit predicts yaw better than springs do, and slips along x that nobody saw."""
     (direction,) = fit([r[0] for r in recorded[:3]], suspension, robot=None)[0].directions
