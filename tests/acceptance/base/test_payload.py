@@ -1,10 +1,8 @@
 """What inverse dynamics cannot know and a plate can: slow, run by `make slow`.
 
-Row `full`, seed 4, the short campaign, per component [mm]; with 2 kg both back casters are off the floor at the start,
-and how far a drive slides depends on a few newtons of its load:
-
-    plate: usual     0 kg         2 kg          push         measured: usual     2 kg         push
-    .28              .28          .41           .33          .34                 .36          .40
+Row `full`, seed 4, the short campaign. With 2 kg both back casters are off the floor at the start, and how far a drive
+slides depends on a few newtons of its load: on other robots and whole campaigns the error with 2 kg by the plate is up
+to 1.6 times the usual one, docs/limits.md.
 """
 
 import json
@@ -34,9 +32,6 @@ def test_a_declared_payload_is_known_to_both(trials):
         assert dynamics < 1.25 * plate
 
 
-LOADED = pytest.mark.xfail(reason="a base that slides with half of its wheels: docs/models.md", strict=True)
-
-
 @pytest.mark.parametrize(
     ("trial", "base"),
     [
@@ -44,7 +39,7 @@ LOADED = pytest.mark.xfail(reason="a base that slides with half of its wheels: d
         ("xyz_2kg", "measured"),
         ("push", "measured"),
         ("xyz_0kg", "plate"),
-        pytest.param("xyz_2kg", "plate", marks=LOADED),
+        ("xyz_2kg", "plate"),
         ("push", "plate"),
     ],
 )
