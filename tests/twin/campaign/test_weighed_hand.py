@@ -34,7 +34,7 @@ def test_mass_and_centre_of_new_robots_lie_in_their_intervals(config, tmp_path, 
     z, error = [], []
     for seed in SEEDS:
         record(config, seed, tmp_path / str(seed))
-        calibrate(load(tmp_path / str(seed) / "dataset"), ["clocks", "registration", "geometry"])
+        calibrate(load(tmp_path / str(seed) / "dataset"), ["clocks", "registration", "geometry", "wrist_load"])
         error.append(np.r_[found[-1].mass, found[-1].centre] - truth(config, seed))
         z.append(error[-1] / np.r_[found[-1].sigma[0], found[-1].centre_sigma])
     held = (np.abs(z) <= 1.96).sum(axis=0)

@@ -46,13 +46,13 @@ def measured(truth, q, rng, share=LEAST):
 
 def drawn(chain, rng, soft=False):
     """A robot, readings (POSTURES + NEW, 8) of it, and the joint angles then; `soft`: a share of its gears gives, by as
-    much as is believed of one that does."""
+    much as is believed of one that does, none against its load."""
     xi, zeros = rng.normal(size=(8, 6)) * np.repeat([4e-3, 8e-3], 3), rng.normal(size=8) * np.r_[4e-3, np.full(7, 4e-2)]
     reading = rigid_robot.random_angles(rng, POSTURES + NEW) + zeros
     tau = chain.gravity_torques(reading)
     gives = (
         Compliance.nominal(chain, np.zeros(12)).tolerance(Known(chain, None, tau[:POSTURES]))
-        * rng.normal(size=8)
+        * np.abs(rng.normal(size=8))
         * (rng.random(8) < rng.random())
     )
     return rigid_robot.Truth(xi=xi, offset=zeros), reading, reading - zeros - soft * gives * tau
