@@ -7,7 +7,8 @@ Zeros of either side may be anything; a link may be off its motor by its gear's 
     q_link ~ a q_motor + b           a = -1 sign, a = 180 / pi degrees, another scale; by least squares
 
     |int v - dq_link|^2 < 1/4 |int v - dq_motor|^2      what is in proportion to int v apart, over steps of 0.1 s in
-                                     which dq_link - dq_motor is ten sigma: v is the link's, sides are exchanged
+                                     which dq_link - dq_motor is ten sigma: v is the link's, sides are exchanged,
+                                     unless the other steps take back half of what these have it nearer
 
 A polynomial of the angle explains such a discrepancy perfectly, so the R2 of a joint model does not show it.
 """
@@ -28,6 +29,7 @@ _COPIED = (
 )
 _LAGS, _BIN = 10.0, 0.1  # sigma by which the sides move apart where they can be judged, in that time [s]
 _FOLLOWS, _TURNS = 0.25, 5  # of the squares; times in which a joint must show its lag
+_KEPT = 0.5  # of what they have the link nearer, over all times: a velocity that jumps between samples is off both
 _SHARE = 0.05  # of the samples that may be farther out
 _NEAR = 0.1  # of a slope, of a turn [-]
 _SCALE, _LEFT = 0.03, 0.3  # a slope is off 1 by more and leaves less of the difference, rms: no backlash is so straight
@@ -93,8 +95,9 @@ def exchanged(trial: Trial, sigma: float) -> Iterator[str]:
             continue
         unit = by_v / max(float(np.linalg.norm(by_v)), np.finfo(float).tiny)
         off_motor, off_link = (x - unit * (unit @ x) for x in (by_v - by_q, by_v - by_link))
-        rows = np.abs(off_link - off_motor) > _LAGS * sigma
-        if rows.sum() >= _TURNS and (off_link[rows] ** 2).sum() < _FOLLOWS * (off_motor[rows] ** 2).sum():
+        rows, nearer = np.abs(off_link - off_motor) > _LAGS * sigma, off_motor**2 - off_link**2
+        follows = (off_link[rows] ** 2).sum() < _FOLLOWS * (off_motor[rows] ** 2).sum()
+        if rows.sum() >= _TURNS and follows and nearer.sum() > _KEPT * nearer[rows].sum():
             names.append(name)
     if names:
         yield (

@@ -38,3 +38,17 @@ def test_exchanged_sides_are_named_and_nothing_else(motor, link, named):
 def test_velocities_nobody_recorded_name_nothing():
     assert not list(exchanged(_trial(MOTOR - LAG, MOTOR, 0.0 * T), SIGMA))
     assert not list(exchanged(_trial(MOTOR - LAG, MOTOR, np.nan * T), SIGMA))
+
+
+def test_a_velocity_that_jumps_between_samples_is_off_both_sides_and_names_nothing():
+    """Its integral is off the motor in six moments, where the link happens to be as far off; elsewhere it is not."""
+    moments, width = len(T) // 10, 10
+    jumps = np.zeros(moments)
+    jumps[20:140:20] = 2e-4 * (-1.0) ** np.arange(6)
+    wander = np.where(jumps == 0.0, RNG.uniform(-1.2e-4, 1.2e-4, moments), 0.0)
+    off, apart = (
+        np.interp(np.arange(len(T)), width * np.arange(1, moments + 1), np.cumsum(x)) for x in (jumps, wander)
+    )
+    trial = _trial(MOTOR, MOTOR + off + apart, np.cos(T) + np.gradient(off, T))
+    assert not list(exchanged(trial, SIGMA))
+    assert list(exchanged(_trial(MOTOR, MOTOR + off, np.cos(T) + np.gradient(off, T)), SIGMA))
