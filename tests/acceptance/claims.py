@@ -77,7 +77,7 @@ def _section(section: dict, results: dict) -> list[str]:
             shown = [f"{value:.{section.get('decimals', 2)}f}" for value in (np.median(x), x.min(), x.max())]
             n = sum(r.get("n", len(r["figures"])) for r in rows[name])
             cells = shown[:1] if single else [str(n), *shown]
-            label = name.strip("/ []").replace("/", ", ").replace("[", ", ")
+            label = name.strip("/ []").replace("/", ", ").replace(" [", ", ").replace("[", ", ")
             lines.append(f"| {' | '.join((label, *cells, when(rows[name])))} |")
         lines.append("")
     elif "figures" in section:
