@@ -153,7 +153,7 @@ class Mapping(Declaration):
         bag: What is what in the bags.
     """
 
-    urdf: str
+    urdf: Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$")]
     setup: Setup
     bodies: tuple[MappedBody, ...]
     trials: Annotated[tuple[MappedTrial, ...], Field(min_length=1)]

@@ -301,6 +301,7 @@ def test_text_in_a_cell_is_reported_by_line_and_column(lab, capsys):
         (lambda m: m["trials"].append({"id": "b", "role": "calibration", "kind": "static"}), "trials.b: no file"),
         (lambda m: m["trials"][0].update(kind="swing"), "holds static postures, trial postures is declared as swing"),
         (lambda m: m.update(csv=[]), "csv: missing"),
+        (lambda m: m.update(urdf="ti\0ago"), "urdf: String should match pattern"),
     ],
 )  # fmt: skip
 def test_a_mapping_that_does_not_fit_is_reported(lab, capsys, change, words):
