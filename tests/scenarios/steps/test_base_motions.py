@@ -79,3 +79,9 @@ def test_a_robot_that_plays_them_has_its_springs_identified_to_a_tenth(off, clai
         for name, error in found.items():
             claim(f"design/base/{what}/{name} off by, share", error)
     assert max(of_springs(found) for found in off.values()) < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(reason="springs are off by much the same whichever a robot plays: docs/limits.md", strict=True)
+def test_a_robot_that_plays_them_has_its_springs_identified_better(off):
+    assert of_springs(off["base motions"]) < 0.5 * of_springs(off["swings"])
