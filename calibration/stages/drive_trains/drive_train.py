@@ -101,21 +101,6 @@ class DriveTrain:
         """Total backlash [rad]."""
         return 2.0 * float(self.values[HALF_GAP])
 
-    def backlash(self, drive: "DriveMotion") -> "Deflection":
-        """delta in trials."""
-        torque, (likely, acceleration) = drive.torque + self.link_inertia * drive.a, self.likely(drive)
-        others = [likely]
-        for off in (-2.0 * self.torque_sigma, 2.0 * self.torque_sigma):
-            shift = self.values[COMPLIANCE] * off  # of a mesh in contact, and no doubt about its side
-            for start in self.ends(torque[drive.begins[:-1]] + off):
-                others.append(self.deltas(drive, torque + off, start) - shift)
-        return Deflection(likely, np.min(others, axis=0), np.max(others, axis=0), acceleration)
-
-    def likely(self, drive: "DriveMotion") -> np.ndarray:
-        """Most likely delta and its acceleration (2, n) in trials, as `delta_motion` has them."""
-        torque = drive.torque + self.link_inertia * drive.a
-        return self.delta_motion(drive, torque, self.begun(torque[drive.begins[:-1]]))
-
     def begun(self, torque: np.ndarray) -> np.ndarray:
         """Expected delta (m,) [rad] where trials begin under torques (m,) [N.m].
 
@@ -156,19 +141,11 @@ class DriveTrain:
         self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
     ) -> np.ndarray:
         """delta (n,) [rad] under torques (n,) [N.m], from `starts` (m,) where trials begin; steps of `longest` [s]."""
-        return np.asarray(self.delta_motion(drive, torque, starts, longest)[0])
-
-    def delta_motion(
-        self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
-    ) -> np.ndarray:
-        """`deltas`, and their mean accelerations since the sample before [rad/s2]; 0 of a play operator; (2, n)."""
-        coupled = np.zeros(len(drive.q)) if drive.coupled is None else drive.coupled
+        still = np.zeros(len(drive.q))
         if not self.dynamic and self.form == "dead_zone":
-            own = Drive(drive.t, drive.q, drive.v, torque, drive.inertia, coupled)
-            delta = played(own, drive.begins, starts, self.values)
-            return np.array([delta, np.zeros(len(delta))])
-        inertia = self.moved_inertia(drive.inertia)
-        own = Drive(drive.t, drive.q, drive.v, torque, inertia, coupled)
+            own = Drive(drive.t, drive.q, drive.v, torque, drive.inertia, still)
+            return np.asarray(played(own, drive.begins, starts, self.values))
+        own = Drive(drive.t, drive.q, drive.v, torque, self.moved_inertia(drive.inertia), still)
         return np.asarray(simulated(own, drive.begins, starts, longest, self.simulated_values))
 
     def moved_inertia(self, nominal: np.ndarray) -> np.ndarray:
@@ -196,7 +173,6 @@ class DriveMotion:
         torque: Of the link's motion if it followed the motor [N.m].
         inertia: The mesh moves [kg.m2].
         begins: (m + 1,) first sample of each trial, and n.
-        coupled: Torque by how links nearer to the hand depart from their motors [N.m], even since the sample before.
     """
 
     t: np.ndarray
@@ -206,7 +182,6 @@ class DriveMotion:
     torque: np.ndarray
     inertia: np.ndarray
     begins: np.ndarray
-    coupled: np.ndarray | None = None
 
 
 def drive_motion(loads: Sequence[LinkLoads], column: int, inertials: np.ndarray | None = None) -> DriveMotion:
@@ -221,23 +196,6 @@ def drive_motion(loads: Sequence[LinkLoads], column: int, inertials: np.ndarray 
         torque = torque + joined("regressor") @ inertials
     begins = np.cumsum([0, *(len(of_trial.t) for of_trial in loads)])
     return DriveMotion(t, joined("q"), joined("v"), joined("a"), torque, inertia, begins)
-
-
-@dataclass(frozen=True)
-class Deflection:
-    """delta of a joint.
-
-    Attributes:
-        value: (n,) most likely [rad].
-        low: (n,) least.
-        high: (n,) largest.
-        acceleration: (n,) of the most likely, as `DriveTrain.delta_motion` has it [rad/s2].
-    """
-
-    value: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    acceleration: np.ndarray
 
 
 def harmonic_terms(angle: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The drive trains of a robot in use: motor readings in, link angles and their intervals out.
 
     q_link = q_motor - offset - e_m - delta           what the geometry is asked with:  q_motor - e_m - delta
-    tau_j <- tau_j - sum_i M_ji d2 delta_i / dt2      i nearer to the hand than j: links load those that carry them
+    tau_j <- tau_j - sum_i M_ji d2 delta_i / dt2      links load each other, see `link_streams`
 
 The geometry keeps the zeros of the readings; it is the one fitted to corrected readings (`geometry_refit`).
 
@@ -22,15 +22,16 @@ from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
 from calibration.robot.rigid_tree import TreeDynamics, room, scratch
 from calibration.robot.wrist_sensor import HandLoads
-from calibration.stages.drive_trains import link_motion
-from calibration.stages.drive_trains.drive_train import LONGEST, DriveMotion, DriveTrain, Quantity, drive_motion
+from calibration.stages.drive_trains import link_streams
+from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_load
-from calibration.stages.drive_trains.link_motion import COMPLIANCE, TORQUE, Drives
+from calibration.stages.drive_trains.link_motion import COMPLIANCE
+from calibration.stages.drive_trains.link_streams import TORQUE, Drives
 from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, dynamics, inertials
 from calibration.stages.suspension.floor_wrench import root_in_base
 
 RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
-_RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
+RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
 
 
 class LinkAngles(NamedTuple):
@@ -129,31 +130,38 @@ class DriveTrains:
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
-        q, acceleration = loads.q.astype(float).copy(), np.zeros(loads.q.shape)
-        for train in self.inwards:
+        q, deltas = loads.q.astype(float).copy(), self._deltas(loads, 1)
+        for train, delta in zip(self.trains, deltas, strict=True):
             j = self.joints.index(train.joint)
-            delta, acceleration[:, j] = train.likely(_driven(train, j, loads, acceleration))
-            q[:, j] = loads.q[:, j] - train.harmonics(loads.angle[:, j]) - delta
+            q[:, j] = loads.q[:, j] - train.harmonics(loads.angle[:, j]) - delta[:, 0]
         return q
 
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""
-        q = loads.q.astype(float).copy()
-        low, high, variance, acceleration = q.copy(), q.copy(), np.zeros(q.shape), np.zeros(q.shape)
-        for train in self.inwards:
+        q, deltas = loads.q.astype(float).copy(), self._deltas(loads, RUNS)
+        low, high, variance = q.copy(), q.copy(), np.zeros(q.shape)
+        for train, delta in zip(self.trains, deltas, strict=True):
             j = self.joints.index(train.joint)
-            delta = train.backlash(_driven(train, j, loads, acceleration))
-            acceleration[:, j] = delta.acceleration
             bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
-            q[:, j], low[:, j], high[:, j] = bare - delta.value, bare - delta.high, bare - delta.low
-            variance[:, j] = train.variance(delta.low, delta.high)
+            q[:, j], low[:, j], high[:, j] = bare - delta[:, 0], bare - delta.max(axis=1), bare - delta.min(axis=1)
+            variance[:, j] = train.variance(bare - high[:, j], bare - low[:, j])
         return LinkAngles(q, low, high, variance)
 
-
-def _driven(train: DriveTrain, j: int, loads: LinkLoads, acceleration: np.ndarray) -> DriveMotion:
-    """The motion of column j, loaded by links whose deltas have accelerations (n, k) [rad/s2] as well."""
-    bare = drive_motion([loads], j, train.inertials if len(train.inertials) else None)
-    return replace(bare, coupled=-(loads.inertia[:, j] * acceleration).sum(axis=1))
+    def _deltas(self, loads: LinkLoads, runs: int) -> np.ndarray:
+        """(m, n, runs) [rad] of each drive train, what its torques are off by taken off as a mesh in contact has it."""
+        if not self.trains:
+            return np.zeros((0, len(loads.t), runs))
+        of, samples = [], np.empty((len(loads.t), 4, len(self.trains)))
+        for i, train in enumerate(self.trains):
+            of.append(
+                drive_motion([loads], self.joints.index(train.joint), train.inertials if len(train.inertials) else None)
+            )
+            torque = of[i].torque + train.link_inertia * of[i].a
+            samples[:, :, i] = np.stack([of[i].q, of[i].v, torque, train.moved_inertia(of[i].inertia)], axis=1)
+        drives = prepared(self)
+        states = np.ascontiguousarray(begun(self, drives, samples[0, TORQUE])[:, :runs])
+        found = link_streams.walked(states, loads.t, samples, loads.inertia, LONGEST, drives)
+        return np.asarray(np.moveaxis(found - drives.shifts[:, :runs], 1, 0))
 
 
 class StreamState(NamedTuple):
@@ -199,12 +207,9 @@ class Stream:
         state, found, angles = self._room(t, moving)
         robot, drives, states = self.trains.dynamics, self.prepared, state.states
         root = self.at_rest if base is None else base
-        link_motion.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
-        for i, (train, torque) in enumerate(zip(self.trains.trains, state.samples[TORQUE], strict=True)):
-            low, high = train.ends(torque + drives.offs[i, ::2])
-            starts = [*train.begun(torque[None]), *np.column_stack([low, high])[1:].ravel()]
-            states[i, :, 0] = states[i, :, 2] = starts
-        link_motion.link_angles(states, state.moving[0], drives, angles)
+        link_streams.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
+        states[:] = begun(self.trains, drives, state.samples[TORQUE])
+        link_streams.link_angles(states, state.moving[0], drives, angles)
         return state, LinkAngles(*angles)
 
     def step(
@@ -215,7 +220,7 @@ class Stream:
         robot, drives = self.trains.dynamics, self.prepared
         state.states[:] = before.states
         root = self.at_rest if base is None else base
-        link_motion.advanced_drives(
+        link_streams.advanced_drives(
             robot.tree, drives, root, self.work, found, state.moving, before.samples, state.states, t - before.t,
             LONGEST, state.samples, angles,
         )  # fmt: skip
@@ -228,15 +233,33 @@ class Stream:
         found = TreeDynamics(
             torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.regressor
         )
-        return StreamState(t, moving, np.empty((4, m)), np.zeros((m, _RUNS, 3)), torque, moment), found, angles
+        return StreamState(t, moving, np.empty((4, m)), np.zeros((m, RUNS, 3)), torque, moment), found, angles
 
 
 def stream_of(trains: DriveTrains) -> Stream:
     """Drive trains made ready for single samples."""
+    robot = trains.dynamics
+    return Stream(
+        trains, prepared(trains), robot.root(None), scratch(robot.tree), room(1, len(trains.joints), regressors=True)
+    )
+
+
+def begun(trains: DriveTrains, drives: Drives, torques: np.ndarray) -> np.ndarray:
+    """States (m, RUNS, 3) of an unknown history under torques (m,) [N.m]."""
+    states = np.zeros((len(torques), RUNS, 3))
+    for i, (train, torque) in enumerate(zip(trains.trains, torques, strict=True)):
+        low, high = train.ends(torque + drives.offs[i, ::2])
+        starts = [*train.begun(torque[None]), *np.column_stack([low, high])[1:].ravel()]
+        states[i, :, 0] = states[i, :, 2] = starts
+    return states
+
+
+def prepared(trains: DriveTrains) -> Drives:
+    """Drive trains made ready for their kernels."""
     of, robot = trains.trains, trains.dynamics
-    p, k = len(inertials(robot)), len(trains.joints)
-    offs = np.array([[0.0, -s, -s, s, s] for s in (2.0 * t.torque_sigma for t in of)]).reshape(-1, _RUNS)
-    prepared = Drives(
+    p = len(inertials(robot))
+    offs = np.array([[0.0, -s, -s, s, s] for s in (2.0 * t.torque_sigma for t in of)]).reshape(-1, RUNS)
+    return Drives(
         np.array([trains.joints.index(t.joint) for t in of], dtype=np.int64),
         np.array([[t.joint for t in of].index(t.joint) for t in trains.inwards], dtype=np.int64),
         np.array([t.simulated_values for t in of]).reshape(-1, 7),
@@ -250,4 +273,3 @@ def stream_of(trains: DriveTrains) -> Stream:
         np.array([[t.doubt**2 / 12.0, t.residual**2] for t in of], dtype=float).reshape(-1, 2),
         np.array(robot.offset, dtype=float),
     )
-    return Stream(trains, prepared, robot.root(None), scratch(robot.tree), room(1, k, True))

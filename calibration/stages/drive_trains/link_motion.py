@@ -23,13 +23,11 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.numerics.compiled import njit
-from calibration.robot.rigid_tree import RigidTree, TreeDynamics, sample
 
 HALF_GAP, COMPLIANCE, COULOMB, VISCOUS, RELAXATION, SPRING, SLIP = range(7)  # order of `values`
 LIGHT = 1e-5  # [kg.m2] least inertia
-Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
 _NEWTON = 12
-_STILL = 3e-5  # [rad] between two samples: one step will do
+STILL = 3e-5  # [rad] between two samples: one step will do
 
 
 class Drive(NamedTuple):
@@ -41,7 +39,7 @@ class Drive(NamedTuple):
         v: Motor velocities [rad/s].
         torque: [N.m].
         inertia: [kg.m2].
-        coupled: Torque by links nearer to the hand, even over the interval that ends at a sample [N.m].
+        coupled: Torque by other links, even over the interval that ends at a sample [N.m].
     """
 
     t: np.ndarray
@@ -137,7 +135,7 @@ def advanced(
     p, r, d, before = a.v[i] * dt, b.v[j] * dt, b.q[j] - a.q[i], 0.0
     torque, inertia = a.torque[i] + b.coupled[j], a.inertia[i]
     more, heavier = b.torque[j] - a.torque[i], b.inertia[j] - inertia
-    if abs(d) < _STILL and abs(p) < _STILL and abs(r) < _STILL and abs(rate) * dt < _STILL:
+    if abs(d) < STILL and abs(p) < STILL and abs(r) < STILL and abs(rate) * dt < STILL:
         n = 1
     for k in range(n):
         s = (k + 1) / n
@@ -149,19 +147,18 @@ def advanced(
 
 @njit(cache=True, error_model="numpy")
 def simulated(drive: Drive, begins: np.ndarray, starts: np.ndarray, longest: float, values: np.ndarray) -> np.ndarray:
-    """delta [rad] and its mean acceleration since the sample before [rad/s2], (2, n), of one joint in trials in a row.
+    """delta (n,) [rad] of one joint in trials in a row.
 
     `begins` (m + 1,) are their first samples and n, `starts` (m,) delta there [rad], at rest; steps as of `advanced`.
     `values` (7,) are g, c, f_c, f_v, T, k, t.
     """
-    out, c = np.zeros((2, len(drive.q))), contact(values)
+    out, c = np.empty(len(drive.q)), contact(values)
     for m in range(len(starts)):
         x, rate, slider = starts[m], 0.0, starts[m]
-        out[0, begins[m]] = x
+        out[begins[m]] = x
         for i in range(begins[m], begins[m + 1] - 1):
-            before = rate
             x, rate, slider = advanced(x, rate, slider, drive, i, drive, i + 1, longest, c)
-            out[0, i + 1], out[1, i + 1] = x, (rate - before) / (drive.t[i + 1] - drive.t[i])
+            out[i + 1] = x
     return out
 
 
@@ -182,118 +179,3 @@ def played(drive: Drive, begins: np.ndarray, starts: np.ndarray, values: np.ndar
         for i in range(begins[m] + 1, begins[m + 1]):
             out[i] = carried(out[i - 1] + drive.q[i] - drive.q[i - 1], drive, i, values)
     return out
-
-
-class Drives(NamedTuple):
-    """Drive trains made ready for single samples, m of them in a robot of k joints.
-
-    Attributes:
-        columns: (m,) column of each in the readings.
-        inwards: (m,) their numbers, those nearer to the hand first.
-        values: (m, 7) as simulated.
-        inertials: (m, p) of each load.
-        link_inertia: (m,) [kg.m2].
-        dynamic: (m,) whose links' inertia counts.
-        offs: (m, c) error of the torque in each run [N.m].
-        shifts: (m, c) that it winds a mesh up by [rad].
-        motor: (m, 4) eccentricities [rad].
-        plays: (m,) which are play operators.
-        doubt: (m, 2) variance over the square of the interval [-], and beside it [rad2].
-        offset: (k,) zeros of all readings [rad, m].
-    """
-
-    columns: np.ndarray
-    inwards: np.ndarray
-    values: np.ndarray
-    inertials: np.ndarray
-    link_inertia: np.ndarray
-    dynamic: np.ndarray
-    offs: np.ndarray
-    shifts: np.ndarray
-    motor: np.ndarray
-    plays: np.ndarray
-    doubt: np.ndarray
-    offset: np.ndarray
-
-
-@njit(cache=True, error_model="numpy")
-def loaded(
-    tree: RigidTree, drives: Drives, root: np.ndarray, work: np.ndarray, found: TreeDynamics, moving: np.ndarray,
-    samples: np.ndarray,
-) -> None:  # fmt: skip
-    """Dynamics of one sample into `found`, and what moves each link into `samples` (4, m).
-
-    `moving` (3, k) are readings, velocities and accelerations, `root` and `work` as of `rigid_tree`.
-    """
-    angle, v, a = np.empty((1, moving.shape[1])), moving[1:2], moving[2:3]
-    for j in range(moving.shape[1]):
-        angle[0, j] = moving[0, j] - drives.offset[j]
-    sample(tree, angle, v, a, root, work, found)
-    x, y, z, p = root[0, 6], root[0, 7], root[0, 8], found.regressor.shape[2]
-    for i in range(len(drives.columns)):
-        c, phi, pull = drives.columns[i], drives.inertials[i], found.coupling[0, drives.columns[i]]
-        torque, inertia = found.torque[0, c] + drives.link_inertia[i] * a[0, c], found.inertia[0, c, c]
-        for k in range(p):
-            torque += found.regressor[0, c, k] * phi[k]
-        tilt_x, tilt_y = pull[1] * z - pull[2] * y, pull[2] * x - pull[0] * z
-        torque += tilt_x * (phi[p] - found.moment[0, 0] * phi[p + 2])
-        torque += tilt_y * (phi[p + 1] - found.moment[0, 1] * phi[p + 2])
-        samples[Q, i], samples[V, i], samples[TORQUE, i] = moving[0, c], v[0, c], torque
-        samples[INERTIA, i] = max(inertia + drives.link_inertia[i], LIGHT) if drives.dynamic[i] else LIGHT
-
-
-@njit(cache=True, error_model="numpy")
-def streamed(
-    states: np.ndarray, before: np.ndarray, samples: np.ndarray, M: np.ndarray, dt: float, longest: float,
-    drives: Drives,
-) -> None:  # fmt: skip
-    """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`.
-
-    M (k, k) is the inertia of all joints at `samples`: by it links, as they likely move, load those that carry them.
-    """
-    m, columns = samples.shape[1], drives.columns
-    room, acceleration = np.zeros((5, m)), np.zeros(m)
-    room[1] = dt
-    a = Drive(room[0], before[Q], before[V], room[2], before[INERTIA], room[4])
-    b = Drive(room[1], samples[Q], samples[V], room[3], samples[INERTIA], room[4])
-    for i in drives.inwards:
-        for other in range(m):
-            b.coupled[i] -= M[columns[i], columns[other]] * acceleration[other]
-        c, rate = contact(drives.values[i]), states[i, 0, 1]
-        for j in range(states.shape[1]):
-            a.torque[i], b.torque[i] = before[TORQUE, i] + drives.offs[i, j], samples[TORQUE, i] + drives.offs[i, j]
-            x = states[i, j]
-            if drives.plays[i]:
-                x[0] = carried(x[0] + b.q[i] - a.q[i], b, i, drives.values[i])
-            else:
-                x[0], x[1], x[2] = advanced(x[0], x[1], x[2], a, i, b, i, longest, c)
-        acceleration[i] = (states[i, 0, 1] - rate) / dt
-
-
-@njit(cache=True, error_model="numpy")
-def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarray) -> None:
-    """Angles (4, 1, k) behind readings q (k,): likely, least, largest; variance."""
-    for j in range(len(q)):
-        out[0, 0, j] = out[1, 0, j] = out[2, 0, j] = q[j]
-        out[3, 0, j] = 0.0
-    for i in range(len(drives.columns)):
-        c, e = drives.columns[i], drives.motor[i]
-        top, bottom, theta = -np.inf, np.inf, q[c] - drives.offset[c]
-        for j in range(states.shape[1]):
-            delta = states[i, j, 0] - drives.shifts[i, j]
-            top, bottom = max(top, delta), min(bottom, delta)
-        bare = q[c] - e[0] * np.cos(theta) - e[1] * np.sin(theta) - e[2] * np.cos(2 * theta) - e[3] * np.sin(2 * theta)
-        out[0, 0, c] = bare - (states[i, 0, 0] - drives.shifts[i, 0])
-        out[1, 0, c], out[2, 0, c] = bare - top, bare - bottom
-        out[3, 0, c] = drives.doubt[i, 0] * (top - bottom) ** 2 + drives.doubt[i, 1]
-
-
-@njit(cache=True, error_model="numpy")
-def advanced_drives(
-    tree: RigidTree, drives: Drives, root: np.ndarray, work: np.ndarray, found: TreeDynamics, moving: np.ndarray,
-    before: np.ndarray, states: np.ndarray, dt: float, longest: float, samples: np.ndarray, angles: np.ndarray,
-) -> None:  # fmt: skip
-    """`loaded`, `streamed` and `link_angles` of a sample dt [s] after `before`."""
-    loaded(tree, drives, root, work, found, moving, samples)
-    streamed(states, before, samples, found.inertia[0], dt, longest, drives)
-    link_angles(states, moving[0], drives, angles)

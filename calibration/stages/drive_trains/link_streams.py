@@ -1,0 +1,193 @@
+"""Drive trains of a robot moved together, compiled: sample by sample, or along a whole recording.
+
+    tau_i <- tau_i - sum_k M_ik d2 delta_k / dt2           links load each other as they depart from their motors
+
+Within a step a link is moved by what the others do in the same step, SWEEPS times from the hand inwards (Gauss-Seidel
+on the blocks of M): first by links nearer to the hand, then by those that carry it, too. A link that strikes in its
+gap throws the link that carries it, and is thrown by it. Reference: Moreau, Unilateral Contact and Dry Friction in
+Finite Freedom Dynamics, 1988 (the same sweeps on impulses).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from calibration.numerics.compiled import njit
+from calibration.robot.rigid_tree import RigidTree, TreeDynamics, sample
+from calibration.stages.drive_trains.link_motion import LIGHT, STILL, Drive, advanced, carried, contact, stepped
+
+Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
+SWEEPS = 2
+
+
+class Drives(NamedTuple):
+    """Drive trains made ready for single samples, m of them in a robot of k joints.
+
+    Attributes:
+        columns: (m,) column of each in the readings.
+        inwards: (m,) their numbers, those nearer to the hand first.
+        values: (m, 7) as simulated.
+        inertials: (m, p) of each load.
+        link_inertia: (m,) [kg.m2].
+        dynamic: (m,) whose links' inertia counts.
+        offs: (m, c) error of the torque in each run [N.m].
+        shifts: (m, c) that it winds a mesh up by [rad].
+        motor: (m, 4) eccentricities [rad].
+        plays: (m,) which are play operators.
+        doubt: (m, 2) variance over the square of the interval [-], and beside it [rad2].
+        offset: (k,) zeros of all readings [rad, m].
+    """
+
+    columns: np.ndarray
+    inwards: np.ndarray
+    values: np.ndarray
+    inertials: np.ndarray
+    link_inertia: np.ndarray
+    dynamic: np.ndarray
+    offs: np.ndarray
+    shifts: np.ndarray
+    motor: np.ndarray
+    plays: np.ndarray
+    doubt: np.ndarray
+    offset: np.ndarray
+
+
+@njit(cache=True, error_model="numpy")
+def loaded(
+    tree: RigidTree, drives: Drives, root: np.ndarray, work: np.ndarray, found: TreeDynamics, moving: np.ndarray,
+    samples: np.ndarray,
+) -> None:  # fmt: skip
+    """Dynamics of one sample into `found`, and what moves each link into `samples` (4, m).
+
+    `moving` (3, k) are readings, velocities and accelerations, `root` and `work` as of `rigid_tree`.
+    """
+    angle, v, a = np.empty((1, moving.shape[1])), moving[1:2], moving[2:3]
+    for j in range(moving.shape[1]):
+        angle[0, j] = moving[0, j] - drives.offset[j]
+    sample(tree, angle, v, a, root, work, found)
+    x, y, z, p = root[0, 6], root[0, 7], root[0, 8], found.regressor.shape[2]
+    for i in range(len(drives.columns)):
+        c, phi, pull = drives.columns[i], drives.inertials[i], found.coupling[0, drives.columns[i]]
+        torque, inertia = found.torque[0, c] + drives.link_inertia[i] * a[0, c], found.inertia[0, c, c]
+        for k in range(p):
+            torque += found.regressor[0, c, k] * phi[k]
+        tilt_x, tilt_y = pull[1] * z - pull[2] * y, pull[2] * x - pull[0] * z
+        torque += tilt_x * (phi[p] - found.moment[0, 0] * phi[p + 2])
+        torque += tilt_y * (phi[p + 1] - found.moment[0, 1] * phi[p + 2])
+        samples[Q, i], samples[V, i], samples[TORQUE, i] = moving[0, c], v[0, c], torque
+        samples[INERTIA, i] = max(inertia + drives.link_inertia[i], LIGHT) if drives.dynamic[i] else LIGHT
+
+
+@njit(cache=True, error_model="numpy")
+def _along(a: np.ndarray, b: np.ndarray, i: int, dt: float, s: float) -> float:
+    """How far motor i [rad] is after a share s of dt [s] on the cubic between samples a and b (4, m)."""
+    p, r, d = a[V, i] * dt, b[V, i] * dt, b[Q, i] - a[Q, i]
+    return s * (p + s * (3.0 * d - 2.0 * p - r + s * (p + r - 2.0 * d)))
+
+
+@njit(cache=True, error_model="numpy")
+def together(
+    links: np.ndarray, a: np.ndarray, b: np.ndarray, M: np.ndarray, dt: float, longest: float, drives: Drives
+) -> np.ndarray:
+    """Move links (m, 3), that are no play operators, from samples a to b (4, m); mean accelerations of deltas (m,).
+
+    M (k, k) is the inertia of all joints at b. Steps are no longer than `longest` [s].
+    """
+    m, columns, still = len(links), drives.columns, True
+    new, acceleration, mean = links.copy(), np.zeros(m), np.zeros(m)
+    for i in range(m):
+        moved = abs(b[Q, i] - a[Q, i]) + abs(a[V, i] * dt) + abs(b[V, i] * dt) + abs(links[i, 1]) * dt
+        still = still and moved < STILL
+    n = 1 if still else max(1, int(np.ceil(dt / longest - 1e-6)))
+    h = dt / n
+    for k in range(n):
+        s, before = (k + 1) / n, k / n
+        acceleration[:] = 0.0
+        for _ in range(SWEEPS):
+            for i in drives.inwards:
+                if drives.plays[i]:
+                    continue
+                torque, c = a[TORQUE, i] + s * (b[TORQUE, i] - a[TORQUE, i]), contact(drives.values[i])
+                inertia = a[INERTIA, i] + s * (b[INERTIA, i] - a[INERTIA, i])
+                for other in range(m):
+                    if other != i:
+                        torque -= M[columns[i], columns[other]] * acceleration[other]
+                dq = _along(a, b, i, dt, s) - _along(a, b, i, dt, before)
+                x, rate, slider = links[i]
+                new[i] = stepped(x, rate, slider, dq, torque, inertia, h, c)
+                acceleration[i] = (new[i, 1] - rate) / h
+        links[:] = new
+        mean += acceleration / n
+    return mean
+
+
+@njit(cache=True, error_model="numpy")
+def streamed(
+    states: np.ndarray, before: np.ndarray, samples: np.ndarray, M: np.ndarray, dt: float, longest: float,
+    drives: Drives,
+) -> None:  # fmt: skip
+    """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`.
+
+    M (k, k) is the inertia of all joints at `samples`. The first runs, which are likely, move together; each other one
+    moves alone, loaded by what the first runs of the other links do.
+    """
+    m, columns = samples.shape[1], drives.columns
+    room = np.zeros((5, m))
+    room[1] = dt
+    a = Drive(room[0], before[Q], before[V], room[2], before[INERTIA], room[4])
+    b = Drive(room[1], samples[Q], samples[V], room[3], samples[INERTIA], room[4])
+    acceleration = together(states[:, 0], before, samples, M, dt, longest, drives)
+    for i in range(m):
+        for other in range(m):
+            if other != i:
+                b.coupled[i] -= M[columns[i], columns[other]] * acceleration[other]
+        c = contact(drives.values[i])
+        for j in range(0 if drives.plays[i] else 1, states.shape[1]):
+            a.torque[i], b.torque[i] = before[TORQUE, i] + drives.offs[i, j], samples[TORQUE, i] + drives.offs[i, j]
+            x = states[i, j]
+            if drives.plays[i]:
+                x[0] = carried(x[0] + b.q[i] - a.q[i], b, i, drives.values[i])
+            else:
+                x[0], x[1], x[2] = advanced(x[0], x[1], x[2], a, i, b, i, longest, c)
+
+
+@njit(cache=True, error_model="numpy")
+def walked(
+    states: np.ndarray, t: np.ndarray, samples: np.ndarray, M: np.ndarray, longest: float, drives: Drives
+) -> np.ndarray:
+    """delta (n, m, c) [rad] of states (m, c, 3), as of `streamed`, along samples (n, 4, m), t (n,) [s], M (n, k, k)."""
+    found = np.empty((len(t), *states.shape[:2]))
+    found[0] = states[:, :, 0]
+    for k in range(1, len(t)):
+        streamed(states, samples[k - 1], samples[k], M[k], t[k] - t[k - 1], longest, drives)
+        found[k] = states[:, :, 0]
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarray) -> None:
+    """Angles (4, 1, k) behind readings q (k,): likely, least, largest; variance."""
+    for j in range(len(q)):
+        out[0, 0, j] = out[1, 0, j] = out[2, 0, j] = q[j]
+        out[3, 0, j] = 0.0
+    for i in range(len(drives.columns)):
+        c, e = drives.columns[i], drives.motor[i]
+        top, bottom, theta = -np.inf, np.inf, q[c] - drives.offset[c]
+        for j in range(states.shape[1]):
+            delta = states[i, j, 0] - drives.shifts[i, j]
+            top, bottom = max(top, delta), min(bottom, delta)
+        bare = q[c] - e[0] * np.cos(theta) - e[1] * np.sin(theta) - e[2] * np.cos(2 * theta) - e[3] * np.sin(2 * theta)
+        out[0, 0, c] = bare - (states[i, 0, 0] - drives.shifts[i, 0])
+        out[1, 0, c], out[2, 0, c] = bare - top, bare - bottom
+        out[3, 0, c] = drives.doubt[i, 0] * (top - bottom) ** 2 + drives.doubt[i, 1]
+
+
+@njit(cache=True, error_model="numpy")
+def advanced_drives(
+    tree: RigidTree, drives: Drives, root: np.ndarray, work: np.ndarray, found: TreeDynamics, moving: np.ndarray,
+    before: np.ndarray, states: np.ndarray, dt: float, longest: float, samples: np.ndarray, angles: np.ndarray,
+) -> None:  # fmt: skip
+    """`loaded`, `streamed` and `link_angles` of a sample dt [s] after `before`."""
+    loaded(tree, drives, root, work, found, moving, samples)
+    streamed(states, before, samples, found.inertia[0], dt, longest, drives)
+    link_angles(states, moving[0], drives, angles)
