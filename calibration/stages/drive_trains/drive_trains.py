@@ -80,7 +80,7 @@ class DriveTrains:
 
     @property
     def inwards(self) -> tuple[DriveTrain, ...]:
-        """The drive trains, those nearer to the hand first: how their links move loads those that carry them."""
+        """The drive trains, those nearer to the hand first."""
         order = {self.joints[column]: i for i, column in enumerate(self.dynamics.tree.column)}
         return tuple(sorted(self.trains, key=lambda train: -order[train.joint]))
 
@@ -151,13 +151,12 @@ class DriveTrains:
         """(m, n, runs) [rad] of each drive train, what its torques are off by taken off as a mesh in contact has it."""
         if not self.trains:
             return np.zeros((0, len(loads.t), runs))
-        of, samples = [], np.empty((len(loads.t), 4, len(self.trains)))
+        samples = np.empty((len(loads.t), 4, len(self.trains)))
         for i, train in enumerate(self.trains):
-            of.append(
-                drive_motion([loads], self.joints.index(train.joint), train.inertials if len(train.inertials) else None)
-            )
-            torque = of[i].torque + train.link_inertia * of[i].a
-            samples[:, :, i] = np.stack([of[i].q, of[i].v, torque, train.moved_inertia(of[i].inertia)], axis=1)
+            column = self.joints.index(train.joint)
+            own = drive_motion([loads], column, train.inertials if len(train.inertials) else None)
+            torque = own.torque + train.link_inertia * own.a
+            samples[:, :, i] = np.stack([own.q, own.v, torque, train.moved_inertia(own.inertia)], axis=1)
         drives = prepared(self)
         states = np.ascontiguousarray(begun(self, drives, samples[0, TORQUE])[:, :runs])
         found = link_streams.walked(states, loads.t, samples, loads.inertia, LONGEST, drives)

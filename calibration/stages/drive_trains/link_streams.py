@@ -4,8 +4,8 @@
 
 Within a step a link is moved by what the others do in the same step, SWEEPS times from the hand inwards (Gauss-Seidel
 on the blocks of M): first by links nearer to the hand, then by those that carry it, too. A link that strikes in its
-gap throws the link that carries it, and is thrown by it. Reference: Moreau, Unilateral Contact and Dry Friction in
-Finite Freedom Dynamics, 1988 (the same sweeps on impulses).
+gap throws the link that carries it, and is thrown by it. Reference: Jean, The non-smooth contact dynamics method,
+Comput. Methods Appl. Mech. Engrg. 1999 (the same sweeps over contacts).
 """
 
 from typing import NamedTuple
