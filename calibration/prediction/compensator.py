@@ -177,9 +177,9 @@ class Compensator:
             if self.slipping is None or self.slipping.source != "plate":
                 moved = there.moved(t, w)
             else:
-                moved, spread = self.slipping.moved(there, t, q, w, hand)
+                moved, spread = self.slipping.moved(there, t, q, w, wrist)
         elif base is not None and self.slipping is not None and self.slipping.source != "plate" and continuous(t):
-            moved, spread = self.slipping.moved(base, t, q, None, hand)
+            moved, spread = self.slipping.moved(base, t, q, None, wrist)
         known = velocity is not None or continuous(t)
         T = placed(T_lab_base_start, moved, len(t))
         if self.arm is not None:

@@ -24,7 +24,7 @@ from calibration.recording.trial import REST
 from calibration.robot.kinematics import shift
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
-from calibration.robot.wrist_sensor import UNSEEN, HandLoads
+from calibration.robot.wrist_sensor import UNSEEN
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, Readings, wrenches_along
 from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, STEPS, VELOCITY, Bases
@@ -109,7 +109,7 @@ class SlippingBase:
         t: np.ndarray,
         q_motor: np.ndarray,
         wrench: np.ndarray | None,
-        hand: HandLoads = UNSEEN,
+        wrist: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """How the base moved in the lab (n, 4, 4) and variances (n, 6) of its displacement in frame 0.
 
@@ -119,10 +119,11 @@ class SlippingBase:
             NotEnoughData: Less than a second, or nothing says what point the wrench is about.
         """
         load = None if wrench is None else at.load(t, wrench, CUTOFF)
+        hand = UNSEEN if self.trains is None or wrist is None else self.trains.hand(t, q_motor, wrist)
         readings = Readings(t, q_motor, hand)
         wrenches, links = wrenches_along(self.lab, readings, load, at.T_lab_0), None
         if self.trains is not None:
-            links = Links(self.lab, self.trains, readings, at.T_lab_0)
+            links = Links(self.lab, self.trains, readings, at.T_lab_0, wrist)
         forcing = forced(self.model, wrenches, self.source, links)
         x, variance = (interpolate_columns(t, forcing.t, found) for found in self.model.displacement(forcing))
         return at.in_lab(x), variance

@@ -14,6 +14,8 @@ A hand that nothing pushes acts on the floor by
 
     h = w - [f + w]        [.]: below 1 Hz, of masses, zeros and drift; what is faster is how links and base move it
 
+with f on a base that moves, where that is known: one that slides moves the hand slower than that, too.
+
 The sensor shows what hangs there besides, too: linear in a mass and its first moment, see `drive_trains.hung_load`.
 """
 
@@ -134,13 +136,18 @@ class WristSensor:
             return None
         return Push(self._on_body(t, read.t, read.wrench - zero), self.tree)
 
-    def hand(self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray, nominal: RigidTree) -> Push | None:
-        """h of a hand that nothing pushes, in the place of what nominally hangs there; None without a second of it."""
+    def hand(
+        self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray, nominal: RigidTree, base: np.ndarray | None = None
+    ) -> Push | None:
+        """h of a hand that nothing pushes, in the place of what nominally hangs there; None without a second of it.
+
+        `base` (n, 6) is the proper acceleration of the root at t; None: it is at rest.
+        """
         try:
             read = smoothed(t, q, wrench)
         except NotEnoughData:
             return None
-        off = self._moved(read) + read.wrench
+        off = self._moved(read, None if base is None else interpolate_columns(read.t, t, base)) + read.wrench
         slow = low_passed(Signal(read.t, off, np.ones(len(off), dtype=bool)), _SLOW).x
         return Push(self._on_body(t, read.t, read.wrench - slow), nominal, outside=False)
 
@@ -174,9 +181,10 @@ class WristSensor:
         """A wrench in the last body's axes, at other times."""
         return interpolate_columns(t, at, wrench @ pin.SE3(self.body).dualAction.T)
 
-    def _moved(self, at: "SmoothReadings") -> np.ndarray:
-        """f (n, 6) in the sensor's axes about its origin."""
-        found = dynamics_along(self.tree, at.q, at.v, at.a, self.at_rest)
+    def _moved(self, at: "SmoothReadings", base: np.ndarray | None = None) -> np.ndarray:
+        """f (n, 6) in the sensor's axes about its origin, on a root of proper acceleration (n, 6) or at rest."""
+        root = self.at_rest if base is None else np.concatenate([np.zeros(base.shape), base], axis=1)
+        found = dynamics_along(self.tree, at.q, at.v, at.a, root)
         T = self.root @ self.chain.poses(at.q[:, self.chain.columns], self.link)
         R, moment = T[:, :3, :3], found.root[:, 3:] - np.cross(T[:, :3, 3], found.root[:, :3])
         f = [(found.root[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]]

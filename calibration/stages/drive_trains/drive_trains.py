@@ -124,9 +124,9 @@ class DriveTrains:
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
         return base_acceleration(self.dynamics.gravity, t, T_lab_root, at, by_plate)
 
-    def hand(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray) -> HandLoads:
-        """What the wrist's sensor (n, 6) shows of the hand, see `hand_load`."""
-        return hand_load(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist)
+    def hand(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray, base: np.ndarray | None = None) -> HandLoads:
+        """What the wrist's sensor (n, 6) shows of the hand on a base (n, 6) as `base_acceleration` has it."""
+        return hand_load(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist, base)
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""

@@ -103,6 +103,7 @@ def hand_load(
     t: np.ndarray,
     q: np.ndarray,
     wrench: np.ndarray,
+    base: np.ndarray | None = None,
 ) -> HandLoads:
     """What the sensor shows of the hand in a trial beside what hangs there by calibration.
 
@@ -117,6 +118,7 @@ def hand_load(
         t: (n,) [s].
         q: (n, k) motor readings less their zeros [rad, m].
         wrench: (n, 6) readings of the sensor.
+        base: (n, 6) proper acceleration of the root, see `torques.base_acceleration`; None: it is at rest.
     """
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
     if sensor is None:
@@ -129,7 +131,7 @@ def hand_load(
     if hung is None:
         return UNSEEN
     if mass == hung.payload:
-        return HandLoads(None, sensor.carrying(known).hand(t, q, wrench, sensor.tree))
+        return HandLoads(None, sensor.carrying(known).hand(t, q, wrench, sensor.tree, base))
     try:
         read = smoothed(t, q, wrench)
         row = (*_means(sensor, read), mass)
@@ -137,7 +139,7 @@ def hand_load(
         return UNSEEN
     x, _ = _fitted([row], np.append(hung.links, hung.centre), hung.covariance)
     found = replace(hung, links=x[:4], centre=x[4:]).added(mass)
-    floor = sensor.carrying(found).hand(t, q, wrench, sensor.tree)
+    floor = sensor.carrying(found).hand(t, q, wrench, sensor.tree, base)
     return HandLoads(sensor.alone(known - found).lacking(len(t)), floor)
 
 

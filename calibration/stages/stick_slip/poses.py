@@ -102,17 +102,21 @@ class Links(NamedTuple):
         trains: Its drive trains with the same.
         readings: Of its motors.
         T_lab_0: (4, 4) frame 0.
+        wrist: (n, 6) readings of the wrist's sensor; None without.
     """
 
     lab: Laboratory
     trains: DriveTrains
     readings: Readings
     T_lab_0: np.ndarray
+    wrist: np.ndarray | None = None
 
     def load(self, t: np.ndarray, T_lab_base: np.ndarray) -> Load:
         """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known."""
         at, q, hand = self.readings
         moving = self.trains.base_acceleration(t, T_lab_base, at)
+        if self.wrist is not None:
+            hand = self.trains.hand(at, q, self.wrist, moving)
         loads = self.trains.dynamics.loads("", at, q, moving, hand.joints)
         angles, twist = (
             self.trains.likely(loads) - self.trains.dynamics.offset,
@@ -125,7 +129,7 @@ def links_of(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, T
     """The links in a whole trial with its payload, and what else loads the hand."""
     lab, trains = lab.of_trial(trial.id), trains.of_trial(trial.id)
     t, q, wrench = readings_of(robot, trial)
-    return Links(lab, trains, Readings(t, q, trains.hand(t, q, wrench)), T_lab_0)
+    return Links(lab, trains, Readings(t, q), T_lab_0, wrench)
 
 
 class Arm(NamedTuple):
