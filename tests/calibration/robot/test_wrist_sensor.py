@@ -92,13 +92,13 @@ def test_a_base_that_accelerates_under_a_pushed_hand_loads_the_joints_once():
     np.testing.assert_allclose((both - moving)[rows], pushed[rows], atol=0.02)
 
 
-@pytest.mark.parametrize(("hertz", "share"), [(4.0, 1.0), (0.2, 0.0)])
-def test_a_hand_acts_on_the_floor_as_the_sensor_shows_it_to_move(hertz, share):
-    """What is slow is taken for masses and drift."""
+@pytest.mark.parametrize(("hertz", "known", "share"), [(4.0, False, 1.0), (0.2, False, 0.0), (0.2, True, 1.0)])
+def test_a_hand_acts_on_the_floor_as_the_sensor_shows_it_to_move(hertz, known, share):
+    """What is slow is taken for masses and drift, but what a base does of which it is known how it moves."""
     q, w, _ = readings(np.zeros(3))
-    _, seen = shaken(hertz)
-    sensor = wrist_sensor(LAB.urdf, HUNG)
-    hand = sensor.hand(T, q, w + seen, sensor.tree)
+    a, seen = shaken(hertz)
+    sensor, base = wrist_sensor(LAB.urdf, HUNG), dynamics(LAB.urdf, HUNG, np.zeros(8)).root(None)[:, 6:] + a
+    hand = sensor.hand(T, q, w + seen, sensor.tree, base if known else None)
     nominal, moved = (motion_load(LAB, T, q, np.eye(4), 20.0, push).signal.x for push in (None, hand))
     acts = seen @ pin.SE3(LAB.chain.poses(Q[None], LINK)[0]).dualAction.T
     rows = slice(150, 350)
