@@ -1,8 +1,7 @@
 """What inverse dynamics cannot know and a plate can: slow, run by `make slow`.
 
 Row `full`, seed 4, the short campaign. With 2 kg both back casters are off the floor at the start, and how far a drive
-slides depends on a few newtons of its load: on other robots and whole campaigns the error with 2 kg by the plate is up
-to 1.7 times the usual one, docs/limits.md.
+slides depends on a few newtons of its load: on other robots and whole campaigns see `test_payload_series.py`.
 """
 
 import json
