@@ -23,7 +23,7 @@ from calibration.robot.laboratory import Laboratory
 from calibration.robot.wrist_sensor import UNSEEN, HandLoads, hand_push
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
-from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
+from calibration.stages.stick_slip.kernel.heaving import Springs, damped, heaving
 from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import Forcing, WrenchSources, forcing_of
@@ -279,8 +279,8 @@ def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcin
     """z, rx, ry of a base while it slips, see `kernel.heaving`."""
     h, order, t = np.ix_(HEAVE, HEAVE), [*PLANE, *HEAVE], forcing.t
     standing, M = tilting.standing(wrenches.wheels, "dynamics"), _resampled(wrenches.t, wrenches.M, t)
-    rest, leans = forcing.rest[[*HEAVE]], tilting.leans(vertical(forcing.rest[None])[0])
-    springs = Springs(tilting.K[h], tilting.C[h], (tilting.K + forcing.tangent)[h], rest, standing, leans)
+    K, C, leans = tilting.K[h], tilting.C[h], tilting.leans(vertical(forcing.rest[None])[0])
+    springs = Springs(K, damped(K, C), K + forcing.tangent[h], forcing.rest[[*HEAVE]], standing, leans)
     w = CubicSpline(t, forcing.w[:, order])(t[0] + np.arange(STEPS * len(t)) * STEP)
     state, wheels, own = slips.state[0].copy(), slips.wheels[0].copy(), np.ascontiguousarray(M[:, order][:, :, order])
     found = heaving(state, wheels, slips.lanes[0], np.ascontiguousarray(w), own, _inertia(M), springs, STEP)

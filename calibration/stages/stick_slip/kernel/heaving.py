@@ -40,6 +40,17 @@ class Springs(NamedTuple):
     leans: np.ndarray
 
 
+def damped(K: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """Dampers (3, 3) that damp heave at least as long as tilt, C / K of the same wheels.
+
+    The robot's motions hardly show those of heave: where they are found to be next to none it rings up as wheels lift.
+    """
+    lag = np.diag(C)[1:] / np.diag(K)[1:]
+    found = C.copy()
+    found[0, 0] = max(C[0, 0], K[0, 0] * float(lag.min()))
+    return found
+
+
 @njit(cache=True, error_model="numpy")
 def _by(A: np.ndarray, x: np.ndarray) -> np.ndarray:
     """A x of a matrix (3, 3): a call of linear algebra takes longer."""

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from calibration.stages.stick_slip.forcing import STEP, STEPS
 from calibration.stages.stick_slip.kernel.bases import VECTOR
-from calibration.stages.stick_slip.kernel.heaving import Springs, heaving
+from calibration.stages.stick_slip.kernel.heaving import Springs, damped, heaving
 from calibration.stages.stick_slip.likelihood import bases_of
 from tests.calibration.stages.stick_slip.slipping import MASS, POSITION, TRUTH, WEIGHT, WHEELS
 
@@ -98,3 +98,9 @@ def test_wheels_that_lift_off_do_not_pull_the_base_back():
     assert lifted > 1.15 * held
     calm = swung(0.3)
     np.testing.assert_allclose(found(TRUTH, calm, free), found(TRUTH, calm, glued), atol=1e-12)
+
+
+def test_heave_is_damped_as_long_as_tilt_is_at_least() -> None:
+    K, C = np.diag([1e6, 2e4, 1.6e4]), np.diag([60.0, 200.0, 240.0])
+    np.testing.assert_allclose(np.diag(damped(K, C)), [1e4, 200.0, 240.0])
+    np.testing.assert_array_equal(damped(K, C + np.diag([2e4, 0.0, 0.0])), C + np.diag([2e4, 0.0, 0.0]))
