@@ -141,11 +141,11 @@ class DriveTrain:
         self, drive: "DriveMotion", torque: np.ndarray, starts: np.ndarray, longest: float = LONGEST
     ) -> np.ndarray:
         """delta (n,) [rad] under torques (n,) [N.m], from `starts` (m,) where trials begin; steps of `longest` [s]."""
-        still = np.zeros(len(drive.q))
+        alone = np.zeros(len(drive.q))
         if not self.dynamic and self.form == "dead_zone":
-            own = Drive(drive.t, drive.q, drive.v, torque, drive.inertia, still)
+            own = Drive(drive.t, drive.q, drive.v, torque, drive.inertia, alone)
             return np.asarray(played(own, drive.begins, starts, self.values))
-        own = Drive(drive.t, drive.q, drive.v, torque, self.moved_inertia(drive.inertia), still)
+        own = Drive(drive.t, drive.q, drive.v, torque, self.moved_inertia(drive.inertia), alone)
         return np.asarray(simulated(own, drive.begins, starts, longest, self.simulated_values))
 
     def moved_inertia(self, nominal: np.ndarray) -> np.ndarray:

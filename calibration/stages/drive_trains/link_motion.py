@@ -122,6 +122,12 @@ def stepped(
 
 
 @njit(cache=True, error_model="numpy")
+def along(p: float, r: float, d: float, s: float) -> float:
+    """How far a motor is [rad] after a share s of d on the cubic that begins with the slope p and ends with r."""
+    return s * (p + s * (3.0 * d - 2.0 * p - r + s * (p + r - 2.0 * d)))
+
+
+@njit(cache=True, error_model="numpy")
 def advanced(
     x: float, rate: float, slider: float, a: Drive, i: int, b: Drive, j: int, longest: float, c: Contact
 ) -> tuple[float, float, float]:
@@ -139,7 +145,7 @@ def advanced(
         n = 1
     for k in range(n):
         s = (k + 1) / n
-        at = s * (p + s * (3.0 * d - 2.0 * p - r + s * (p + r - 2.0 * d)))
+        at = along(p, r, d, s)
         x, rate, slider = stepped(x, rate, slider, at - before, torque + s * more, inertia + s * heavier, dt / n, c)
         before = at
     return x, rate, slider

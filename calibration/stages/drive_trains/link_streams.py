@@ -14,7 +14,7 @@ import numpy as np
 
 from calibration.numerics.compiled import njit
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, sample
-from calibration.stages.drive_trains.link_motion import LIGHT, STILL, Drive, advanced, carried, contact, stepped
+from calibration.stages.drive_trains.link_motion import LIGHT, STILL, Drive, advanced, along, carried, contact, stepped
 
 Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
 SWEEPS = 2
@@ -79,13 +79,6 @@ def loaded(
 
 
 @njit(cache=True, error_model="numpy")
-def _along(a: np.ndarray, b: np.ndarray, i: int, dt: float, s: float) -> float:
-    """How far motor i [rad] is after a share s of dt [s] on the cubic between samples a and b (4, m)."""
-    p, r, d = a[V, i] * dt, b[V, i] * dt, b[Q, i] - a[Q, i]
-    return s * (p + s * (3.0 * d - 2.0 * p - r + s * (p + r - 2.0 * d)))
-
-
-@njit(cache=True, error_model="numpy")
 def together(
     links: np.ndarray, a: np.ndarray, b: np.ndarray, M: np.ndarray, dt: float, longest: float, drives: Drives
 ) -> np.ndarray:
@@ -112,7 +105,8 @@ def together(
                 for other in range(m):
                     if other != i:
                         torque -= M[columns[i], columns[other]] * acceleration[other]
-                dq = _along(a, b, i, dt, s) - _along(a, b, i, dt, before)
+                p, r, d = a[V, i] * dt, b[V, i] * dt, b[Q, i] - a[Q, i]
+                dq = along(p, r, d, s) - along(p, r, d, before)
                 x, rate, slider = links[i]
                 new[i] = stepped(x, rate, slider, dq, torque, inertia, h, c)
                 acceleration[i] = (new[i, 1] - rate) / h

@@ -16,6 +16,7 @@ from calibration.numerics.signals import RATE, Signal, even, interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
+from calibration.robot.wrist_sensor import UNSEEN
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved
 from calibration.stages.stick_slip.forcing import (
@@ -109,14 +110,13 @@ class Links(NamedTuple):
     trains: DriveTrains
     readings: Readings
     T_lab_0: np.ndarray
-    wrist: np.ndarray | None = None
+    wrist: np.ndarray | None
 
     def load(self, t: np.ndarray, T_lab_base: np.ndarray) -> Load:
         """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known."""
-        at, q, hand = self.readings
+        at, q, _ = self.readings
         moving = self.trains.base_acceleration(t, T_lab_base, at)
-        if self.wrist is not None:
-            hand = self.trains.hand(at, q, self.wrist, moving)
+        hand = UNSEEN if self.wrist is None else self.trains.hand(at, q, self.wrist, moving)
         loads = self.trains.dynamics.loads("", at, q, moving, hand.joints)
         angles, twist = (
             self.trains.likely(loads) - self.trains.dynamics.offset,
