@@ -110,7 +110,7 @@ class Links(NamedTuple):
     trains: DriveTrains
     readings: Readings
     T_lab_0: np.ndarray
-    wrist: np.ndarray | None
+    wrist: np.ndarray | None = None
 
     def load(self, t: np.ndarray, T_lab_base: np.ndarray) -> Load:
         """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known."""
