@@ -26,8 +26,17 @@ from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
 from calibration.robot.wrist_sensor import UNSEEN
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE, UPPER, Readings, wrenches_along
-from calibration.stages.stick_slip.kernel.bases import ACCELERATION, COLUMNS, STEPS, VELOCITY, Bases
+from calibration.stages.stick_slip.forcing import CUTOFF, Readings, wrenches_along
+from calibration.stages.stick_slip.kernel.bases import (
+    ACCELERATION,
+    COLUMNS,
+    HEAVE,
+    PLANE,
+    STEPS,
+    UPPER,
+    VELOCITY,
+    Bases,
+)
 from calibration.stages.stick_slip.kernel.lifted import bear
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import Links, forced

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.stages.stick_slip.band import Band, LeftOut, block_means, ensemble_of, fitted_band, reached
-from calibration.stages.stick_slip.forcing import PLANE
+from calibration.stages.stick_slip.kernel.bases import PLANE
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.model import Direction
 from calibration.stages.stick_slip.search import FRICTIONS, Point, settled, sketched, tried

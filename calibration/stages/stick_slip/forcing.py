@@ -22,8 +22,8 @@ from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.wrist_sensor import UNSEEN, HandLoads, hand_push
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, PLATE, STEPS, Bases
-from calibration.stages.stick_slip.kernel.heaving import Springs, damped, heaving
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, HEAVE, PLANE, PLATE, STEPS, Bases, inertia_rows
+from calibration.stages.stick_slip.kernel.heaving import Springs, accelerations, damped, heaving
 from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import Forcing, WrenchSources, forcing_of
@@ -35,8 +35,6 @@ from calibration.stages.suspension.weighing import leans
 
 CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
 STEP = 1.0 / (RATE * STEPS)
-PLANE, HEAVE = (0, 1, 5), (2, 3, 4)
-UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
 
 
@@ -198,8 +196,10 @@ def wheels_of(lab: Laboratory) -> WheelSet:
     return wheel_set(lab.urdf, lab.description.wheels, float(np.linalg.norm(lab.description.gravity)))
 
 
-def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> PlanarForcing:
+def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source, balanced: bool = True) -> PlanarForcing:
     """The forcing by the plate with inverse dynamics, or by inverse dynamics alone.
+
+    `balanced`: whether what a plate misses of inverse dynamics tells how the base is shaken, see `kernel.heaving`.
 
     Raises:
         NotEnoughData: The wrench asked for was not recorded.
@@ -220,12 +220,13 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
         M = _resampled(wrenches.t, wrenches.M, t)
-        shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], heave(fine, 2))
+        rises = _rising(heave, dynamics, main, t, M)(fine) if balanced and main is not dynamics else heave(fine, 2)
+        shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], rises)
         drive[:, :3] = (CubicSpline(dynamics.signal.t, dynamics.signal.x)(fine) - shift)[:, PLANE]
         drive[:, :3] -= drive[rest, :3].mean(axis=0)
-        rows[:, :6] = _inertia(M)[:, :6]
+        rows[:, :6] = inertia_rows(M)[:, :6]
         if main is dynamics:
-            load, rows = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0), _inertia(M)
+            load, rows = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0), inertia_rows(M)
     drive[:, 3:6] = vertical(load)
     if source == "plate":
         drive[:, 4:6] -= drive[:, 3:4] * tilting.off
@@ -233,6 +234,12 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source) -> Plan
     drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:] + tilting.leans(drive[rest, 3:6].mean(axis=0))
     own = slice(STEPS - 1, None, STEPS)
     return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[own], rest[own], linear(t), wrenches.pushed)
+
+
+def _rising(heave: CubicSpline, dynamics: Load, plate: Load, t: np.ndarray, M: np.ndarray) -> CubicSpline:
+    """Accelerations of z, rx, ry of a base on a plate, M (n, 6, 6) at t (n,), see `kernel.heaving`."""
+    own, borne = (CubicSpline(load.signal.t, load.signal.x)(t) for load in (dynamics, plate))
+    return CubicSpline(t, accelerations(t, heave(t, 2), own - borne, M))
 
 
 def _compliant(wrenches: Wrenches, tilting: Tilting, source: Source, load: Load) -> tuple[np.ndarray, np.ndarray]:
@@ -283,16 +290,8 @@ def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcin
     springs = Springs(K, damped(K, C), K + forcing.tangent[h], forcing.rest[[*HEAVE]], standing, leans)
     w = CubicSpline(t, forcing.w[:, order])(t[0] + np.arange(STEPS * len(t)) * STEP)
     state, wheels, own = slips.state[0].copy(), slips.wheels[0].copy(), np.ascontiguousarray(M[:, order][:, :, order])
-    found = heaving(state, wheels, slips.lanes[0], np.ascontiguousarray(w), own, _inertia(M), springs, STEP)
+    found = heaving(state, wheels, slips.lanes[0], np.ascontiguousarray(w), own, inertia_rows(M), springs, STEP)
     return CubicSpline(t, found[::STEPS])
-
-
-def _inertia(M: np.ndarray) -> np.ndarray:
-    """(n, 15) of M (n, 6, 6), as the kernel takes it: of a base that its own accelerations load."""
-    rows = np.empty((len(M), 15))
-    rows[:, :6] = np.stack([M[:, PLANE[i], PLANE[j]] for i, j in UPPER], axis=1)
-    rows[:, 6:] = (M[:, (2, 4, 3)][:, :, PLANE] * np.array([1.0, -1.0, 1.0])[:, None]).reshape(len(M), 9)
-    return rows
 
 
 def _resampled(t: np.ndarray, M: np.ndarray, at: np.ndarray) -> np.ndarray:

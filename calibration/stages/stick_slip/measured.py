@@ -20,7 +20,8 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import GAP, RATE, Signal
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
-from calibration.stages.stick_slip.forcing import HEAVE, PLANE, PlanarForcing
+from calibration.stages.stick_slip.forcing import PlanarForcing
+from calibration.stages.stick_slip.kernel.bases import HEAVE, PLANE
 from calibration.stages.suspension.base_response import base_response_of
 from calibration.stages.suspension.floor_wrench import Load
 from calibration.stages.suspension.modal_response import predicted

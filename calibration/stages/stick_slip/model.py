@@ -7,7 +7,8 @@ import numpy as np
 
 from calibration.errors import NoSuchElement
 from calibration.stages.stick_slip.band import Band, PlainBand, reached
-from calibration.stages.stick_slip.forcing import HEAVE, PLANE, STEP, PlanarForcing, Tilting
+from calibration.stages.stick_slip.forcing import STEP, PlanarForcing, Tilting
+from calibration.stages.stick_slip.kernel.bases import HEAVE, PLANE
 from calibration.stages.stick_slip.kernel.integration import simulated
 from calibration.stages.stick_slip.kernel.preloaded import noise_at_rest, weighed_along
 from calibration.stages.stick_slip.likelihood import bases_of

@@ -21,7 +21,6 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved
 from calibration.stages.stick_slip.forcing import (
     CUTOFF,
-    PLANE,
     STEP,
     STEPS,
     PlanarForcing,
@@ -31,7 +30,7 @@ from calibration.stages.stick_slip.forcing import (
     readings_of,
     wrenches_of,
 )
-from calibration.stages.stick_slip.kernel.bases import LOAD
+from calibration.stages.stick_slip.kernel.bases import HEAVE, LOAD, PLANE
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bases_of
@@ -113,16 +112,19 @@ class Links(NamedTuple):
     wrist: np.ndarray | None = None
 
     def load(self, t: np.ndarray, T_lab_base: np.ndarray) -> Load:
-        """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known."""
+        """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known.
+
+        The wrist's sensor leans with the base, and the hand weighs downwards: the hand is that of a base upright.
+        """
         at, q, _ = self.readings
-        moving = self.trains.base_acceleration(t, T_lab_base, at)
-        hand = UNSEEN if self.wrist is None else self.trains.hand(at, q, self.wrist, moving)
-        loads = self.trains.dynamics.loads("", at, q, moving, hand.joints)
-        angles, twist = (
-            self.trains.likely(loads) - self.trains.dynamics.offset,
-            planar_twist(t, T_lab_base, self.T_lab_0, at),
-        )
-        return motion_load(self.lab, at, angles, self.T_lab_0, CUTOFF, hand.floor, twist)
+        moving, in_plane = self.trains.base_acceleration(t, T_lab_base, at), upright(T_lab_base, self.T_lab_0)
+        joints = UNSEEN.joints if self.wrist is None else self.trains.hand(at, q, self.wrist, moving).joints
+        links, floor = self.trains.likely(self.trains.dynamics.loads("", at, q, moving, joints)), UNSEEN.floor
+        if self.wrist is not None:
+            moving = self.trains.base_acceleration(t, self.T_lab_0 @ from_vector(in_plane), at)
+            floor = self.trains.hand(at, links, self.wrist, moving).floor
+        twist = planar_twist(t, in_plane[:, PLANE], at)
+        return motion_load(self.lab, at, links - self.trains.dynamics.offset, self.T_lab_0, CUTOFF, floor, twist)
 
 
 def links_of(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, T_lab_0: np.ndarray) -> Links:
@@ -151,17 +153,24 @@ def moving_links(lab: Laboratory, arm: Arm, robot: Clock, trial: MeasuredTrial, 
     return links.load(trial.t_mocap, T_lab_B @ inverse(rest.T_0_B))
 
 
-def planar_twist(t: np.ndarray, T_lab_base: np.ndarray, T_lab_0: np.ndarray, at: np.ndarray) -> np.ndarray | None:
-    """Twist (n, 6) [m/s, rad/s, base frame] in the floor's plane at times `at` (n,), of poses (m, 4, 4) at t (m,)."""
+def upright(T_lab_base: np.ndarray, T_lab_0: np.ndarray) -> np.ndarray:
+    """x, y, 0, 0, 0, yaw (m, 6) [m, rad, frame 0] of poses (m, 4, 4)."""
+    x = to_vector(inverse(T_lab_0) @ T_lab_base)
+    x[:, HEAVE] *= 0.0  # NaN where not known
+    return x
+
+
+def planar_twist(t: np.ndarray, seen: np.ndarray, at: np.ndarray) -> np.ndarray | None:
+    """Twist (n, 6) [m/s, rad/s, base frame] in the floor's plane at times `at` (n,), of x, y, yaw (m, 3) at t (m,)."""
     try:
-        seen = even(t, to_vector(inverse(T_lab_0) @ T_lab_base)[:, PLANE])
+        plane = even(t, seen)
     except NotEnoughData:
         return None
-    x = low_passed(seen, CUTOFF).x
+    x = low_passed(plane, CUTOFF).x
     v, c, s = np.gradient(x, 1.0 / RATE, axis=0), np.cos(x[:, 2]), np.sin(x[:, 2])
     twist = np.zeros((len(v), 6))
     twist[:, 0], twist[:, 1], twist[:, 5] = c * v[:, 0] + s * v[:, 1], c * v[:, 1] - s * v[:, 0], v[:, 2]
-    return interpolate_columns(at, seen.t, twist)
+    return interpolate_columns(at, plane.t, twist)
 
 
 def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | None) -> PlanarForcing:
@@ -173,8 +182,8 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
         NotEnoughData: The wrench was not recorded.
         NoSuchElement: The model was not fitted from that source.
     """
-    slips, links = model.direction(source).slips, links if links is not None and links.trains.trains else None
-    forcing = planar_forcing(wrenches, model.tilting, source)
+    found, links = model.direction(source), links if links is not None and links.trains.trains else None
+    slips, forcing = found.slips, planar_forcing(wrenches, model.tilting, source, found.by_plate)
     if links is None and not slips.any():
         return forcing
     x, _ = model.displacement(forcing)
@@ -186,7 +195,7 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
     elif slips.any():
         likely = model.direction(source).logarithms
         wrenches = replace(wrenches, slips=bases_of(model.wheels, likely[None], corrected=False))
-    return planar_forcing(wrenches, model.tilting, source)
+    return planar_forcing(wrenches, model.tilting, source, found.by_plate)
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:

@@ -86,7 +86,11 @@ def fit_stick_slip(
     fits += [fit_direction(source, own, warmed(own, fits[0].logarithms)) for source, _, own in others]
     shift, chi2 = shifts_of_wheels(usable[0][2], usable[0][1], fits[0])
     if _behind(fits):
-        fits[0] = _uncorrected(fits, usable[0][2])
+        rows = _rows(sources.lab.description, read, campaign.tilting, "plate", balanced=False)
+        alone = replace(joined(wheels, rows, first.prior), corrected=False)
+        found = _uncorrected(fits, alone)
+        if found is not fits[0]:
+            fits[0], usable[0] = found, ("plate", rows, alone)
     directions = [linear_where(fit, suspension) for fit in fits]
     directions = [_banded(d, wheels, rows) for d, (_, rows, _) in zip(directions, usable, strict=True)]
     if len(directions) == len(SOURCES):
@@ -148,11 +152,11 @@ def _read_one(sources: WrenchSources, trial: Trial, suspension: Suspension, arm:
 
 
 def _rows(
-    description: Description, read: Sequence[Read], tilting: Tilting, source: Source
+    description: Description, read: Sequence[Read], tilting: Tilting, source: Source, balanced: bool = True
 ) -> list[tuple[PlanarForcing, PlanarMotion]]:
     def row(one: Read) -> tuple[PlanarForcing, PlanarMotion] | None:
         try:
-            forcing = planar_forcing(one.wrenches, tilting, source)
+            forcing = planar_forcing(one.wrenches, tilting, source, balanced)
             return forcing, planar_motion(description, one.trial, one.rest, forcing)
         except NotEnoughData as error:
             _log.info("%s from %s: %s", one.trial.id, source, error)
@@ -229,15 +233,14 @@ def _calm(directions: Sequence[Direction]) -> np.ndarray:
     return ~np.any([d.held_out.wild for d in directions], axis=0)
 
 
-def _uncorrected(fits: Sequence[Direction], campaign: Trials) -> Direction:
+def _uncorrected(fits: Sequence[Direction], alone: Trials) -> Direction:
     """The plate's direction, its force no correction where trials left out say so.
 
     Wheels that yield otherwise than by friction under their load, as casters that turn, make the simulated force wrong,
     not the position.
     """
-    alone = replace(campaign, corrected=False)
     tried = fit_direction("plate", alone, warmed(alone, fits[1].logarithms))
-    calm = _calm((fits[0], tried))
+    calm = ~tried.held_out.wild  # a trial that is wild by the correction alone speaks against it
     left = [np.log(d.held_out.only(calm).variance(np.ones(3, dtype=bool))).mean() for d in (fits[0], tried)]
     return tried if left[1] < left[0] + np.log(BETTER) else fits[0]
 

@@ -26,9 +26,19 @@ from calibration.numerics.side_by_side import side_by_side
 from calibration.numerics.signals import interpolate_columns
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
-from calibration.stages.stick_slip.forcing import HEAVE, Tilting, Wrenches
+from calibration.stages.stick_slip.forcing import Tilting, Wrenches
+from calibration.stages.stick_slip.kernel.bases import HEAVE
 from calibration.stages.stick_slip.kernel.lifted import on_wheels
-from calibration.stages.stick_slip.wheels import LENGTH, LOADS, PRIOR_SIGMA, WIDE, Prior, WheelSet, prior_by_tilt
+from calibration.stages.stick_slip.wheels import (
+    LENGTH,
+    LOADS,
+    LOGARITHMS,
+    PRIOR,
+    PRIOR_SIGMA,
+    WIDE,
+    Prior,
+    WheelSet,
+)
 from calibration.stages.suspension.base_response import (
     BaseResponse,
     WrenchSources,
@@ -50,6 +60,11 @@ _TOGETHER, _WORTH = 100, 20.0  # samples that err alike; chi-square that springs
 _LOST = 1e3  # what a base that does not settle is off [noise]
 _STEP, _SAME = 0.02, 1e-4  # of logarithms and LENGTH, for derivatives; share of them that a last step changes
 _PLACED = 5e-4  # [m] to which the plate's place is known at best
+_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 2))
+_KNOWN = np.array([0.3, 0.03, 0.05, 0.04])  # sigmas of the elements: heave hardly moves
+_MODEL = 0.05  # of a logarithm: loads are shared by more than springs
+_TYPES = ("drive", "front", "back")
+_RATIOS = np.array([[1.0, -1.0, 0.0], [0.0, -1.0, 1.0]])  # of drives and back casters to front ones, of logarithms
 
 
 @dataclass(frozen=True)
@@ -81,6 +96,48 @@ def tilting_of(
 
 def _prior(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
     return prior_by_tilt(wheels, K[np.ix_(HEAVE, HEAVE)], place)
+
+
+def prior_by_tilt(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
+    """The wide prior, its shares of the load by the stiffness K (3, 3) of z, rx, ry [N/m, N, N.m/rad].
+
+        K = sum_i k_i a_i a_i',   a_i = (1, y_i, -x_i)
+
+    Wheels share the load as their vertical springs do. The logarithms of the three types' k are fitted to K_zz, K_rx,
+    K_ry and K_z,ry each relative to sqrt(K_ii K_jj); ratios to front casters have the wide prior too, which decides
+    where a type is missing.
+
+    Args:
+        wheels: Of the robot.
+        K: Stiffness.
+        place: (2,) sigma of where the load is [m].
+    """
+    a = np.column_stack([np.ones(len(wheels.position)), wheels.position[:, 1], -wheels.position[:, 0]])
+    rows, columns = np.transpose(_ELEMENTS)
+    size = np.sqrt(np.diag(K))
+    size = size[rows] * size[columns]
+    own = [a[[kind == one for one in wheels.types]] for kind in _TYPES]
+    A = np.stack([(part.T @ part)[rows, columns] for part in own], axis=1) / (size * _KNOWN)[:, None]
+    b = K[rows, columns] / (size * _KNOWN)
+    weighted = _RATIOS / PRIOR_SIGMA[LOADS][:, None]
+
+    def residuals(log_k: np.ndarray) -> np.ndarray:
+        return np.concatenate([A @ np.exp(log_k) - b, weighted @ log_k])
+
+    def jacobian(log_k: np.ndarray) -> np.ndarray:
+        return np.concatenate([A * np.exp(log_k), weighted])
+
+    start = np.full(3, np.log(K[0, 0] / len(wheels.types)))
+    found = least_squares(residuals, start, jac=jacobian, method="lm")
+    return _sharing(found.x, np.linalg.pinv(found.jac.T @ found.jac), place)
+
+
+def _sharing(log_k: np.ndarray, covariance: np.ndarray, place: np.ndarray) -> Prior:
+    """The wide prior, its shares of the load as springs of log_k (3,) with a covariance (3, 3) have them."""
+    mean, sigma = PRIOR.copy(), PRIOR_SIGMA.copy()
+    mean[LOADS], sigma[LOADS] = _RATIOS @ log_k, np.sqrt(np.diag(_RATIOS @ covariance @ _RATIOS.T) + _MODEL**2)
+    sigma[LOGARITHMS:] = place / LENGTH
+    return Prior(mean, sigma)
 
 
 def _lifted(standing: np.ndarray, load: Load) -> float:
@@ -151,8 +208,8 @@ def _on_springs(
     if 2.0 * found.cost > sum(float((one.left(noise, *pulling) ** 2).sum()) for one in rocked) - _WORTH:
         return None
     K, off = stiffness(np.exp(found.x[:3]), found.x[3:] * LENGTH), found.x[3:] * LENGTH
-    sigma = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[3:] * LENGTH
-    prior = _prior(wheels, K, np.hypot(sigma, _PLACED))
+    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    prior = _sharing(found.x[:3], covariance[:3, :3], np.hypot(np.sqrt(np.diag(covariance)[3:]) * LENGTH, _PLACED))
     return Tilting(K, linear.C, off, prior.shares, off - linear.off + linear.over), prior
 
 

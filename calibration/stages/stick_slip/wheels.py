@@ -15,7 +15,6 @@ from functools import cached_property, lru_cache
 import numpy as np
 import pinocchio as pin
 from scipy.constants import g as STANDARD_GRAVITY
-from scipy.optimize import least_squares
 
 from calibration.errors import ShapeError
 from calibration.recording.schema import Wheel
@@ -33,10 +32,6 @@ DRIVES = 0.1  # of the logarithm of the drives' friction: a drive slides for hun
 _OWN = 0.8  # 1 - k / k_tyre
 PRELOADS = 16  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
-_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 2))
-_KNOWN = np.array([0.3, 0.03, 0.05, 0.04])  # sigmas of the elements: heave hardly moves
-_MODEL = 0.05  # of a logarithm: loads are shared by more than springs
-_TYPES = ("drive", "front", "back")
 LOADS = [NAMES.index("drive_load"), NAMES.index("back_load")]
 _ALIKE, _IN_PLACE = np.ones(2), np.zeros(2)
 _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal robot that is it
@@ -221,45 +216,6 @@ class WheelSet:
             A = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])
             K += A.T @ np.diag([kx, ky]) @ A
         return K
-
-
-def prior_by_tilt(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
-    """The wide prior, its shares of the load by the stiffness K (3, 3) of z, rx, ry [N/m, N, N.m/rad].
-
-        K = sum_i k_i a_i a_i',   a_i = (1, y_i, -x_i)
-
-    Wheels share the load as their vertical springs do. The logarithms of the three types' k are fitted to K_zz, K_rx,
-    K_ry and K_z,ry each relative to sqrt(K_ii K_jj); ratios to front casters have the wide prior too, which decides
-    where a type is missing.
-
-    Args:
-        wheels: Of the robot.
-        K: Stiffness.
-        place: (2,) sigma of where the load is [m].
-    """
-    a = np.column_stack([np.ones(len(wheels.position)), wheels.position[:, 1], -wheels.position[:, 0]])
-    rows, columns = np.transpose(_ELEMENTS)
-    size = np.sqrt(np.diag(K))
-    size = size[rows] * size[columns]
-    own = [a[[kind == one for one in wheels.types]] for kind in _TYPES]
-    A = np.stack([(part.T @ part)[rows, columns] for part in own], axis=1) / (size * _KNOWN)[:, None]
-    b = K[rows, columns] / (size * _KNOWN)
-    ratios = np.array([[1.0, -1.0, 0.0], [0.0, -1.0, 1.0]])
-    weighted = ratios / PRIOR_SIGMA[LOADS][:, None]
-
-    def residuals(log_k: np.ndarray) -> np.ndarray:
-        return np.concatenate([A @ np.exp(log_k) - b, weighted @ log_k])
-
-    def jacobian(log_k: np.ndarray) -> np.ndarray:
-        return np.concatenate([A * np.exp(log_k), weighted])
-
-    start = np.full(3, np.log(K[0, 0] / len(wheels.types)))
-    found = least_squares(residuals, start, jac=jacobian, method="lm")
-    covariance = ratios @ np.linalg.pinv(found.jac.T @ found.jac) @ ratios.T
-    mean, sigma = PRIOR.copy(), PRIOR_SIGMA.copy()
-    mean[LOADS], sigma[LOADS] = ratios @ found.x, np.sqrt(np.diag(covariance) + _MODEL**2)
-    sigma[LOGARITHMS:] = place / LENGTH
-    return Prior(mean, sigma)
 
 
 @lru_cache(maxsize=8)

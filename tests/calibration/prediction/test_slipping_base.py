@@ -6,7 +6,8 @@ import pytest
 
 from calibration.prediction.slipping_base import driven, lagged
 from calibration.robot.rigid_tree import room, scratch, tree_of
-from calibration.stages.stick_slip.forcing import CUTOFF, HEAVE, PLANE
+from calibration.stages.stick_slip.forcing import CUTOFF
+from calibration.stages.stick_slip.kernel.bases import HEAVE, PLANE
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 

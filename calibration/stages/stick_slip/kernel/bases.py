@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 PLATE = 8  # first of the plate's columns of `drive`
+PLANE, HEAVE = (0, 1, 5), (2, 3, 4)  # of x, y, z, rx, ry, yaw
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # elements of a symmetric matrix (3, 3), row by row
 STEPS = 3  # of the integration to a sample
 COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
 LANES = 16  # bases side by side
@@ -66,3 +68,11 @@ def at_rest(
     if noise is not None:
         judge(state, noise)
     return Bases(state, np.ascontiguousarray(rows), -(-lanes // VECTOR) * VECTOR)
+
+
+def inertia_rows(M: np.ndarray) -> np.ndarray:
+    """(n, 15) of M (n, 6, 6), as `integration.advance` takes it: of a base that its own accelerations load."""
+    rows = np.empty((len(M), 15))
+    rows[:, :6] = np.stack([M[:, PLANE[i], PLANE[j]] for i, j in UPPER], axis=1)
+    rows[:, 6:] = (M[:, (2, 4, 3)][:, :, PLANE] * np.array([1.0, -1.0, 1.0])[:, None]).reshape(len(M), 9)
+    return rows

@@ -5,6 +5,12 @@
 
 h: z, rx, ry, p: x, y, yaw, M_pp of the robot without wheels. F is what it puts on its wheels, from the two steps before
 on, c(L) that of wheels that lift off, see `suspension.lifting_response`. Heave by the trapezoidal rule.
+
+Where a plate measures what the wheels bear, f, heave follows it, and its acceleration is that of heave up to BALANCED,
+
+    d2h/dt2 = [d2h/dt2 - a] + a        M a = w - f        [.]: below BALANCED, about which the base resonates
+
+since above it heave's second derivative multiplies the plate's noise by more than the base's inertia divides it.
 """
 
 from typing import NamedTuple
@@ -12,10 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.numerics.compiled import njit
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, STEPS, F, W
+from calibration.numerics.signals import Signal, low_passed
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, HEAVE, STEPS, F, W
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest, moving_wheels
 
+BALANCED = 6.0  # [Hz]
 _REPEATS, _SETTLED = 20, 1e-3  # [N, N.m]
 _UPPER = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # of a symmetric matrix, in its six elements
 
@@ -49,6 +57,19 @@ def damped(K: np.ndarray, C: np.ndarray) -> np.ndarray:
     found = C.copy()
     found[0, 0] = max(C[0, 0], K[0, 0] * float(lag.min()))
     return found
+
+
+def accelerations(t: np.ndarray, sprung: np.ndarray, left: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """Of z, rx, ry (n, 3) [m/s2, rad/s2] at even times t (n,) [s] of a base on a force plate.
+
+    Args:
+        t: Times.
+        sprung: (n, 3) those of heave and tilt by the plate's wrench.
+        left: (n, 6) w - f: of inverse dynamics on a base at rest less the plate's [N, N.m].
+        M: (n, 6, 6) inertia of the robot.
+    """
+    a = np.linalg.solve(M, left[:, :, None])[:, HEAVE, 0]
+    return a + low_passed(Signal(t, sprung - a, np.ones(len(t), dtype=bool)), BALANCED).x
 
 
 @njit(cache=True, error_model="numpy")

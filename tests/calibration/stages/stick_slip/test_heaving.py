@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from calibration.stages.stick_slip.forcing import STEP, STEPS
 from calibration.stages.stick_slip.kernel.bases import VECTOR
-from calibration.stages.stick_slip.kernel.heaving import Springs, damped, heaving
+from calibration.stages.stick_slip.kernel.heaving import Springs, accelerations, damped, heaving
 from calibration.stages.stick_slip.likelihood import bases_of
 from tests.calibration.stages.stick_slip.slipping import MASS, POSITION, TRUTH, WEIGHT, WHEELS
 
@@ -104,3 +104,20 @@ def test_heave_is_damped_as_long_as_tilt_is_at_least() -> None:
     K, C = np.diag([1e6, 2e4, 1.6e4]), np.diag([60.0, 200.0, 240.0])
     np.testing.assert_allclose(np.diag(damped(K, C)), [1e4, 200.0, 240.0])
     np.testing.assert_array_equal(damped(K, C + np.diag([2e4, 0.0, 0.0])), C + np.diag([2e4, 0.0, 0.0]))
+
+
+def test_a_plate_shows_slow_accelerations_by_heave_and_fast_ones_by_what_it_misses() -> None:
+    """Heave is off where it is fast, by the plate's noise; inverse dynamics where they are slow, by a weight."""
+    t, whole = np.arange(1500) / 100.0, np.zeros((1500, 6))
+    whole[:, 2:5] = np.sin(2.0 * np.pi * np.array([2.0, 2.5, 3.0]) * t[:, None])
+    whole[:, 2:5] += 0.5 * np.sin(2.0 * np.pi * np.array([12.0, 14.0, 16.0]) * t[:, None])
+    own = np.zeros((6, 6))
+    own[np.ix_((0, 1, 5, 2, 3, 4), (0, 1, 5, 2, 3, 4))] = M
+    noise = np.sin(2.0 * np.pi * 15.0 * t)[:, None] * [1.0, -1.0, 1.0]
+    left = whole @ own + np.array([3.0, -2.0, 9.0, 4.0, -5.0, 1.0]) * np.sin(2.0 * np.pi * 0.3 * t)[:, None]
+    rows = slice(200, -200)
+    found = accelerations(t, whole[:, 2:5] + noise, left, np.repeat(own[None], len(t), axis=0))
+    by_balance = np.linalg.solve(own, left[:, :, None])[:, 2:5, 0]
+    error, balance = (np.std((x - whole[:, 2:5])[rows], axis=0) for x in (found, by_balance))
+    assert (error < 0.1 * noise[rows].std(axis=0)).all()
+    assert (error[1:] < 0.1 * balance[1:]).all()

@@ -194,6 +194,7 @@ def test_casters_that_lift_off_do_not_make_the_base_softer():
     assert linear[4, 4] < 0.8 * springs[2, 2]
     np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.02)
     np.testing.assert_array_equal(found.K[[0, 1, 5]], linear[[0, 1, 5]])
+    np.testing.assert_allclose(found.shares, SPRINGS[[0, 4]] / SPRINGS[2], rtol=0.05)  # when they lift off tells
 
 
 def test_casters_that_lift_off_show_where_the_wheels_are():

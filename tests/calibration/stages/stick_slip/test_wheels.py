@@ -5,6 +5,7 @@ import pytest
 
 import mjcf
 from calibration.stages.stick_slip.kernel.lifted import borne
+from calibration.stages.stick_slip.standing import prior_by_tilt
 from calibration.stages.stick_slip.wheels import (
     NAMES,
     PRIOR,
@@ -12,7 +13,6 @@ from calibration.stages.stick_slip.wheels import (
     SlipParameters,
     WheelSet,
     preloads,
-    prior_by_tilt,
     wheel_set,
 )
 from tests.calibration.stages.stick_slip.slipping import POSITION, TRUTH, WEIGHT, WHEELS
