@@ -26,10 +26,10 @@ SAG = 0.03  # [rad] of arm_5, whose gear gives where the hand pulls
 G = np.array(HUNG.gravity) @ T_LAB_BASE[:3, :3]
 
 
-def readings(links, tilt):
-    """(n, 6) of the sensor on links (n, k) of a base that leans by (n, 2) [rad]."""
+def readings(links, tilt, a=0.0):
+    """(n, 6) of the sensor on links (n, k) of a base that leans by (n, 2) [rad], accelerates by a (n, 3) [m/s2]."""
     load, turn = expected_load(LAB, LINK), np.pad(tilt, ((0, 0), (0, 1)))
-    weight = load.mass * ((G - np.cross(turn, G))[:, None] @ LAB.chain.poses(links, LINK)[:, :3, :3])[:, 0]
+    weight = load.mass * ((G - np.cross(turn, G) - a)[:, None] @ LAB.chain.poses(links, LINK)[:, :3, :3])[:, 0]
     return np.concatenate([weight, np.cross(load.centre, weight)], axis=1)
 
 
@@ -60,6 +60,22 @@ def test_a_hand_weighs_downwards(sags, leans):
     sideways = (found - expected)[rows][:, (0, 1, 5)]
     weight = expected_load(LAB, LINK).mass * 9.81
     assert np.abs(sideways).max() < 0.1 * max(SAG * sags, 6e-3 * leans) * weight
+
+
+def test_a_hand_is_moved_by_a_base_that_slides():
+    """Slowly, too: what is slower than 1 Hz is not all the sensor's error."""
+    q, still = np.tile(Q, (len(T), 1)), np.zeros((len(T), 2))
+    x = 0.1 * np.sin(2.0 * np.pi * 0.3 * T)[:, None] * [1.0, -0.5, 0.0]
+    a = -((2.0 * np.pi * 0.3) ** 2) * x
+    poses = np.tile(T_LAB_BASE, (len(T), 1, 1))
+    poses[:, :3, 3] += x @ T_LAB_BASE[:3, :3].T
+    found, rests = (
+        behind(q, readings(q, still, by), 1e-9).load(T, at).signal.x
+        for by, at in ((a, poses), (0.0, np.tile(T_LAB_BASE, (len(T), 1, 1))))
+    )
+    rows, pushes = slice(200, 600), -expected_load(LAB, LINK).mass * a[:, :2]
+    error = (found - rests)[rows, :2] - pushes[rows]
+    assert np.abs(error).max() < 0.1 * np.abs(pushes).max()
 
 
 def _skew(rx, ry):
