@@ -11,6 +11,7 @@ import pytest
 from scenarios import load, run
 
 pytestmark = pytest.mark.slow
+FAR = "half of the wheels slide, and how far is decided by a few newtons of their load: docs/limits.md"
 PUSHED = "links that the end of a push throws cross their gaps at another time than predicted: docs/limits.md"
 
 
@@ -39,8 +40,8 @@ def test_a_declared_payload_is_known_to_both(trials):
         ("xyz_2kg", "measured"),
         pytest.param("push", "measured", marks=pytest.mark.xfail(reason=PUSHED, strict=True)),
         ("xyz_0kg", "plate"),
-        ("xyz_2kg", "plate"),
-        ("push", "plate"),
+        pytest.param("xyz_2kg", "plate", marks=pytest.mark.xfail(reason=FAR, strict=True)),
+        pytest.param("push", "plate", marks=pytest.mark.xfail(reason=FAR, strict=True)),
     ],
 )
 def test_row_full_knows_what_loads_it(trials, trial, base):
