@@ -116,7 +116,7 @@ def hand_load(
         description: With the payload of the trial.
         hung: By the calibration; None where nothing was weighed.
         t: (n,) [s].
-        q: (n, k) motor readings less their zeros [rad, m].
+        q: (n, k) motor readings less their zeros, or the links' angles where they are known [rad, m].
         wrench: (n, 6) readings of the sensor.
         base: (n, 6) proper acceleration of the root, see `torques.base_acceleration`; None: it is at rest.
     """

@@ -2,20 +2,23 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
 import mjcf
 from calibration.numerics.signals import CUTOFF, Signal
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip.forcing import Tilting, Wrenches
 from calibration.stages.stick_slip.measured import slid
-from calibration.stages.stick_slip.standing import Read, _rocked, plate_place, tilting_of
-from calibration.stages.stick_slip.wheels import wheel_set
+from calibration.stages.stick_slip.standing import Read, _rocked, plate_place, prior_by_tilt, tilting_of
+from calibration.stages.stick_slip.wheels import WIDE, WheelSet, wheel_set
 from calibration.stages.suspension.base_response import base_response_of, laboratory
 from calibration.stages.suspension.compliance_fit import fit_compliance
 from calibration.stages.suspension.cross_validation import HeldOut
 from calibration.stages.suspension.floor_wrench import Load, vertical
 from calibration.stages.suspension.model import Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_of
+from tests.calibration.stages.stick_slip.slipping import POSITION
+from tests.calibration.stages.stick_slip.slipping import WHEELS as SLIPPING
 from tests.doubles import rigid_robot
 from tests.doubles.moving_base import T_LAB_BASE, WHEELS, moved
 
@@ -194,12 +197,13 @@ def test_casters_that_lift_off_do_not_make_the_base_softer():
     assert linear[4, 4] < 0.8 * springs[2, 2]
     np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.02)
     np.testing.assert_array_equal(found.K[[0, 1, 5]], linear[[0, 1, 5]])
-    np.testing.assert_allclose(found.shares, SPRINGS[[0, 4]] / SPRINGS[2], rtol=0.05)  # when they lift off tells
+    np.testing.assert_allclose(found.shares, SPRINGS[[0, 4]] / SPRINGS[2], rtol=0.01)  # when they lift off tells
 
 
 def test_casters_that_lift_off_show_where_the_wheels_are():
     _, found, springs = rocking(0.85, off=(4e-3, -2e-3))
     np.testing.assert_allclose(found.off, [4e-3, -2e-3], atol=5e-4)
+    np.testing.assert_allclose(found.shares, SPRINGS[[0, 4]] / SPRINGS[2], rtol=0.01)
     np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.03)
     np.testing.assert_allclose(found.over - found.off, 0.0, atol=1e-12)  # there is no other robot to compare it with
 
@@ -246,3 +250,45 @@ def test_where_no_wheel_lifts_off_the_compliance_stays():
     linear, found, springs = rocking(0.2)
     np.testing.assert_array_equal(found.K, linear)
     np.testing.assert_allclose(np.diag(found.K)[3:5], np.diag(springs)[1:], rtol=0.02)
+
+
+BY_TYPE = {"drive": 200e3, "front": 110e3, "back": 160e3}  # [N/m]
+PLACE = np.array([1e-3, 2e-3])  # [m] sigma of where the load is
+
+
+def tilt_stiffness(wheels=SLIPPING):
+    """(3, 3) of heave and tilt on vertical springs, wheel by wheel."""
+    K = np.zeros((3, 3))
+    for kind, (x, y) in zip(wheels.types, wheels.position, strict=True):
+        a = np.array([1.0, y, -x])
+        K += BY_TYPE[kind] * np.outer(a, a)
+    return K
+
+
+def test_shares_of_the_load_are_ratios_of_the_springs_that_tilt_shows():
+    prior = prior_by_tilt(SLIPPING, tilt_stiffness(), PLACE)
+    np.testing.assert_allclose(np.exp(prior.mean[11:13]), [200 / 110, 160 / 110], rtol=0.06)  # the wide prior pulls
+    assert np.all((prior.sigma[11:13] < 0.2) & (prior.sigma[11:13] >= 0.05))
+    np.testing.assert_array_equal(prior.mean[:11], WIDE.mean[:11])
+    np.testing.assert_array_equal(prior.sigma[:11], WIDE.sigma[:11])
+    np.testing.assert_allclose(prior.sigma[13:], [0.1, 0.2])
+
+
+@pytest.mark.parametrize("off", [0.7, 1.3])
+def test_heave_that_is_off_by_a_third_moves_shares_by_less_than_their_sigma(off):
+    K = tilt_stiffness()
+    K[0, 0] *= off
+    assert np.all(
+        np.abs(prior_by_tilt(SLIPPING, K, PLACE).mean - prior_by_tilt(SLIPPING, tilt_stiffness(), PLACE).mean)
+        < 0.7 * WIDE.sigma
+    )
+    right = np.log([200 / 110, 160 / 110])
+    found = prior_by_tilt(SLIPPING, K, PLACE)
+    assert np.all(np.abs(found.mean[11:13] - right) < 1.5 * found.sigma[11:13])
+
+
+def test_where_there_are_no_back_casters_their_share_keeps_the_wide_prior():
+    wheels = WheelSet(SLIPPING.names[:4], SLIPPING.types[:4], POSITION[:4], SLIPPING.weight[:4])
+    prior = prior_by_tilt(wheels, tilt_stiffness(wheels), PLACE)
+    assert prior.sigma[12] == pytest.approx(WIDE.sigma[12], rel=0.01)
+    assert prior.mean[12] == pytest.approx(WIDE.mean[12], abs=1e-3)

@@ -5,21 +5,15 @@ import pytest
 
 import mjcf
 from calibration.stages.stick_slip.kernel.lifted import borne
-from calibration.stages.stick_slip.standing import prior_by_tilt
 from calibration.stages.stick_slip.wheels import (
     NAMES,
     PRIOR,
-    WIDE,
     SlipParameters,
-    WheelSet,
     preloads,
     wheel_set,
 )
 from tests.calibration.stages.stick_slip.slipping import POSITION, TRUTH, WEIGHT, WHEELS
 from tests.doubles.moving_base import WHEELS as DECLARED
-
-SPRINGS = {"drive": 200e3, "front": 110e3, "back": 160e3}
-PLACE = np.array([1e-3, 2e-3])  # [m] sigma of where the load is
 
 
 def test_parameters_are_their_logarithms():
@@ -107,41 +101,3 @@ def test_wheels_of_a_base_that_has_slid_bear_the_load_where_they_are():
     found = borne(WHEELS.standing(), wrench, far[None])
     np.testing.assert_allclose(found, at_rest, atol=0.1)  # to first order in the turn: 1e-3 of 60 N.m
     assert np.abs(wrench - at_rest).max() > 3.0
-
-
-def tilt_stiffness(wheels=WHEELS):
-    """(3, 3) of heave and tilt on vertical springs, wheel by wheel."""
-    K = np.zeros((3, 3))
-    for kind, (x, y) in zip(wheels.types, wheels.position, strict=True):
-        a = np.array([1.0, y, -x])
-        K += SPRINGS[kind] * np.outer(a, a)
-    return K
-
-
-def test_shares_of_the_load_are_ratios_of_the_springs_that_tilt_shows():
-    prior = prior_by_tilt(WHEELS, tilt_stiffness(), PLACE)
-    np.testing.assert_allclose(np.exp(prior.mean[11:13]), [200 / 110, 160 / 110], rtol=0.06)  # the wide prior pulls
-    assert np.all((prior.sigma[11:13] < 0.2) & (prior.sigma[11:13] >= 0.05))
-    np.testing.assert_array_equal(prior.mean[:11], WIDE.mean[:11])
-    np.testing.assert_array_equal(prior.sigma[:11], WIDE.sigma[:11])
-    np.testing.assert_allclose(prior.sigma[13:], [0.1, 0.2])
-
-
-@pytest.mark.parametrize("off", [0.7, 1.3])
-def test_heave_that_is_off_by_a_third_moves_shares_by_less_than_their_sigma(off):
-    K = tilt_stiffness()
-    K[0, 0] *= off
-    assert np.all(
-        np.abs(prior_by_tilt(WHEELS, K, PLACE).mean - prior_by_tilt(WHEELS, tilt_stiffness(), PLACE).mean)
-        < 0.7 * WIDE.sigma
-    )
-    right = np.log([200 / 110, 160 / 110])
-    found = prior_by_tilt(WHEELS, K, PLACE)
-    assert np.all(np.abs(found.mean[11:13] - right) < 1.5 * found.sigma[11:13])
-
-
-def test_where_there_are_no_back_casters_their_share_keeps_the_wide_prior():
-    wheels = WheelSet(WHEELS.names[:4], WHEELS.types[:4], POSITION[:4], WHEELS.weight[:4])
-    prior = prior_by_tilt(wheels, tilt_stiffness(wheels), PLACE)
-    assert prior.sigma[12] == pytest.approx(WIDE.sigma[12], rel=0.01)
-    assert prior.mean[12] == pytest.approx(WIDE.mean[12], abs=1e-3)
