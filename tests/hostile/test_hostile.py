@@ -2,11 +2,13 @@
 
 import shutil
 
+import numpy as np
 import pytest
 
 from tests.hostile.findings import FINDINGS, unshown
 from tests.hostile.page import tables
 from tests.hostile.rows.case import Case, judged
+from tests.hostile.rows.child import forked
 from tests.hostile.rows.laboratory import copied, make
 
 ROWS = [
@@ -27,6 +29,12 @@ def test_a_hostile_case_ends_as_its_row_says(laboratory, tmp_path, case: Case):
     found = judged(case, folder)
     shutil.rmtree(folder, ignore_errors=True)
     assert not found.wrong, f"{found.wrong}\n{found.outcome.output[-3000:]}"
+
+
+def test_the_memory_of_a_command_is_its_own():
+    held = np.ones(2**24)
+    assert forked(lambda: None).memory < 0.5 * held.nbytes
+    assert forked(lambda: print(np.ones(len(held)).sum())).memory > 0.9 * held.nbytes
 
 
 def test_every_finding_of_use_is_a_row_a_test_or_argued():

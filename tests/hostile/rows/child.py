@@ -26,7 +26,7 @@ class Outcome:
     Attributes:
         code: Exit code; minus the signal that ended it.
         output: What it wrote, both streams.
-        memory: The most it had at once [B].
+        memory: The most it had at once, beyond what this process had when it was forked [B].
         seconds: What it took of a processor [s].
     """
 
@@ -57,6 +57,7 @@ def command(arguments: Sequence[str], folder: Path | None = None, seconds: int =
 def forked(work: Callable[[], None], folder: Path | None = None, seconds: int = SECONDS) -> Outcome:
     """Do some work in a child process."""
     with tempfile.TemporaryFile() as stream:
+        before = _has("RssAnon")
         child = os.fork()
         if child == 0:
             _child(work, stream.fileno(), folder, seconds)
@@ -64,7 +65,7 @@ def forked(work: Callable[[], None], folder: Path | None = None, seconds: int = 
         stream.seek(0)
         output = stream.read(2**20).decode("utf-8", "replace")
     code = os.waitstatus_to_exitcode(status)
-    return Outcome(code, output, 1024.0 * used.ru_maxrss, used.ru_utime + used.ru_stime)
+    return Outcome(code, output, max(1024.0 * used.ru_maxrss - before, 0.0), used.ru_utime + used.ru_stime)
 
 
 def _child(work: Callable[[], None], stream: int, folder: Path | None, seconds: int) -> None:
@@ -74,7 +75,7 @@ def _child(work: Callable[[], None], stream: int, folder: Path | None, seconds: 
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.alarm(3 * seconds)
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
-        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY + _has(), resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY + _has("VmData"), resource.RLIM_INFINITY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         os.dup2(stream, 1)
         os.dup2(stream, 2)
@@ -100,9 +101,9 @@ def _code_of(work: Callable[[], None]) -> int:
     return 0
 
 
-def _has() -> int:
-    """Memory this process has asked for already [B]."""
+def _has(kind: str) -> int:
+    """Memory of this process [B]: VmData, asked for, or RssAnon, which a child shares at first."""
     for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmData:"):
+        if line.startswith(f"{kind}:"):
             return 1024 * int(line.split()[1])
     return 0
