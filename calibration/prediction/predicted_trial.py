@@ -20,7 +20,7 @@ from calibration.estimate.rows import Base, Encoder
 from calibration.recording import netcdf
 from calibration.recording.trial import Trial
 from calibration.stages.bundle.robot import BundledRobot
-from calibration.stages.drive_trains.geometry_refit import CorrectedTrial
+from calibration.stages.drive_trains.corrected_trial import CorrectedTrial
 from calibration.stages.joints.correction import Corrected, JointModels
 from calibration.stages.joints.samples import samples_of
 from calibration.stages.stick_slip.poses import BasePrediction, SlippingMotion

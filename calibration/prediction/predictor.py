@@ -36,7 +36,7 @@ from calibration.recording.schema import Description, TrialEntry
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.stages.bundle.robot import BundledRobot
-from calibration.stages.drive_trains.geometry_refit import CorrectedTrial
+from calibration.stages.drive_trains.corrected_trial import CorrectedTrial
 from calibration.stages.drive_trains.stage import MovedBase
 from calibration.stages.joints.correction import Corrected, JointModels
 from calibration.stages.stick_slip.poses import BasePrediction

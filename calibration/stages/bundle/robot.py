@@ -17,9 +17,14 @@ from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.robot.link_masses import LinkMasses
 from calibration.stages.drive_trains.column_bending import ColumnBending
+from calibration.stages.drive_trains.corrected_trial import (
+    CorrectedTrial,
+    by_link_encoders,
+    corrected_trial,
+    hand_poses,
+)
 from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, corrected_trial, hand_poses
 from calibration.stages.drive_trains.hung_load import HungLoad
 from calibration.stages.drive_trains.stage import MovedBase
 from calibration.stages.drive_trains.torques import dynamics
@@ -40,7 +45,7 @@ class BundleParts:
         offset: (k,) zeros of the motor readings [rad, m].
         bending: Of the column.
         stick_slip: The base; None where it was not identified.
-        at_rest: (m,) s_j of each train's angle in dwells, see `geometry_refit` [rad]; 0 where not known, or empty.
+        at_rest: (m,) s_j of each train's angle in dwells, see `errors_in_use` [rad]; 0 where not known, or empty.
         at_rest_by_dynamics: The same where inverse dynamics move the base that else a plate moves; empty without.
         hung: What the wrist's sensor weighed beside links and payload; None where nothing was.
         links: What a plate weighed; None where none did, and the links are nominal.

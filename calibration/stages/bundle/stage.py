@@ -24,15 +24,12 @@ from calibration.robot.laboratory import Laboratory
 from calibration.stages.bundle.moved_base import RoughBase, moved_as_predicted
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.drive_trains.column_bending import rigid
+from calibration.stages.drive_trains.corrected_trial import CorrectedTrial, corrected_trial
 from calibration.stages.drive_trains.drive_train import Quantity
 from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.errors_in_use import rest_errors, with_doubts
 from calibration.stages.drive_trains.from_markers import completed
-from calibration.stages.drive_trains.geometry_refit import (
-    CorrectedTrial,
-    RefittedGeometry,
-    corrected_trial,
-    rest_errors,
-)
+from calibration.stages.drive_trains.geometry_refit import RefittedGeometry
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved, MovedBase, fit_drive_trains, motor_zeros
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
@@ -43,7 +40,7 @@ from calibration.stages.stick_slip.poses import Arm, slipping_base_poses
 from calibration.stages.stick_slip.stage import fit_stick_slip
 from calibration.stages.stick_slip.standing import SOURCES
 from calibration.stages.suspension.base_response import WrenchSources
-from calibration.stages.suspension.model import Suspension
+from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.weighing import weighed_links
 from calibration.verdict import Verdict
 
@@ -105,12 +102,12 @@ def fit_bundle(
         sources = replace(sources, lab=lab)
     rough = RoughBase(AS_SEEN) if suspension is None else moved_as_predicted(sources, trials, suspension)
     trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, rough.moved)
-    bending, quantities, found, at_rest = rigid(chain.joints[0]), trains.parameters, [*unlikely, *findings], np.zeros(0)
+    bending, quantities, found = rigid(chain.joints[0]), trains.parameters, [*unlikely, *findings]
     geometry = replace(geometry, name="full")
     refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings, rough.moved)
     found += more
     if refitted is not None:
-        geometry, bending, trains, at_rest = refitted.model, refitted.bending, refitted.trains, refitted.at_rest
+        geometry, bending, trains = refitted.model, refitted.bending, refitted.trains
         hand = refitted.hand(chain)
         found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
@@ -120,27 +117,48 @@ def fit_bundle(
         sources = replace(sources, T_base_B=from_vector(hand.base))
         base, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)
         found += more
-    other = _at_rest_by_dynamics(base, sources, trials, trains, hand) if len(at_rest) else np.zeros(0)
+    at_rest = other = np.zeros(0)
+    if refitted is not None:
+        trains, at_rest, other = _in_use(base, sources, trials, trains, hand, rough.moved)
     parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, other, trains.hung, links)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
 
 
-def _at_rest_by_dynamics(
-    base: StickSlip | None, sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains, hand: HandModel
-) -> np.ndarray:
-    """s_j (m,) of `BundleParts` on the base that inverse dynamics move; empty where no plate moves it better."""
-    robot = sources.robot
-    if base is None or robot is None or len(base.directions) < len(SOURCES):
-        return np.zeros(0)
+def _in_use(  # noqa: PLR0913
+    base: StickSlip | None, sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains, hand: HandModel,
+    moved: Moved,
+) -> tuple[DriveTrains, np.ndarray, np.ndarray]:  # fmt: skip
+    """The drive trains with what predictions left; s_j (m,) at rest, and where inverse dynamics move the base.
 
-    def corrected(trial: Trial) -> CorrectedTrial | None:
+    The last is empty where no plate moves the base better. `moved` is for trials in which no base was identified.
+    """
+    robot, known = sources.robot, () if base is None else tuple(d.source for d in base.directions)
+    if robot is None:
+        return trains, np.zeros(0), np.zeros(0)
+
+    def corrected(by: Source | None, trials: Sequence[Trial]) -> list[CorrectedTrial]:
+        bases = moved if base is None or by is None else {**moved, **_moved_by(base, sources, trials, trains, by)}
+        return side_by_side(lambda t: corrected_trial(trains, t, robot, hand, bases.get(t.id)), trials)
+
+    shown = corrected(known[0] if known else None, trials)
+    resting = [trial for trial in trials if len(trial.dwell_start)]
+    other = corrected("dynamics", resting) if len(known) == len(SOURCES) else None
+    by_dynamics = np.zeros(0) if other is None else rest_errors(trains, other, robot)
+    return with_doubts(trains, shown), rest_errors(trains, shown, robot), by_dynamics
+
+
+def _moved_by(
+    base: StickSlip, sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains, source: Source
+) -> Moved:
+    """How a wrench moves the base in the trials that have it."""
+
+    def moved(trial: Trial) -> MovedBase | None:
         with suppress(NotEnoughData):
-            moved = slipping_base_poses(base, sources, trial, "dynamics", trains)
-            return corrected_trial(trains, trial, robot, hand, MovedBase(moved.T_lab_B, by_plate=False))
+            return MovedBase(slipping_base_poses(base, sources, trial, source, trains).T_lab_B, source == "plate")
         return None
 
-    found = side_by_side(corrected, [trial for trial in trials if len(trial.dwell_start)])
-    return rest_errors(trains, [one for one in found if one is not None], robot)
+    found = side_by_side(moved, trials)
+    return {trial.id: one for trial, one in zip(trials, found, strict=True) if one is not None}
 
 
 def _completed(  # noqa: PLR0913

@@ -74,7 +74,9 @@ class DriveTrain:
             no trial shows it, see `begun`.
         torque_sigma: Standard deviation of the torque at which the side changes [N.m].
         residual: Rms of what the model left of trials left out, in motion, where the side of the mesh is certain [rad].
-        doubt: The same where it is not, over the standard deviation of an even distribution between both ends [-].
+        doubt: The same where it is not, over the standard deviation of an even distribution between both ends [-]; of
+            joints with link encoders what predictions in use left, see `errors_in_use`.
+        doubt_at_rest: The same where it has stopped.
         inertials: (p,) masses and first moments, less the nominal ones, that this joint's load identifies, in the order
             of `torques.inertials` [kg, kg.m]; empty: nominal.
         parameters: What is reported, with standard deviations.
@@ -92,6 +94,7 @@ class DriveTrain:
     torque_sigma: float = 0.05
     residual: float = 0.0
     doubt: float = 1.0
+    doubt_at_rest: float = 1.0
     inertials: np.ndarray = field(default_factory=lambda: np.zeros(0))
     parameters: tuple[Quantity, ...] = ()
     range: np.ndarray = field(default_factory=lambda: np.full(2, np.nan))
@@ -113,9 +116,10 @@ class DriveTrain:
         side = np.clip(torque / max(self.values[COULOMB], _FRICTIONLESS), -1.0, 1.0)
         return np.asarray(self.values[COMPLIANCE] * torque + self.values[HALF_GAP] * side)
 
-    def variance(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Variance (n,) [rad2] of a link in motion that is between low and high (n,) [rad]."""
-        return np.asarray(self.doubt**2 * (high - low) ** 2 / 12.0 + self.residual**2)
+    def variance(self, low: np.ndarray, high: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """Variance (n,) [rad2] of a link that is between low and high (n,) [rad], its motor in motion (n,) or not."""
+        doubt = np.where(moves, self.doubt, self.doubt_at_rest)
+        return np.asarray(doubt**2 * (high - low) ** 2 / 12.0 + self.residual**2)
 
     def beyond(self, torque: np.ndarray) -> np.ndarray:
         """By how much nominal torques (...) [N.m] exceed those it was found by; all of them where those are unknown."""

@@ -26,11 +26,10 @@ from calibration.stages.drive_trains import link_streams
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_load
 from calibration.stages.drive_trains.link_motion import COMPLIANCE
-from calibration.stages.drive_trains.link_streams import TORQUE, Drives
+from calibration.stages.drive_trains.link_streams import RESTS, TORQUE, Drives
 from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, dynamics, inertials
 from calibration.stages.suspension.floor_wrench import root_in_base
 
-RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
 RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
 
 
@@ -144,7 +143,8 @@ class DriveTrains:
             j = self.joints.index(train.joint)
             bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
             q[:, j], low[:, j], high[:, j] = bare - delta[:, 0], bare - delta.max(axis=1), bare - delta.min(axis=1)
-            variance[:, j] = train.variance(bare - high[:, j], bare - low[:, j])
+            moves = np.abs(loads.v[:, j]) >= RESTS
+            variance[:, j] = train.variance(bare - high[:, j], bare - low[:, j], moves)
         return LinkAngles(q, low, high, variance)
 
     def _deltas(self, loads: LinkLoads, runs: int) -> np.ndarray:
@@ -208,7 +208,7 @@ class Stream:
         root = self.at_rest if base is None else base
         link_streams.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
         states[:] = begun(self.trains, drives, state.samples[TORQUE])
-        link_streams.link_angles(states, state.moving[0], drives, angles)
+        link_streams.link_angles(states, state.moving, drives, angles)
         return state, LinkAngles(*angles)
 
     def step(
@@ -269,6 +269,6 @@ def prepared(trains: DriveTrains) -> Drives:
         offs * np.array([t.values[COMPLIANCE] for t in of])[:, None],
         np.array([t.motor for t in of]).reshape(-1, 4),
         np.array([not t.dynamic and t.form == "dead_zone" for t in of], dtype=bool),
-        np.array([[t.doubt**2 / 12.0, t.residual**2] for t in of], dtype=float).reshape(-1, 2),
+        np.array([[t.doubt**2 / 12.0, t.doubt_at_rest**2 / 12.0, t.residual**2] for t in of]).reshape(-1, 3),
         np.array(robot.offset, dtype=float),
     )

@@ -69,8 +69,7 @@ class JointData:
 
     def means(self, x: np.ndarray) -> np.ndarray:
         """Means (k, ...) over the windows of x (n, ...)."""
-        count = np.diff(np.append(self.first, len(x)))
-        return np.asarray(np.add.reduceat(x, self.first, axis=0) / count.reshape(-1, *[1] * (x.ndim - 1)))
+        return window_means(x, self.first)
 
     def loaded(self, z: np.ndarray) -> DriveMotion:
         """The motion with torque modes z (z,)."""
@@ -169,8 +168,7 @@ def joint_data(
     motion = drive_motion(loads, column)
     first, trial = [], []
     for i, (start, stop) in enumerate(pairwise(motion.begins)):
-        t = motion.t[start:stop]
-        edges = np.unique(np.searchsorted(t, np.arange(t[0], t[-1] - 0.5 * window, window)))
+        edges = windows(motion.t[start:stop], window)
         first.append(start + edges)
         trial.append(np.full(len(edges), i))
     n = sum(map(len, first))
@@ -183,6 +181,17 @@ def joint_data(
     angle = bare.means(np.concatenate([of_trial.angle[:, column] for of_trial in loads]))
     terms = np.column_stack([np.ones(len(angle)), harmonic_terms(angle)])
     return replace(bare, y=bare.means(np.concatenate(differences)[:, column]), terms=terms)
+
+
+def windows(t: np.ndarray, window: float = WINDOW) -> np.ndarray:
+    """(k,) first samples of windows of times (n,) [s]."""
+    return np.unique(np.searchsorted(t, np.arange(t[0], t[-1] - 0.5 * window, window)))
+
+
+def window_means(x: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Means (k, ...) of x (n, ...) over windows that begin at samples `first` (k,)."""
+    count = np.diff(np.append(first, len(x)))
+    return np.asarray(np.add.reduceat(x, first, axis=0) / count.reshape(-1, *[1] * (x.ndim - 1)))
 
 
 def _regimes(motion: DriveMotion, first: np.ndarray) -> np.ndarray:

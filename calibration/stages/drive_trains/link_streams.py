@@ -18,6 +18,7 @@ from calibration.stages.drive_trains.link_motion import LIGHT, STILL, Drive, adv
 
 Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
 SWEEPS = 2
+RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
 
 
 class Drives(NamedTuple):
@@ -34,7 +35,7 @@ class Drives(NamedTuple):
         shifts: (m, c) that it winds a mesh up by [rad].
         motor: (m, 4) eccentricities [rad].
         plays: (m,) which are play operators.
-        doubt: (m, 2) variance over the square of the interval [-], and beside it [rad2].
+        doubt: (m, 3) variance over the square of the interval in motion and at rest [-], and beside it [rad2].
         offset: (k,) zeros of all readings [rad, m].
     """
 
@@ -159,8 +160,9 @@ def walked(
 
 
 @njit(cache=True, error_model="numpy")
-def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarray) -> None:
-    """Angles (4, 1, k) behind readings q (k,): likely, least, largest; variance."""
+def link_angles(states: np.ndarray, moving: np.ndarray, drives: Drives, out: np.ndarray) -> None:
+    """Angles (4, 1, k) behind readings and velocities, `moving` (3, k): likely, least, largest; variance."""
+    q = moving[0]
     for j in range(len(q)):
         out[0, 0, j] = out[1, 0, j] = out[2, 0, j] = q[j]
         out[3, 0, j] = 0.0
@@ -173,7 +175,8 @@ def link_angles(states: np.ndarray, q: np.ndarray, drives: Drives, out: np.ndarr
         bare = q[c] - e[0] * np.cos(theta) - e[1] * np.sin(theta) - e[2] * np.cos(2 * theta) - e[3] * np.sin(2 * theta)
         out[0, 0, c] = bare - (states[i, 0, 0] - drives.shifts[i, 0])
         out[1, 0, c], out[2, 0, c] = bare - top, bare - bottom
-        out[3, 0, c] = drives.doubt[i, 0] * (top - bottom) ** 2 + drives.doubt[i, 1]
+        doubt = drives.doubt[i, 1] if abs(moving[1, c]) < RESTS else drives.doubt[i, 0]
+        out[3, 0, c] = doubt * (top - bottom) ** 2 + drives.doubt[i, 2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -184,4 +187,4 @@ def advanced_drives(
     """`loaded`, `streamed` and `link_angles` of a sample dt [s] after `before`."""
     loaded(tree, drives, root, work, found, moving, samples)
     streamed(states, before, samples, found.inertia[0], dt, longest, drives)
-    link_angles(states, moving[0], drives, angles)
+    link_angles(states, moving, drives, angles)

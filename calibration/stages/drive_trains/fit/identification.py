@@ -38,8 +38,8 @@ from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB, HALF_GAP
 
 _FRICTION, _TORQUE = 0.15, 0.045  # share of the friction, and [N.m], to which a load is not known
-_SURE, _FEW = 0.1, 20  # of the half gap that an error of the torque moves a link by; windows
-_OTHER_SIDE = 12.0**0.5  # doubt of a link that is at the other end each time
+SURE, _FEW = 0.1, 20  # of the half gap that an error of the torque moves a link by; windows
+OTHER_SIDE = 12.0**0.5  # doubt of a link that is at the other end each time
 _SPREAD = 0.15  # least standard deviation of where trials start [-]
 _GAPS = (0.0, 0.2, 0.35, 0.45)  # of the discrepancy's spread
 _SOFTNESS = (0.15, 0.5)  # of the prior
@@ -94,6 +94,7 @@ def identify(
         start=_start(fit),
         residual=residual,
         doubt=doubt,
+        doubt_at_rest=doubt,
         inertials=modes @ fit.problem.modes(fit.theta),
         torque_sigma=torque_sigma(float(fit.problem.train(fit.theta).values[COULOMB])),
         range=_range(data.means(data.motion.torque)[data.known]),
@@ -117,14 +118,14 @@ def residual_and_doubt(chosen: Candidate) -> tuple[float, float]:
     off = 2.0 * torque_sigma(float(train.values[COULOMB]))
     ends = np.array([fit.problem.deltas(fit.theta, fit.gamma, x) for x in (-off, 0.0, off)])
     wide, square = np.ptp(ends, axis=0), chosen.left_out**2
-    sure = moves & (wide <= _SURE * train.values[HALF_GAP])
+    sure = moves & (wide <= SURE * train.values[HALF_GAP])
     if sure.sum() < _FEW:
         return float(np.sqrt(square[moves].mean())), 1.0
     least, open_ = float(square[sure].mean()), moves & ~sure
     if not open_.any():
         return float(np.sqrt(least)), 1.0
     doubt = np.sqrt(max(square[open_].mean() - least, 0.0) / (wide[open_] ** 2 / 12.0).mean())
-    return float(np.sqrt(least)), float(np.clip(doubt, 1.0, _OTHER_SIDE))
+    return float(np.sqrt(least)), float(np.clip(doubt, 1.0, OTHER_SIDE))
 
 
 def _start(fit: TrainFit) -> tuple[float, float]:

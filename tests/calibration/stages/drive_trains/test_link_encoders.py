@@ -7,9 +7,10 @@ import numpy as np
 import mjcf
 from calibration.inference.parameters import Model, Parameter
 from calibration.stages.drive_trains.column_bending import ColumnBending
+from calibration.stages.drive_trains.corrected_trial import CorrectedTrial, by_link_encoders, seen_by_links
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, Quantity, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
-from calibration.stages.drive_trains.geometry_refit import CorrectedTrial, by_link_encoders, referred, seen_by_links
+from calibration.stages.drive_trains.geometry_refit import referred
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
 

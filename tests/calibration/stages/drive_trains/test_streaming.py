@@ -13,6 +13,7 @@ from calibration.prediction.bundled_arm import BundledArm
 from calibration.stages.drive_trains import DriveTrain, DriveTrains, stream_of
 from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.drive_train import Quantity
+from calibration.stages.drive_trains.link_streams import RESTS
 from calibration.stages.drive_trains.torques import (
     Dynamics,
     base_acceleration,
@@ -49,10 +50,13 @@ def dynamics() -> Dynamics:
 
 def trains() -> DriveTrains:
     robot, values = dynamics(), np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0])
+    sure = {"residual": 2e-5, "doubt": 0.6, "doubt_at_rest": 1.4}
     shown = (Quantity("backlash.second.gap", "rad", 6e-3, 1e-4, "estimated"),)
     of = (
-        DriveTrain("first", "dead_zone", values, dynamic=False, motor=np.array([1e-3, 0.0, 2e-4, 0.0])),
-        DriveTrain("second", "dead_zone", values, inertials=np.full(len(inertials(robot)), 1e-3), parameters=shown),
+        DriveTrain("first", "dead_zone", values, dynamic=False, motor=np.array([1e-3, 0.0, 2e-4, 0.0]), **sure),
+        DriveTrain(
+            "second", "dead_zone", values, inertials=np.full(len(inertials(robot)), 1e-3), parameters=shown, **sure
+        ),
     )
     return DriveTrains(robot, of, "", None)  # type: ignore[arg-type]
 
@@ -90,15 +94,16 @@ def test_a_tilt_of_the_base_is_a_turned_gravity() -> None:
 
 
 def test_samples_one_by_one_are_the_recording_in_one_go() -> None:
-    of = trains()
-    smooth, v, a = derivatives(T, Q, 20.0)
-    loads = replace(of.dynamics.loads("", T, Q), q=smooth)
+    of, q = trains(), Q[np.maximum(np.arange(len(T)) - 50, 0)]  # at rest to begin with
+    smooth, v, a = derivatives(T, q, 20.0)
+    loads = replace(of.dynamics.loads("", T, q), q=smooth)
     batch, stream = of.of_loads(loads), stream_of(of)
     state, angles = stream.begin(T[0], np.array([smooth[0], v[0], a[0]]))
     found = [angles]
     for i in range(1, len(T)):
         state, angles = stream.step(state, T[i], np.array([smooth[i], v[i], a[i]]))
         found.append(angles)
+    assert (batch.high - batch.low)[np.abs(v) < RESTS].max() > 1e-5  # a link at rest whose side is not known
     for name in ("q", "low", "high", "variance"):
         one_by_one = np.concatenate([getattr(x, name) for x in found])
         assert np.abs(one_by_one - getattr(batch, name)).max() < 1e-12
@@ -123,7 +128,7 @@ def test_link_angles_lag_behind_their_motors_by_half_the_gap_at_least() -> None:
 def test_a_link_that_nothing_loads_stopped_on_one_of_its_flanks() -> None:
     arm = BundledArm(trains(), ColumnBending("first", np.zeros(2), np.zeros(2)), np.zeros(2))
     found = arm.at_rest(np.zeros((1, 2)))
-    np.testing.assert_allclose(np.sqrt(found.variance[0, 0]), 3e-3 + 0.15 * 8e-4, rtol=1e-6)
+    np.testing.assert_allclose(found.variance[0, 0], (3e-3 + 0.15 * 8e-4) ** 2 + 2e-5**2, rtol=1e-6)
 
 
 def test_drive_trains_come_back_from_json() -> None:

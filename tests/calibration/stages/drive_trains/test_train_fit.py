@@ -192,9 +192,9 @@ def test_what_changes_of_side_leave_is_apart_from_what_certain_sides_leave(doubt
     residual, found = residual_and_doubt(Candidate(fit, 0.0, left, np.eye(10)))
     assert residual == pytest.approx(2e-5, rel=1e-6)
     assert found == pytest.approx(max(doubt, 1.0), rel=1e-3)
-    train = replace(TRUTH, residual=residual, doubt=found)
-    variance = train.variance(np.zeros(2), np.array([0.0, 6e-3]))
-    np.testing.assert_allclose(variance, [4e-10, 4e-10 + found**2 * 3e-6])
+    train = replace(TRUTH, residual=residual, doubt=found, doubt_at_rest=0.5)
+    variance = train.variance(np.zeros(3), np.array([0.0, 6e-3, 6e-3]), np.array([True, True, False]))
+    np.testing.assert_allclose(variance, [4e-10, 4e-10 + found**2 * 3e-6, 4e-10 + 0.75e-6])
 
 
 def test_a_single_trial_is_left_out_by_parts() -> None:
