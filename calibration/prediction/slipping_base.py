@@ -156,10 +156,10 @@ class SlippingBase:
         )
         motion = _UNMOVED if moving is None else moving
         tree, actions, work, room = self._robot
-        w, (y, u), x, lags, moved, a, row, state, wheels, found = carried(
+        w, (y, u), x, lags, moved, a, row, state, wheels, learnt, found = carried(
             wrench, motion, t - before.t, earlier, slip.bases, place, stream.fitted, tree, *actions, work, room
         )
-        bases = Bases(state, wheels, slip.bases.lanes)
+        bases = Bases(state, wheels, slip.bases.lanes, learnt)
         slid = found[1] * stream.fitted.moves
         slip = SlipState(slip.start, t, slip.rest, slip.n, slip.noise, row, bases, found, slip.band, slid)
         return BaseState(before.start, t, w, before.rest, before.n, u, y, x, moved, a, slip, lags)
@@ -262,7 +262,8 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     """`SlippingBase.stepped` after the first second: fields of the states.
 
     Returns:
-        wrench, y and u, x, lags, moved, acceleration of `BaseState`; row, state, wheels of bases, found of `SlipState`.
+        wrench, y and u, x, lags, moved, acceleration of `BaseState`; row, state, wheels, learnt of bases, found of
+        `SlipState`.
     """
     w, x, own, change, turn = np.zeros((1, 6)), np.empty(6), np.empty((1, 6)), np.empty(6), np.zeros((1, 4, 4))
     row, found, driving = np.empty(COLUMNS), np.empty((5, 3)), UNDRIVEN.copy()
@@ -281,7 +282,7 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
         base = np.empty((2, 3))
         base[0], base[1] = mean_of(bases.state, VELOCITY, fitted.members), heaving
         driving = driven(tree, (dual, back), place.gravity, base, moving, work, room)
-    after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes)
+    after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes, bases.learnt.copy())
     readings = w[0], x[2:5], driving, before.rest, before.row, before.found
     step_members(after, readings, fitted, before.band, dt / STEPS, row, found)
     for i in range(6):
@@ -294,4 +295,4 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     shift(moved[0], turn[0], scratch)
     a = accelerating(mean_of(after.state, ACCELERATION, fitted.members), heaving, moved[0])
     shift(moved[0], place.T_0_lab, scratch)
-    return sprung[0], modes, x, lags, moved, a, row, after.state, after.wheels, found
+    return sprung[0], modes, x, lags, moved, a, row, after.state, after.wheels, after.learnt, found

@@ -3,7 +3,8 @@
     x(t) = mean_e x_e(t),     V_a(t) = s_a^2 + r_a^2 var_e x_e,a(t) + (p_a^2 + g^2) var_o x_o,a(t) + l_a^2 S_a(t)
     g^2 = OTHER^2 D^2 / (D^2 + FAR^2),  D = |m - m_usual|,  S_a(t) = max_(t' < t) (x - x_el)_a^2,  x_el = K_0^-1 F
 
-x_e: predictions by an ensemble of parameters, from their posterior; x_o: by the optimum from wheels that are preloaded
+x_e: predictions by an ensemble of parameters, from their posterior, mean and variance as a plate informs them in the
+trial, see `kernel.informed`; x_o: by the optimum from wheels that are preloaded
 at the start, about that without preload. m (My, -Mx) at the start: a base that begins under another load than most
 trials came there by slips, which preload its wheels by up to OTHER of what they hold. x_el what springs alone would do
 under the force F: S the largest slip so far, of which a share l_a [-] stays. Where a plate corrects the prediction it
@@ -44,6 +45,7 @@ from scipy.optimize import minimize
 from scipy.special import ndtri, stdtrit
 
 from calibration.numerics.compiled import njit
+from calibration.stages.stick_slip.kernel.preloaded import LEFT
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.measured import blocks
 from calibration.stages.stick_slip.wheels import DRIVES, NAMES
@@ -65,7 +67,7 @@ PRIOR = np.log(
 WIDTH = np.array([0.5, 0.3, 0.4, 0.5])  # left-out `around_z` alone would make l as large as what it shows of frictions
 SURE = 10.0  # by which -2 log of the likelihood falls; robots on the model's ground: 5 at most
 _LARGER = np.log([1.0, 2.0, 4.0, 8.0, 16.0])  # u
-TRIED, LEFT = 0.1, 0.4  # least share, and of the variance by preloads what is left of it when a plate judged them
+TRIED = 0.1  # least share of what is tried
 _HIGHEST = 0.975  # share below the band's upper end
 OTHER, FAR = 0.8, 25.0  # [-] of the most that wheels can be preloaded, [N.m] from the usual load
 _PLAIN, _PLAIN_WIDTH = 0.3, np.array([1.5, 1.5])  # r, and what the logarithms of s and r are uncertain by

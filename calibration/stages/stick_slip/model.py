@@ -6,9 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from calibration.errors import NoSuchElement
+from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.band import Band, PlainBand, reached
 from calibration.stages.stick_slip.forcing import STEP, PlanarForcing, Tilting
 from calibration.stages.stick_slip.kernel.bases import HEAVE, PLANE
+from calibration.stages.stick_slip.kernel.informed import informed_along
 from calibration.stages.stick_slip.kernel.integration import simulated
 from calibration.stages.stick_slip.kernel.preloaded import noise_at_rest, weighed_along
 from calibration.stages.stick_slip.likelihood import bases_of
@@ -138,14 +140,15 @@ class StickSlip:
         found = self.direction(forcing.source)
         p, load = found.parameters, forcing.drive[0, 3:6]
         band, tried = found.begun(load)
-        every, share, unlikely = self._motions(forcing, found, tried * preloads(self.wheels, p, load))
+        every, share, missed = self._motions(forcing, found, tried * preloads(self.wheels, p, load))
         n = len(found.ensemble)
         own = [0, *range(n, len(every))]
-        shift, judged, preloaded = weighed_along(unlikely[own], every[own]).transpose(1, 0, 2)
-        x = every[:n].mean(axis=0) + shift
+        shift, judged, preloaded = weighed_along(missed[own], every[own], 1.0 / RATE).transpose(1, 0, 2)
+        x, spread = informed_along(missed[:n], every[:n], 1.0 / RATE).transpose(1, 0, 2)
+        x = x + shift
         elastic = forcing.force @ np.linalg.inv(self.wheels.stiffness(p))
         slipped = reached(x - elastic)
-        variance = band.variance(every[:n].var(axis=0), preloaded, slipped) + judged
+        variance = band.variance(spread, preloaded, slipped) + judged
         kept = believed(slipped, variance - found.band.floor**2)
         x = elastic + kept * (x - elastic)
         plain = np.where(found.linear, forcing.linear, 0.0)
@@ -157,17 +160,17 @@ class StickSlip:
     def _motions(
         self, forcing: PlanarForcing, found: Direction, preload: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions since the first second (k, n, 3), shares of the optimum's wheels that slid (n,), `unlikely` (k, n).
+        """Positions since the first second (k, n, 3), shares of the optimum's wheels that slid (n,), missing forces.
 
-        Of the ensemble, then of the optimum from preloads (p, m, 2).
+        Of the ensemble, then of the optimum from preloads (p, m, 2). The forces (k, n, 3) are over 2 sigma.
         """
         k, starts = len(found.ensemble), np.array([0, len(forcing.inertia)])
         e = np.concatenate([np.zeros((k, *preload.shape[1:])), preload])
         p = np.concatenate([found.ensemble, np.repeat(found.logarithms[None], len(preload), axis=0)])
         noise = noise_at_rest(forcing.force[forcing.rest].var(axis=0)) if found.corrected else None
         bases = bases_of(self.wheels, p, found.corrected, e, noise=noise)
-        x, share, unlikely = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, len(p))
-        return x - x[:, forcing.rest].mean(axis=1, keepdims=True), share[0], unlikely
+        x, share, missed = simulated(starts, forcing.drive, forcing.inertia, bases, STEP, len(p))
+        return x - x[:, forcing.rest].mean(axis=1, keepdims=True), share[0], missed
 
     def displacement(self, forcing: PlanarForcing) -> tuple[np.ndarray, np.ndarray]:
         """Displacement of the base frame (n, 6) [m, rad, frame 0] and its variances (n, 6)."""

@@ -19,6 +19,7 @@ from calibration.stages.stick_slip.forcing import UNMOVED, Tilting
 from calibration.stages.stick_slip.kernel.bases import (
     COLUMNS,
     LANES,
+    MISSED,
     PLATE,
     STEPS,
     UNLIKELY,
@@ -27,6 +28,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     at_rest,
     judge,
 )
+from calibration.stages.stick_slip.kernel.informed import informed, learn
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.kernel.preloaded import noise_at_rest, weighed
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
@@ -145,7 +147,7 @@ class SlipStream:
             bases = self._judging(before.bases, noise / n)
             return before._replace(t=sample.t, rest=before.rest + off / n, n=n, noise=noise, before=row, bases=bases)
         was = before.bases
-        bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes)
+        bases = Bases(was.state.copy(), was.wheels.copy(), was.lanes, was.learnt.copy())
         row, found = np.empty(COLUMNS), np.empty_like(before.found)
         readings = sample.wrench, sample.heave, driving, before.rest, before.before, before.found
         step_members(bases, readings, self.fitted, before.band, (sample.t - before.t) / STEPS, row, found)
@@ -168,6 +170,8 @@ class SlipStream:
         bases = at_rest(self.wheels, self.bodies, e)
         for wheels, lanes in zip(bases.wheels, bases.lanes, strict=True):
             deflect_at_rest(wheels.reshape(-1), row, lanes)
+        members = self.fitted.members
+        bases = bases._replace(learnt=np.zeros((members, members + 1)))
         return SlipState(t, t, rest, 1, np.zeros(3), row, bases, none, band, none[1])
 
 
@@ -204,7 +208,7 @@ def advance_members(
     """`advance` for k bases: the members of an ensemble, then preloaded ones of the first member's parameters.
 
     Args:
-        bases: States and deflections are changed.
+        bases: States, deflections and what was learnt of the members are changed.
         drive: (steps, 11).
         inertia: (15,).
         h: [s].
@@ -212,17 +216,19 @@ def advance_members(
         k: Of all.
 
     Returns:
-        Mean (3,) of the members, shifted as a plate judges preloads, and their variance; mean square (3,) of the
-        preloaded about the first; variance (3,) of the shift, 0 without a plate.
+        Mean (3,) of the members, as a plate informs it, shifted as it judges preloads, and their variance; mean square
+        (3,) of the preloaded about the first; variance (3,) of the shift, 0 without a plate.
     """
-    variance, x, own = np.zeros(3), np.empty((k - members + 1, 3)), np.empty(k - members + 1)
-    found = np.zeros((3, 3))
+    x, own, found = np.empty((k - members + 1, 3)), np.empty(k - members + 1), np.zeros((3, 3))
+    each, missed, mean = np.empty((members, 3)), np.empty((members, 3)), np.empty((2, 3))
     for g in range(len(bases.lanes)):
         advance(bases.state[g], bases.wheels[g], drive, inertia, h, bases.lanes[g])
-    mean = mean_of(bases.state, X, members)
-    for a in range(3):
-        for i in range(members):
-            variance[a] += (bases.state[i // LANES, X + a, i % LANES] - mean[a]) ** 2 / members
+    for i in range(members):
+        for a in range(3):
+            each[i, a] = bases.state[i // LANES, X + a, i % LANES]
+            missed[i, a] = bases.state[i // LANES, MISSED + a, i % LANES]
+    learn(bases.learnt, missed, h * len(drive))
+    informed(bases.learnt, each, mean)
     for o in range(len(own)):
         i = members - 1 + o if o > 0 else 0
         own[o] = bases.state[i // LANES, UNLIKELY, i % LANES]
@@ -230,7 +236,7 @@ def advance_members(
             x[o, a] = bases.state[i // LANES, X + a, i % LANES]
     if k > members:
         weighed(own, x, found)
-    return mean + found[0], variance, found[2], found[1]
+    return mean[0] + found[0], mean[1], found[2], found[1]
 
 
 @njit(cache=True, error_model="numpy")

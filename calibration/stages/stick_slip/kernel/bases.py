@@ -19,7 +19,7 @@ D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, for
 BODY = 30  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 LEANS, PULL, W = 34, 36, 37  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
 STUCK, NOW = 40, 43  # force of a wheel that sticks (2), its load; v at the time of the load
-UNLIKELY, NOISE, ROWS = 46, 47, 50  # see `preloaded`; 1 / (4 sigma^2) of the plate's force, 0: not judged
+UNLIKELY, MISSED, NOISE, ROWS = 46, 47, 50, 53  # see `preloaded`, `informed`; 1 / (2 sigma), 0: not judged
 
 
 class Bases(NamedTuple):
@@ -29,11 +29,13 @@ class Bases(NamedTuple):
         state: (groups, ROWS, LANES), see above.
         wheels: (groups, m, WHEEL, LANES).
         lanes: (groups,) that count, a multiple of VECTOR.
+        learnt: (n, n + 1) of the first n of them, see `informed`; (0, 1) where a plate says nothing of parameters.
     """
 
     state: np.ndarray
     wheels: np.ndarray
     lanes: np.ndarray
+    learnt: np.ndarray
 
     def deflection(self, i: int) -> np.ndarray:
         """Of the wheels (m, 2) of a base [m]."""
@@ -42,7 +44,7 @@ class Bases(NamedTuple):
 
 def judge(state: np.ndarray, noise: np.ndarray) -> None:
     """Let states (groups, ROWS, LANES) be judged by a plate's force, sigma (3,) [N, N, N.m]."""
-    state[:, NOISE:ROWS] = 0.25 / noise[:, None] ** 2
+    state[:, NOISE:ROWS] = 0.5 / noise[:, None]
 
 
 def at_rest(
@@ -67,7 +69,7 @@ def at_rest(
     state[:, BODY:LEANS] = bodies[own].reshape(groups, LANES, 4).transpose(0, 2, 1)
     if noise is not None:
         judge(state, noise)
-    return Bases(state, np.ascontiguousarray(rows), -(-lanes // VECTOR) * VECTOR)
+    return Bases(state, np.ascontiguousarray(rows), -(-lanes // VECTOR) * VECTOR, np.zeros((0, 1)))
 
 
 def inertia_rows(M: np.ndarray) -> np.ndarray:

@@ -38,6 +38,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     LANES,
     LEANS,
     LOAD,
+    MISSED,
     NOISE,
     NOW,
     PLATE,
@@ -127,13 +128,15 @@ def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int)
 
 @njit(cache=True, error_model="numpy")
 def _judged(s: np.ndarray, u: np.ndarray, dt: float, n: int) -> None:
-    """Add a sample of dt [s] to how unlikely n lanes are by the plate's force in the drive u (11,), see `preloaded`."""
+    """What n lanes miss of the plate's force in the drive u (11,), and dt [s] of it added to how unlikely they are."""
     if s[NOISE * LANES] == 0.0:
         return
     for l in range(n):
         r0, r1, r2 = _missing(s, l, u[PLATE], u[PLATE + 1], u[PLATE + 2])
-        q0, q1 = r0 * r0 * s[NOISE * LANES + l], r1 * r1 * s[(NOISE + 1) * LANES + l]
-        s[UNLIKELY * LANES + l] += dt * np.log((1.0 + q0) * (1.0 + q1) * (1.0 + r2 * r2 * s[(NOISE + 2) * LANES + l]))
+        r0, r1 = r0 * s[NOISE * LANES + l], r1 * s[(NOISE + 1) * LANES + l]
+        r2 *= s[(NOISE + 2) * LANES + l]
+        s[MISSED * LANES + l], s[(MISSED + 1) * LANES + l], s[(MISSED + 2) * LANES + l] = r0, r1, r2
+        s[UNLIKELY * LANES + l] += dt * np.log((1.0 + r0 * r0) * (1.0 + r1 * r1) * (1.0 + r2 * r2))
 
 
 @njit(cache=True, error_model="numpy")
@@ -208,9 +211,9 @@ def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: n
 def simulated(  # noqa: PLR0913
     starts: np.ndarray, drive: np.ndarray, inertia: np.ndarray, bases: Bases, h: float, k: int, every: int = 1
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (k, n, 3) [m, rad], shares of wheels that slid (k, n), and how unlikely bases became (k, n).
+    """Positions (k, n, 3) [m, rad], shares of wheels that slid (k, n), and missing force over 2 sigma (k, n, 3).
 
-    Of k bases in trials one after the other.
+    Of k bases in trials one after the other; no force is missing where no plate judges them.
 
     Args:
         starts: Sample at which each trial starts, and n.
@@ -222,12 +225,12 @@ def simulated(  # noqa: PLR0913
         every: Samples of a trial, of which means are returned; what is left at its end is not.
     """
     first = np.cumsum([0, *(np.diff(starts) // every)])
-    x, share, unlikely = np.empty((k, first[-1], 3)), np.empty((k, first[-1])), np.empty((k, first[-1]))
+    x, share, missed = np.empty((k, first[-1], 3)), np.empty((k, first[-1])), np.empty((k, first[-1], 3))
     side_by_side(
-        lambda a, b, out: _simulated((x, share, unlikely), (a, b, out, every), drive, inertia, bases, h),
+        lambda a, b, out: _simulated((x, share, missed), (a, b, out, every), drive, inertia, bases, h),
         starts[:-1], starts[1:], first[:-1],
     )  # fmt: skip
-    return x, share, unlikely
+    return x, share, missed
 
 
 @njit(cache=True, error_model="numpy")
@@ -241,7 +244,7 @@ def _simulated(
 ) -> None:
     """One trial of what `simulated` finds: its first sample, its end, its first mean, samples of a mean."""
     a, b, out, every = of
-    x, share, unlikely = found
+    x, share, missed = found
     k, m, steps = len(x), bases.wheels.shape[1], len(drive) // len(inertia)
     total = np.zeros(4 * LANES)
     for g in range(len(bases.lanes)):
@@ -261,9 +264,9 @@ def _simulated(
                 at = out + done // every - 1
                 for l in range(min(lanes, k - LANES * g)):
                     share[LANES * g + l, at] = total[3 * LANES + l] / (m * steps * every)
-                    unlikely[LANES * g + l, at] = state[UNLIKELY * LANES + l]
                     for i in range(3):
                         x[LANES * g + l, at, i] = total[i * LANES + l] / every
+                        missed[LANES * g + l, at, i] = state[(MISSED + i) * LANES + l]
                 for l in range(4 * LANES):
                     total[l] = 0.0
         for l in range(4 * LANES):

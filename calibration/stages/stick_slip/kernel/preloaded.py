@@ -13,6 +13,7 @@ import numpy as np
 from calibration.numerics.compiled import njit
 
 LEAST_FORCE = np.array([0.1, 0.1, 0.03])  # [N, N, N.m] sigma of a plate's force
+LEFT = 0.4  # of a variance that a plate explains: wrong loads hang together, few members are surer than they should be
 TRUST = 60.0  # [1/s]: forces of a plate below 20 Hz, whose errors hang together for a twentieth of a second
 
 
@@ -40,9 +41,12 @@ def weighed(unlikely: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def weighed_along(unlikely: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """`weighed` (n, 3, 3) at every sample, unlikely (p, n), x (p, n, 3)."""
-    out = np.empty((x.shape[1], 3, 3))
+def weighed_along(missed: np.ndarray, x: np.ndarray, dt: float) -> np.ndarray:
+    """`weighed` (n, 3, 3) at every sample, dt [s] apart, by forces that are missing over 2 sigma and x, (p, n, 3)."""
+    out, unlikely = np.empty((x.shape[1], 3, 3)), np.zeros(len(x))
     for t in range(len(out)):
-        weighed(unlikely[:, t], x[:, t], out[t])
+        for o in range(len(x)):
+            r0, r1, r2 = missed[o, t]
+            unlikely[o] += dt * np.log((1.0 + r0 * r0) * (1.0 + r1 * r1) * (1.0 + r2 * r2))
+        weighed(unlikely, x[:, t], out[t])
     return out

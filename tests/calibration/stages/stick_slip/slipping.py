@@ -96,7 +96,7 @@ def slid(  # noqa: PLR0913
     mass: np.ndarray = MASS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n, 3) and forces on the floor (n, 3) at every step, by the kernel itself, under w (n, 3)."""
-    (state,), (wheels,), (lanes,) = bases_of(of, p.logarithms[None], False, preload)
+    (state,), (wheels,), (lanes,), _ = bases_of(of, p.logarithms[None], False, preload)
     drive, inertia = np.zeros((len(w), 11)), np.zeros(15)
     drive[:, :3], drive[:, 3:6], inertia[:6] = w, load, mass[np.triu_indices(3)]
     x, force = np.empty((len(w), 3)), np.empty((len(w), 3))

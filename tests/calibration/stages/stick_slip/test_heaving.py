@@ -38,7 +38,7 @@ def swung(size):
 
 
 def found(p, w, springs, on=BARE):
-    (state,), (wheels,), _ = bases_of(on, p.logarithms[None], False)
+    (state,), (wheels,), _, _ = bases_of(on, p.logarithms[None], False)
     n = len(w) // STEPS
     rows = np.zeros((n, 15))
     rows[:, :6] = MASS[np.triu_indices(3)]

@@ -64,7 +64,7 @@ def test_markers_that_are_elsewhere_on_the_base_see_the_same_wheels_slip():
 
 @pytest.mark.parametrize("load", [(730.0, 75.0, 20.0), (730.0, 95.0, 0.0), (730.0, -120.0, 30.0)])
 def test_where_wheels_are_off_the_floor_the_others_bear_the_load(load):
-    ((state,), (wheels,), (lanes,)), rows = bases_of(WHEELS, STUCK.logarithms[None], False), WHEELS.rows(STUCK)
+    ((state,), (wheels,), (lanes,), _), rows = bases_of(WHEELS, STUCK.logarithms[None], False), WHEELS.rows(STUCK)
     drive, inertia = np.zeros((2, 11)), np.concatenate([MASS[np.triu_indices(3)], np.zeros(9)])
     drive[:, 3:6] = load
     advance(state, wheels, drive, inertia, STEP, lanes)
@@ -80,7 +80,7 @@ def test_a_wheel_bears_where_it_touches_the_floor():
     """Pushed aside by 3 N.m about the axis of the drives, wheels stay behind: so much the load of each leans on it."""
     force, p = np.array([0.0, -60.0, 0.0]), STUCK
     one = slipping.forcing(np.repeat(force[None], round(6.0 / STEP), axis=0))
-    ((state,), (wheels,), (lanes,)), rows = bases_of(WHEELS, p.logarithms[None], False), WHEELS.rows(p)
+    ((state,), (wheels,), (lanes,), _), rows = bases_of(WHEELS, p.logarithms[None], False), WHEELS.rows(p)
     advance(state, wheels, one.drive, one.inertia[0], STEP, lanes)
     N = rows[:, 6] + rows[:, 7:10] @ state[LOAD : LOAD + 3, 0]
     at = POSITION - wheels[:, E : E + 2, 0]
@@ -131,7 +131,7 @@ def test_wheels_that_slide_leave_a_constant_friction():
 
 def test_a_sprung_base_keeps_its_energy_without_dampers():
     p = replace(STUCK, drive_c=1e-9, caster_c=1e-9, body_c=1e-9, body_cr=1e-9)
-    ((state,), (wheels,), (lanes,)), rows = bases_of(WHEELS, p.logarithms[None], False), WHEELS.rows(p)
+    ((state,), (wheels,), (lanes,), _), rows = bases_of(WHEELS, p.logarithms[None], False), WHEELS.rows(p)
     state[3:6] = np.array([[0.05], [-0.03], [0.2]])
     A = np.array([slipping.across(q) for q in POSITION])
     M = MASS - np.einsum("i,iab,iac->bc", WHEELS.mass, A, A)  # wheels that stick do not move
@@ -149,7 +149,7 @@ def test_a_wheel_carried_back_and_forth_dissipates_what_jenkins_element_does():
     k, mu, N, amplitude, h = 14e3, 0.25, 190.0, 8e-3, 1e-3
     row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, 0.0, 0.0, 0.0, 0.0]]])
     u = amplitude * np.sin(np.linspace(0.0, 4.0 * np.pi, 40001))
-    (state,), (wheels,), (lanes,) = at_rest(row, np.zeros((1, 4)))
+    (state,), (wheels,), (lanes,), _ = at_rest(row, np.zeros((1, 4)))
     inertia, force = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0, *np.zeros(9)]), np.zeros(len(u))
     for n in range(1, len(u)):
         state[3], drive = (u[n] - u[n - 1]) / h, np.zeros((1, 11))
