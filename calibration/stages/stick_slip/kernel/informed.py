@@ -6,7 +6,8 @@
 Columns of X (3, n) are (x_e - mean x) / n^1/2, r_e = (F - sum_i A_i' f_i) / (2 sigma) of n members, r their mean and R
 as X. The force of wheels that slide is
 their friction: the same force displaces the base, which members differ in. q weighs a force as the loss of `preloaded`
-does. Members that no plate judges, or that bear alike, are as far apart as they were.
+does. Members that no plate judges, or that bear alike, are as far apart as they were. Weights instead, as of preloads,
+leave of so few members one; members that differ in all parameters by what the model may miss follow that, too.
 Reference: Evensen, Ocean Dynamics 53, 2003.
 """
 
