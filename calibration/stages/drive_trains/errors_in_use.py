@@ -53,13 +53,13 @@ class _Shown:
 
 def with_doubts(trains: DriveTrains, corrected: Sequence[CorrectedTrial]) -> DriveTrains:
     """The drive trains, those of joints with link encoders with the d that trials they have corrected show."""
-    read = [by_link_encoders(trains, one) for one in corrected]
+    read = [(one, by_link_encoders(trains, one)) for one in corrected if len(one.loads.t)]
 
     def doubted(train: DriveTrain) -> DriveTrain:
-        if not np.isfinite(train.link).all() or not corrected:
+        if not np.isfinite(train.link).all() or not read:
             return train
         j = trains.joints.index(train.joint)
-        parts = [_shown(one, by, j) for one, by in zip(corrected, read, strict=True)]
+        parts = [_shown(one, by_links, j) for one, by_links in read]
         error, width, moves, moved = (np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(_Shown))
         open_ = np.isfinite(error) & (width > SURE * train.values[HALF_GAP])
         square, even = error**2 - train.residual**2, width**2 / 12.0

@@ -72,6 +72,13 @@ def test_at_rest_an_interval_is_no_surer_than_an_even_distribution() -> None:
     assert with_doubts(trains(), [corrected(2, 0.5, 0.2)]).trains[0].doubt_at_rest == 1.0
 
 
+def test_trials_without_readings_say_nothing() -> None:
+    silent = CorrectedTrial(Readings(np.zeros((0, 8)), np.zeros((0, 8))), Loads(np.zeros(0), np.zeros((0, 8))), None)  # type: ignore[arg-type]
+    one, other = corrected(3, 0.5, 1.2), with_doubts(trains(), [silent])
+    assert [train.doubt for train in other.trains] == [train.doubt for train in trains().trains]
+    assert with_doubts(trains(), [silent, one]).trains[0].doubt == with_doubts(trains(), [one]).trains[0].doubt
+
+
 def test_few_stretches_say_little_and_many_much() -> None:
     even, rows = np.ones(400), np.zeros(400, dtype=bool)
     assert doubt(np.zeros(400), even, rows) == 1.0
