@@ -4,8 +4,8 @@
     g^2 = OTHER^2 D^2 / (D^2 + FAR^2),  D = |m - m_usual|,  S_a(t) = max_(t' < t) (x - x_el)_a^2,  x_el = K_0^-1 F
 
 x_e: predictions by an ensemble of parameters, from their posterior, mean and variance as a plate informs them in the
-trial, see `kernel.informed`; x_o: by the optimum from wheels that are preloaded
-at the start, about that without preload. m (My, -Mx) at the start: a base that begins under another load than most
+trial, see `kernel.informed`; x_o: by the optimum from wheels that are preloaded at the start, about that without
+preload. m (My, -Mx) at the start: a base that begins under another load than most
 trials came there by slips, which preload its wheels by up to OTHER of what they hold. x_el what springs alone would do
 under the force F: S the largest slip so far, of which a share l_a [-] stays. Where a plate corrects the prediction it
 tells how likely preloads are, tried up to c times the most, see `kernel.preloaded`:
@@ -67,7 +67,7 @@ PRIOR = np.log(
 WIDTH = np.array([0.5, 0.3, 0.4, 0.5])  # left-out `around_z` alone would make l as large as what it shows of frictions
 SURE = 10.0  # by which -2 log of the likelihood falls; robots on the model's ground: 5 at most
 _LARGER = np.log([1.0, 2.0, 4.0, 8.0, 16.0])  # u
-TRIED = 0.1  # least share of what is tried
+TRIED = 0.1  # least share of preloads that is tried
 _HIGHEST = 0.975  # share below the band's upper end
 OTHER, FAR = 0.8, 25.0  # [-] of the most that wheels can be preloaded, [N.m] from the usual load
 _PLAIN, _PLAIN_WIDTH = 0.3, np.array([1.5, 1.5])  # r, and what the logarithms of s and r are uncertain by

@@ -4,7 +4,8 @@ integration    `simulated`: some bases in trials one after the other; `advance`:
 bases          `Bases`: how they lie in memory; `at_rest`
 wheel_forces   what wheels put on the floor that stick or slide
 heaving        heave and tilt beside
-preloaded      what a plate says of how wheels stood; `informed`: of their parameters
+preloaded      what a plate says of how wheels stood
+informed       and of their parameters
 corrector      what a force plate corrects of their positions
 lifted         the load of wheels that are left on the floor
 """

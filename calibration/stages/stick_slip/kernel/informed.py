@@ -4,10 +4,10 @@
     A = 2 TRUST int sum_a q_a R_a' R_a dt,    b = 2 TRUST int sum_a q_a R_a' r_a dt,    q_a = 1 / (1 + r_a^2)
 
 Columns of X (3, n) are (x_e - mean x) / n^1/2, r_e = (F - sum_i A_i' f_i) / (2 sigma) of n members, r their mean and R
-as X. The force of wheels that slide is
-their friction: the same force displaces the base, which members differ in. q weighs a force as the loss of `preloaded`
-does. Members that no plate judges, or that bear alike, are as far apart as they were. Weights instead, as of preloads,
-leave of so few members one; members that differ in all parameters by what the model may miss follow that, too.
+as X. The force of wheels that slide is their friction, in which members differ, and so does how far they slide. q
+weighs a force as the loss of `preloaded` does. Members that no plate judges, or that bear alike, are as far apart as
+they were. Weights instead, as of preloads, leave of so few members one; members that differ in all parameters by what
+the model may miss follow that, too.
 Reference: Evensen, Ocean Dynamics 53, 2003.
 """
 

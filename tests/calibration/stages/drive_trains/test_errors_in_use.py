@@ -12,19 +12,12 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.errors_in_use import doubt, with_doubts
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
+from tests.doubles.two_sides import Readings
 
 JOINT, OTHER, COLUMN, GAP, LEFT = "arm_3_joint", "arm_5_joint", 3, 2e-3, 3e-5
 ERRORS = np.array([2e-3, 1.5e-3, -1e-3, 3e-4, 2e-4])
 STRETCH, STRETCHES = 80, 80  # samples of one, and how many in a trial
 N, WINDOW = STRETCH * STRETCHES, 10
-
-
-@dataclass(frozen=True)
-class Readings:
-    """Of a trial, both sides, the motors' corrected."""
-
-    q_motor: np.ndarray
-    q_link: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -74,8 +67,9 @@ def test_at_rest_an_interval_is_no_surer_than_an_even_distribution() -> None:
 
 def test_trials_without_readings_say_nothing() -> None:
     silent = CorrectedTrial(Readings(np.zeros((0, 8)), np.zeros((0, 8))), Loads(np.zeros(0), np.zeros((0, 8))), None)  # type: ignore[arg-type]
-    one, other = corrected(3, 0.5, 1.2), with_doubts(trains(), [silent])
-    assert [train.doubt for train in other.trains] == [train.doubt for train in trains().trains]
+    alone = with_doubts(trains(), [silent])
+    assert [train.doubt for train in alone.trains] == [train.doubt for train in trains().trains]
+    one = corrected(3, 0.5, 1.2)
     assert with_doubts(trains(), [silent, one]).trains[0].doubt == with_doubts(trains(), [one]).trains[0].doubt
 
 

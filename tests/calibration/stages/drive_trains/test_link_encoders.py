@@ -1,7 +1,5 @@
 """Link angles read by link encoders: their offset and eccentricity removed, the motor's where there is none."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 import mjcf
@@ -13,16 +11,9 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.geometry_refit import referred
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
+from tests.doubles.two_sides import Readings
 
 JOINT, COLUMN, ERRORS = "arm_3_joint", 3, np.array([2e-3, 1.5e-3, -1e-3, 3e-4, 2e-4])
-
-
-@dataclass(frozen=True)
-class Readings:
-    """Of a trial, both sides."""
-
-    q_motor: np.ndarray
-    q_link: np.ndarray
 
 
 def test_offset_and_eccentricity_are_removed_where_a_link_encoder_reads():
