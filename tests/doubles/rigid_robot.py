@@ -32,6 +32,14 @@ CENTRE = np.array([0.12, 1.5, -0.2, -1.4, 0.9, 0.0, 0.1, 0.1])
 
 
 @dataclass(frozen=True)
+class Readings:
+    """Of a trial, both sides, the motors' corrected."""
+
+    q_motor: np.ndarray
+    q_link: np.ndarray
+
+
+@dataclass(frozen=True)
 class Truth:
     xi: np.ndarray = field(default_factory=lambda: np.zeros((8, 6)))
     offset: np.ndarray = field(default_factory=lambda: np.zeros(8))

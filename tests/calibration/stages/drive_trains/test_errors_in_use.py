@@ -12,7 +12,7 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.errors_in_use import doubt, with_doubts
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
-from tests.doubles.two_sides import Readings
+from tests.doubles.rigid_robot import Readings
 
 JOINT, OTHER, COLUMN, GAP, LEFT = "arm_3_joint", "arm_5_joint", 3, 2e-3, 3e-5
 ERRORS = np.array([2e-3, 1.5e-3, -1e-3, 3e-4, 2e-4])

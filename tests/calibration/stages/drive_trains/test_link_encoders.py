@@ -11,7 +11,7 @@ from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.geometry_refit import referred
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
-from tests.doubles.two_sides import Readings
+from tests.doubles.rigid_robot import Readings
 
 JOINT, COLUMN, ERRORS = "arm_3_joint", 3, np.array([2e-3, 1.5e-3, -1e-3, 3e-4, 2e-4])
 
