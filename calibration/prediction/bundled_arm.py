@@ -82,24 +82,27 @@ class BundledArm:
         q_motor: np.ndarray,
         velocity: np.ndarray | None = None,
         T_lab_base: np.ndarray | None = None,
-        push: Push | None = None,
+        wrist: np.ndarray | None = None,
         by_plate: bool = False,
     ) -> ArmPositions:
         """Of readings q_motor (n, k) [rad, m] at t (n,) [s].
 
-        Velocity (n, k), the base (n, 4, 4), by a plate's wrench or not, and what pushes the hand where known.
+        Velocity (n, k), the base (n, 4, 4), by a plate's wrench or not, and the wrist's sensor (n, 6) where known.
 
         Raises:
             NotEnoughData: Less than a second of readings and no velocity.
         """
         robot = self.trains.dynamics
         base = None if T_lab_base is None else self.trains.base_acceleration(t, T_lab_base, t, by_plate)
-        if velocity is None:
-            loads = robot.loads("", t, q_motor, base, push)
-        else:
+
+        def under(push: Push | None, delta: np.ndarray | None) -> LinkLoads:
+            if velocity is None:
+                return robot.loads("", t, q_motor, base, push, delta)
             a = np.gradient(velocity, t, axis=0) if len(t) > 1 else np.zeros_like(velocity)
-            found = robot.evaluated(q_motor, velocity, a, base, push)
-            loads = LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
+            found = robot.evaluated(q_motor, velocity, a, base, push, delta)
+            return LinkLoads("", t, q_motor, q_motor - robot.offset, velocity, a, *found)
+
+        loads = self.trains.weighed(t, q_motor, wrist, under)
         angles = self.trains.of_loads(loads)
         return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, loads.v)
 

@@ -45,7 +45,6 @@ from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, points_of
 from calibration.robot.kinematics import beyond
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.wrist_sensor import UNSEEN
 from calibration.stages.bundle.robot import BundledRobot
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.joints.correction import JointModels, correct, input_model, velocities
@@ -169,7 +168,6 @@ class Compensator:
             raise ShapeError("q_motor", q.shape, (len(t), "n_joints"))
         self._refuse_impossible(q)
         base, moved, spread = self._base(T_lab_base_start), None, None
-        hand = UNSEEN if self.arm is None or wrist is None else self.arm.trains.hand(t, q, wrist)
         if wrench is not None:
             w, there = np.asarray(wrench, dtype=float), needed(base)
             if t_wrench is not None:
@@ -183,7 +181,7 @@ class Compensator:
         known = velocity is not None or continuous(t)
         T = placed(T_lab_base_start, moved, len(t))
         if self.arm is not None:
-            along = partial(self.arm.along, t, q, velocity, T, hand.joints, wrench is not None)
+            along = partial(self.arm.along, t, q, velocity, T, wrist, wrench is not None)
             found = self._on_links(along() if known else self.arm.at_rest(q, T_lab_base_start))
         else:
             found = self._hand(t, q, velocities(t, q) if known and velocity is None else velocity)

@@ -52,6 +52,7 @@ class TreeDynamics(NamedTuple):
         moment: (n, 2) about x and y of the first joint's frame, of the force it passes on [N.m].
         composite: (n, 6, 6) inertia of the whole about the root's origin.
         coupling: (n, k, 3) force on the root by unit acceleration of each joint.
+        stiffness: (n, k, k) how tau grows with the joints' positions by what bodies weigh, symmetric [N.m, N].
         regressor: (n, k, 4 k) by mass, then first moments, body by body; (n, k, 0) where not asked for.
     """
 
@@ -61,6 +62,7 @@ class TreeDynamics(NamedTuple):
     moment: np.ndarray
     composite: np.ndarray
     coupling: np.ndarray
+    stiffness: np.ndarray
     regressor: np.ndarray
 
 
@@ -101,7 +103,7 @@ def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
     """What dynamics of n samples of k joints are written to."""
     return TreeDynamics(
         np.empty((n, k)), np.zeros((n, k, k)), np.empty((n, 6)), np.empty((n, 2)), np.empty((n, 6, 6)),
-        np.empty((n, k, 3)), np.zeros((n, k, 4 * k if regressors else 0)),
+        np.empty((n, k, 3)), np.zeros((n, k, k)), np.zeros((n, k, 4 * k if regressors else 0)),
     )  # fmt: skip
 
 
@@ -114,10 +116,9 @@ def scratch(tree: RigidTree) -> np.ndarray:
 def _times(me: np.ndarray, at: int, out: np.ndarray, to: int) -> None:
     """out[to:to + 6] = I me[at:at + 6], I the body's inertia."""
     for i in range(6):
-        total = 0.0
+        out[to + i] = 0.0
         for c in range(6):
-            total += me[_I + 6 * i + c] * me[at + c]
-        out[to + i] = total
+            out[to + i] += me[_I + 6 * i + c] * me[at + c]
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,8 +167,7 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
     """Inertia of body b about the root's origin, and the wrench that moves it."""
     m, inertia, h, square, at = tree.mass[b], tree.inertia[b], np.zeros(3), 0.0, _I + 21  # where the angular part is
     turned(me, tree.moment[b], h, _R)
-    for i in range(36):
-        me[_I + i] = 0.0
+    me[_I:] = 0.0
     for i in range(3):
         p = me[_P + i]
         square += p * (2.0 * h[i] + m * p)
@@ -193,12 +193,11 @@ def _weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
 def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
     """Wrenches (4, 6) about the root's origin by unit mass and first moments of a body that moves: a(r) = a + B r."""
     B, axis, w, square = np.zeros((3, 3)), np.empty(3), np.empty(3), 0.0
+    out[:] = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         w[i] = me[_V + 3 + i]
         square += w[i] ** 2
-        for c in range(4):
-            out[c, i] = out[c, 3 + i] = 0.0
         B[k, j], B[j, k] = me[_A + 3 + i], -me[_A + 3 + i]
     for i in range(3):
         B[i, i] -= square
@@ -252,8 +251,7 @@ def sample(
     k = len(tree.parent)
     work[0, 0] = work[0, 4] = work[0, 8] = 1.0
     for i in range(len(q)):
-        for c in range(12):
-            work[0, _V + c] = root[min(i, len(root) - 1), c]
+        work[0, _V:_F] = root[min(i, len(root) - 1), :12]
         for b in range(k + 1):
             if b > 0:
                 me, up, column = work[b], work[tree.parent[b - 1]], tree.column[b - 1]
@@ -272,12 +270,14 @@ def sample(
 @njit(cache=True, error_model="numpy")
 def _gather(tree: RigidTree, work: np.ndarray, j: int, out: TreeDynamics, i: int) -> None:
     """What joint j bears into sample i of `out`, and to the body that carries it."""
-    me, up, column, b = work[j + 1], work[tree.parent[j]], tree.column[j], j + 1
+    me, up, column, b, leans = work[j + 1], work[tree.parent[j]], tree.column[j], j + 1, np.zeros(6)
     out.torque[i, column] = dot(me, _S, me, _F)
     _times(me, _S, me, _X)
+    cross(me, _X, work[0], _A, leans, _R + 3)
     while b > 0:  # the joints that carry this one
         other = tree.column[b - 1]
         out.inertia[i, other, column] = out.inertia[i, column, other] = dot(work[b], _S, me, _X)
+        out.stiffness[i, other, column] = out.stiffness[i, column, other] = dot(work[b], _S, leans, _R)
         b = tree.parent[b - 1]
     for c in range(3):
         out.coupling[i, column, c] = me[_X + c]

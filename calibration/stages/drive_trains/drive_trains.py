@@ -1,7 +1,7 @@
 """The drive trains of a robot in use: motor readings in, link angles and their intervals out.
 
     q_link = q_motor - offset - e_m - delta           what the geometry is asked with:  q_motor - e_m - delta
-    tau_j <- tau_j - sum_i M_ji d2 delta_i / dt2      links load each other, see `link_streams`
+    tau_j <- tau_j - sum_i (M_ji d2 delta_i / dt2 + G_ji delta_i)     links load each other, see `link_streams`
 
 The geometry keeps the zeros of the readings; it is the one fitted to corrected readings (`geometry_refit`).
 
@@ -14,6 +14,7 @@ those of the recording in one go.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -27,10 +28,18 @@ from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Qua
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_load
 from calibration.stages.drive_trains.link_motion import COMPLIANCE
 from calibration.stages.drive_trains.link_streams import RESTS, TORQUE, Drives
-from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, base_acceleration, dynamics, inertials
+from calibration.stages.drive_trains.torques import (
+    Dynamics,
+    LinkLoads,
+    LoadsUnder,
+    base_acceleration,
+    dynamics,
+    inertials,
+)
 from calibration.stages.suspension.floor_wrench import root_in_base
 
 RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
+_PASSES = 2  # in which links at rest hang from where they were found
 
 
 class LinkAngles(NamedTuple):
@@ -127,6 +136,19 @@ class DriveTrains:
         """What the wrist's sensor (n, 6) shows of the hand on a base (n, 6) as `base_acceleration` has it."""
         return hand_load(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist, base)
 
+    def loads(
+        self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None, wrist: np.ndarray | None
+    ) -> LinkLoads:
+        """Loads at motor readings q (n, k) on a base as of `Dynamics.loads`, `wrist` as of `weighed`."""
+        return self.weighed(t, q, wrist, partial(self.dynamics.loads, trial_id, t, q, base))
+
+    def weighed(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray | None, loads: LoadsUnder) -> LinkLoads:
+        """Loads under what the wrist's sensor (n, 6) shows of a hand on motors, and then on the links."""
+        if wrist is None or (push := self.hand(t, q, wrist).joints) is None:
+            return loads(None, None)
+        links = self.likely(loads(push, None))
+        return loads(self.hand(t, links, wrist).joints, q - links)
+
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
         q, deltas = loads.q.astype(float).copy(), self._deltas(loads, 1)
@@ -158,8 +180,8 @@ class DriveTrains:
             torque = own.torque + train.link_inertia * own.a
             samples[:, :, i] = np.stack([own.q, own.v, torque, train.moved_inertia(own.inertia)], axis=1)
         drives = prepared(self)
-        states = np.ascontiguousarray(begun(self, drives, samples[0, TORQUE])[:, :runs])
-        found = link_streams.walked(states, loads.t, samples, loads.inertia, LONGEST, drives)
+        states = np.ascontiguousarray(begun(self, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs])
+        found = link_streams.walked(states, loads.t, samples, loads.inertia, loads.stiffness, LONGEST, drives)
         return np.asarray(np.moveaxis(found - drives.shifts[:, :runs], 1, 0))
 
 
@@ -207,7 +229,7 @@ class Stream:
         robot, drives, states = self.trains.dynamics, self.prepared, state.states
         root = self.at_rest if base is None else base
         link_streams.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
-        states[:] = begun(self.trains, drives, state.samples[TORQUE])
+        states[:] = begun(self.trains, drives, state.samples[TORQUE], found.stiffness[0])
         link_streams.link_angles(states, state.moving, drives, angles)
         return state, LinkAngles(*angles)
 
@@ -230,8 +252,9 @@ class Stream:
         m, k, scratch = len(self.prepared.columns), moving.shape[1], self.found
         torque, moment, angles = np.empty((1, k)), np.empty((1, 2)), np.empty((4, 1, k))
         found = TreeDynamics(
-            torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.regressor
-        )
+            torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.stiffness,
+            scratch.regressor,
+        )  # fmt: skip
         return StreamState(t, moving, np.empty((4, m)), np.zeros((m, RUNS, 3)), torque, moment), found, angles
 
 
@@ -243,13 +266,15 @@ def stream_of(trains: DriveTrains) -> Stream:
     )
 
 
-def begun(trains: DriveTrains, drives: Drives, torques: np.ndarray) -> np.ndarray:
-    """States (m, RUNS, 3) of an unknown history under torques (m,) [N.m]."""
-    states = np.zeros((len(torques), RUNS, 3))
-    for i, (train, torque) in enumerate(zip(trains.trains, torques, strict=True)):
-        low, high = train.ends(torque + drives.offs[i, ::2])
-        starts = [*train.begun(torque[None]), *np.column_stack([low, high])[1:].ravel()]
-        states[i, :, 0] = states[i, :, 2] = starts
+def begun(trains: DriveTrains, drives: Drives, torques: np.ndarray, G: np.ndarray) -> np.ndarray:
+    """States (m, RUNS, 3) of an unknown history under torques (m,) [N.m] at the motors; G (k, k) stiffness."""
+    states, G = np.zeros((len(torques), RUNS, 3)), G[np.ix_(drives.columns, drives.columns)]
+    for _ in range(_PASSES):
+        at_links = torques - G @ states[:, 0, 0]
+        for i, (train, torque) in enumerate(zip(trains.trains, at_links, strict=True)):
+            low, high = train.ends(torque + drives.offs[i, ::2])
+            starts = [*train.begun(torque[None]), *np.column_stack([low, high])[1:].ravel()]
+            states[i, :, 0] = states[i, :, 2] = starts
     return states
 
 

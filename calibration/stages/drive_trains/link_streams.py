@@ -1,6 +1,6 @@
 """Drive trains of a robot moved together, compiled: sample by sample, or along a whole recording.
 
-    tau_i <- tau_i - sum_k M_ik d2 delta_k / dt2           links load each other as they depart from their motors
+    tau_i <- tau_i - sum_k M_ik d2 delta_k / dt2 - sum_j G_ij delta_j          k all other links, j all of them
 
 Within a step a link is moved by what the others do in the same step, SWEEPS times from the hand inwards (Gauss-Seidel
 on the blocks of M): first by links nearer to the hand, then by those that carry it, too. A link that strikes in its
@@ -81,11 +81,12 @@ def loaded(
 
 @njit(cache=True, error_model="numpy")
 def together(
-    links: np.ndarray, a: np.ndarray, b: np.ndarray, M: np.ndarray, dt: float, longest: float, drives: Drives
-) -> np.ndarray:
+    links: np.ndarray, a: np.ndarray, b: np.ndarray, M: np.ndarray, G: np.ndarray, dt: float, longest: float,
+    drives: Drives,
+) -> np.ndarray:  # fmt: skip
     """Move links (m, 3), that are no play operators, from samples a to b (4, m); mean accelerations of deltas (m,).
 
-    M (k, k) is the inertia of all joints at b. Steps are no longer than `longest` [s].
+    M and G (k, k) are inertia and stiffness of all joints at b. Steps are no longer than `longest` [s].
     """
     m, columns, still = len(links), drives.columns, True
     new, acceleration, mean = links.copy(), np.zeros(m), np.zeros(m)
@@ -104,6 +105,7 @@ def together(
                 torque, c = a[TORQUE, i] + s * (b[TORQUE, i] - a[TORQUE, i]), contact(drives.values[i])
                 inertia = a[INERTIA, i] + s * (b[INERTIA, i] - a[INERTIA, i])
                 for other in range(m):
+                    torque -= G[columns[i], columns[other]] * new[other, 0]
                     if other != i:
                         torque -= M[columns[i], columns[other]] * acceleration[other]
                 p, r, d = a[V, i] * dt, b[V, i] * dt, b[Q, i] - a[Q, i]
@@ -118,28 +120,30 @@ def together(
 
 @njit(cache=True, error_model="numpy")
 def streamed(
-    states: np.ndarray, before: np.ndarray, samples: np.ndarray, M: np.ndarray, dt: float, longest: float,
-    drives: Drives,
+    states: np.ndarray, before: np.ndarray, samples: np.ndarray, M: np.ndarray, G: np.ndarray, dt: float,
+    longest: float, drives: Drives,
 ) -> None:  # fmt: skip
     """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`.
 
-    M (k, k) is the inertia of all joints at `samples`. The first runs, which are likely, move together; each other one
-    moves alone, loaded by what the first runs of the other links do.
+    M and G (k, k) are inertia and stiffness of all joints at `samples`. The first runs, the likely ones, move together;
+    each other one moves alone, loaded by what the first runs of the other links do.
     """
     m, columns = samples.shape[1], drives.columns
     room = np.zeros((5, m))
     room[1] = dt
     a = Drive(room[0], before[Q], before[V], room[2], before[INERTIA], room[4])
     b = Drive(room[1], samples[Q], samples[V], room[3], samples[INERTIA], room[4])
-    acceleration = together(states[:, 0], before, samples, M, dt, longest, drives)
+    acceleration = together(states[:, 0], before, samples, M, G, dt, longest, drives)
     for i in range(m):
+        others, c = 0.0, contact(drives.values[i])
         for other in range(m):
             if other != i:
-                b.coupled[i] -= M[columns[i], columns[other]] * acceleration[other]
-        c = contact(drives.values[i])
+                others -= M[columns[i], columns[other]] * acceleration[other]
+                others -= G[columns[i], columns[other]] * states[other, 0, 0]
         for j in range(0 if drives.plays[i] else 1, states.shape[1]):
             a.torque[i], b.torque[i] = before[TORQUE, i] + drives.offs[i, j], samples[TORQUE, i] + drives.offs[i, j]
             x = states[i, j]
+            b.coupled[i] = others - G[columns[i], columns[i]] * x[0]
             if drives.plays[i]:
                 x[0] = carried(x[0] + b.q[i] - a.q[i], b, i, drives.values[i])
             else:
@@ -148,13 +152,13 @@ def streamed(
 
 @njit(cache=True, error_model="numpy")
 def walked(
-    states: np.ndarray, t: np.ndarray, samples: np.ndarray, M: np.ndarray, longest: float, drives: Drives
+    states: np.ndarray, t: np.ndarray, samples: np.ndarray, M: np.ndarray, G: np.ndarray, longest: float, drives: Drives
 ) -> np.ndarray:
-    """delta (n, m, c) [rad] of states (m, c, 3), as of `streamed`, along samples (n, 4, m), t (n,) [s], M (n, k, k)."""
+    """delta (n, m, c) [rad] of states (m, c, 3), as of `streamed`, along samples (n, 4, m), t (n,), M, G (n, k, k)."""
     found = np.empty((len(t), *states.shape[:2]))
     found[0] = states[:, :, 0]
     for k in range(1, len(t)):
-        streamed(states, samples[k - 1], samples[k], M[k], t[k] - t[k - 1], longest, drives)
+        streamed(states, samples[k - 1], samples[k], M[k], G[k], t[k] - t[k - 1], longest, drives)
         found[k] = states[:, :, 0]
     return found
 
@@ -186,5 +190,5 @@ def advanced_drives(
 ) -> None:  # fmt: skip
     """`loaded`, `streamed` and `link_angles` of a sample dt [s] after `before`."""
     loaded(tree, drives, root, work, found, moving, samples)
-    streamed(states, before, samples, found.inertia[0], dt, longest, drives)
+    streamed(states, before, samples, found.inertia[0], found.stiffness[0], dt, longest, drives)
     link_angles(states, moving, drives, angles)

@@ -54,6 +54,7 @@ AS_SEEN: Moved = {}
 STAGE = "drive_trains"
 DEFLECTION = 1e-2  # [rad] of a drive at its largest torque, prior
 _SHORTEST = 1.5  # [s] of a trial
+_TAIL = 0.02  # of the readings, beyond what links do behind their motors
 
 
 def fit_drive_trains(  # noqa: PLR0913
@@ -74,8 +75,8 @@ def fit_drive_trains(  # noqa: PLR0913
         hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
         moved: How the base moved in trials in which that is not taken from its markers.
     """
-    offset = motor_zeros(hand)
-    weighed = hung_load(urdf, description, offset, trials)
+    offset, middle = motor_zeros(hand), _middles(trials)
+    weighed = hung_load(urdf, description, offset, [_by_links(trial, middle) for trial in trials])
     hung, unlikely = (None, (_unlikely(weighed),)) if weighed and weighed.departs > DEPARTS else (weighed, ())
     bare = DriveTrains(dynamics(urdf, description, offset, hung), (), urdf, description, hung)
     try:
@@ -88,7 +89,8 @@ def fit_drive_trains(  # noqa: PLR0913
     used = [trial for trial in trials if is_long(trial)]
     loads = side_by_side(lambda trial: loads_of_trial(bare, trial, robot, hand, moved.get(trial.id)), used)
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
-    tried = _identified(bare, loads, differences, hand)
+    behind = [of.behind(np.nan_to_num(d - middle)) for of, d in zip(loads, differences, strict=True)]
+    tried = _identified(bare, behind, differences, hand)
     trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))
     slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
     found = replace(bare, trains=trains)
@@ -111,7 +113,7 @@ def loads_of_trial(
         T_lab_base = moved.T_lab_B @ inverse(from_vector(hand.base))
         base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t), moved.by_plate)
     own, q = trains.of_trial(trial.id), trial.q_motor[rows]
-    return own.dynamics.loads(trial.id, t, q, base, own.hand(t, q, trial.wrist_wrench[rows]).joints)
+    return own.loads(trial.id, t, q, base, trial.wrist_wrench[rows])
 
 
 def motor_zeros(hand: HandModel) -> np.ndarray:
@@ -119,6 +121,21 @@ def motor_zeros(hand: HandModel) -> np.ndarray:
     offset = np.zeros(len(hand.chain.measured))
     offset[hand.chain.columns] = hand.offset
     return offset
+
+
+def _middles(trials: Sequence[Trial]) -> np.ndarray:
+    """(n_joints,) motor less link reading in the middle of what links do behind their motors; NaN without encoder."""
+    found = np.concatenate([trial.q_motor - trial.q_link for trial in trials])
+    seen = np.isfinite(found).any(axis=0)
+    ends = np.full((2, len(seen)), np.nan)
+    ends[:, seen] = np.nanquantile(found[:, seen], [_TAIL, 1.0 - _TAIL], axis=0)
+    return np.asarray(ends.mean(axis=0))
+
+
+def _by_links(trial: Trial, middle: np.ndarray) -> Trial:
+    """The trial with what link encoders read, on the motors' zeros, in the place of motor readings."""
+    read = trial.q_link + middle
+    return replace(trial, q_motor=np.where(np.isfinite(read), read, trial.q_motor))
 
 
 def _complete(trial: Trial) -> np.ndarray:

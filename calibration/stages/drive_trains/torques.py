@@ -12,8 +12,8 @@ turns all it carries by its compliance times the moment of what it carries. 5 mr
 shoulder.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -54,6 +54,7 @@ class LinkLoads:
         inertia: (n, k, k) M [kg.m2, kg.m, kg]; of a pushed hand, without what hangs on the wrist's sensor.
         regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
+        stiffness: (n, k, k) G, how tau grows with the joints' positions [N.m/rad, N].
     """
 
     trial_id: str
@@ -66,6 +67,20 @@ class LinkLoads:
     inertia: np.ndarray
     regressor: np.ndarray
     moment: np.ndarray
+    stiffness: np.ndarray
+
+    def behind(self, delta: np.ndarray) -> "LinkLoads":
+        """Where links are delta (n, k) [rad] behind their motors: each joint's if it followed, as the others move it.
+
+        tau_i - sum_j G_ij delta_j - sum_(j != i) M_ij d2 delta_j / dt2
+        """
+        a = derivatives(self.t, delta, CUTOFF)[2]
+        moved = (self.inertia @ a[..., None])[..., 0] - np.einsum("nii,ni->ni", self.inertia, a)
+        return replace(self, torque=self.torque - (self.stiffness @ delta[..., None])[..., 0] - moved)
+
+
+LoadsUnder = Callable[[Push | None, np.ndarray | None], LinkLoads]
+"""Loads by what pushes the hand, and by about how far (n, k) links are behind their motors."""
 
 
 @dataclass(frozen=True)
@@ -96,22 +111,31 @@ class Dynamics:
         q: np.ndarray,
         base: np.ndarray | None = None,
         push: Push | None = None,
+        delta: np.ndarray | None = None,
     ) -> LinkLoads:
         """Loads at motor readings q (n, k) taken at t (n,) [s], without NaN.
 
-        `base` (n, 6) as `base_acceleration` has it, `push` on the hand.
+        `base` (n, 6) as `base_acceleration` has it, `push` on the hand, `delta` (n, k) as of `evaluated`.
         """
         smooth, v, a = derivatives(t, q, CUTOFF)
-        return LinkLoads(trial_id, t, q, smooth - self.offset, v, a, *self.evaluated(smooth, v, a, base, push))
+        found = self.evaluated(smooth, v, a, base, push, delta)
+        return LinkLoads(trial_id, t, q, smooth - self.offset, v, a, *found)
 
-    def evaluated(
-        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: Push | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Torques (n, k), inertias (n, k, k), regressors (n, k, p), moments (n, 2) at readings and derivatives."""
+    def evaluated(  # noqa: PLR0913
+        self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: Push | None = None,
+        delta: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Torques (n, k), inertias (n, k, k), regressors (n, k, p), moments (n, 2), stiffnesses at readings (n, k).
+
+        Where links are about delta (n, k) behind their motors, torques are tau(q - delta) + G delta: those that, less G
+        times what links are behind, are right there, a push in the axes of the hand included.
+        """
+        delta = np.zeros(q.shape) if delta is None else delta
         root, tree = self.root(base), self.tree
         if push is not None:
             root, tree = np.concatenate([np.broadcast_to(root, (len(q), 12)), push.wrench], axis=1), push.on(tree)
-        found = dynamics_along(tree, q - self.offset, v, a, root, True)
+        found = dynamics_along(tree, q - delta - self.offset, v, a, root, True)
+        torque = found.torque + (found.stiffness @ delta[..., None])[..., 0]
         a_0, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
         tilt = np.stack(
             [
@@ -121,7 +145,8 @@ class Dynamics:
             axis=2,
         )
         bending = -(tilt @ found.moment[..., None])
-        return found.torque, found.inertia, np.concatenate([found.regressor, tilt, bending], axis=2), found.moment
+        R = np.concatenate([found.regressor, tilt, bending], axis=2)
+        return torque, found.inertia, R, found.moment, found.stiffness
 
     def root(self, base: np.ndarray | None) -> np.ndarray:
         """Twist, zero, and proper acceleration (n, 12) of the base; `base` (n, 6) as of `loads`."""

@@ -118,8 +118,7 @@ class Links(NamedTuple):
         """
         at, q, _ = self.readings
         moving, in_plane = self.trains.base_acceleration(t, T_lab_base, at), upright(T_lab_base, self.T_lab_0)
-        joints = UNSEEN.joints if self.wrist is None else self.trains.hand(at, q, self.wrist, moving).joints
-        links, floor = self.trains.likely(self.trains.dynamics.loads("", at, q, moving, joints)), UNSEEN.floor
+        links, floor = self.trains.likely(self.trains.loads("", at, q, moving, self.wrist)), UNSEEN.floor
         if self.wrist is not None:
             moving = self.trains.base_acceleration(t, self.T_lab_0 @ from_vector(in_plane), at)
             floor = self.trains.hand(at, links, self.wrist, moving).floor

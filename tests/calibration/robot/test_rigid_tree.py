@@ -61,3 +61,17 @@ def test_a_sample_alone_is_that_of_many(arm):
     many = dynamics_along(tree, q, v, a, np.ones((1, 12)))
     one = dynamics_along(tree, q[3:4], v[3:4], a[3:4], np.ones((1, 12)))
     assert (one.torque[0] == many.torque[3]).all() and one.regressor.shape == (1, K, 0)
+
+
+def test_stiffness_is_how_weight_grows_with_position(arm):
+    joints, rng = tuple(f"joint_{i}" for i in range(K)), np.random.default_rng(3)
+    q, still, a_0, data = rng.normal(size=K), np.zeros(K), rng.normal(size=3), arm.createData()
+    root = np.concatenate([np.zeros(6), a_0, np.zeros(3)])[None]
+    found = dynamics_along(tree_of(arm, joints), q[None], still[None], still[None], root).stiffness[0]
+    held = arm.copy()
+    held.gravity = pin.Motion(-a_0, np.zeros(3))
+    columns = [arm.joints[arm.getJointId(name)].idx_v for name in joints]
+    step = np.zeros(arm.nv)
+    step[columns] = q
+    expected = pin.computeGeneralizedGravityDerivatives(held, data, pin.integrate(arm, pin.neutral(arm), step))
+    np.testing.assert_allclose(found, expected[np.ix_(columns, columns)], atol=1e-11)

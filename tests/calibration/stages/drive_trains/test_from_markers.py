@@ -10,10 +10,11 @@ from calibration.errors import NotEnoughData
 from calibration.recording.clock import shared_clock
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import HandModel, nominal_hand
+from calibration.stages.drive_trains import from_markers
 from calibration.stages.drive_trains.column_bending import rigid
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.from_markers import completed, seen_joint
+from calibration.stages.drive_trains.from_markers import completed, identified_by_markers, seen_joint
 from calibration.stages.drive_trains.stage import loads_of_trial
 from calibration.stages.drive_trains.torques import dynamics
 from tests.doubles import rigid_robot
@@ -69,3 +70,21 @@ def test_joints_whose_drive_trains_are_known_are_no_noise_for_others(trains, tri
 def test_recordings_without_motion_show_no_drive_train(trains, hand):
     with pytest.raises(NotEnoughData):
         completed(hand.chain, [], shared_clock("robot"), hand, trains)
+
+
+def test_the_torque_is_that_of_links_as_the_markers_show_them(trains, trial, hand, monkeypatch):
+    clock, used = shared_clock("robot"), []
+
+    def data(loads, seen, column, modes, window):
+        used.append((loads[0], seen[0].y))
+        raise NotEnoughData("enough of it")
+
+    monkeypatch.setattr(from_markers, "_data", data)
+    loads = loads_of_trial(trains, trial, clock, hand)
+    with pytest.raises(NotEnoughData, match="enough of it"):
+        identified_by_markers(trains, JOINT, [trial], [loads], clock, hand, rigid("torso_lift_joint"))
+    ((found, y),) = used
+    delta = np.zeros(loads.q.shape)
+    delta[:, COLUMN] = np.nan_to_num(y - np.nanmedian(y))
+    np.testing.assert_allclose(found.torque, loads.behind(delta).torque, atol=1e-12)
+    assert np.abs(found.torque - loads.torque).max() > 1e-3

@@ -64,7 +64,7 @@ def trains() -> DriveTrains:
 def test_gravity_and_inertia_of_a_pendulum() -> None:
     robot, q = dynamics(), np.array([[0.3, 0.0]])
     still = np.zeros((1, 2))
-    torque, inertia, _, _ = robot.evaluated(q, still, still, None)
+    torque, inertia, *_ = robot.evaluated(q, still, still, None)
     assert torque[0, 1] == pytest.approx(2.0 * 9.81 * 0.3 * np.sin(0.3), rel=1e-12)
     own, above = 0.02 + 2.0 * 0.3**2, 2.0 * 0.3 * 0.6 * np.cos(0.0)
     expected = [[0.02 + 2.0 * 0.3**2 + 2.0 * 0.6**2 + 2.0 * above + own, own + above], [own + above, own]]
@@ -74,10 +74,10 @@ def test_gravity_and_inertia_of_a_pendulum() -> None:
 def test_regressors_are_what_other_masses_do() -> None:
     robot, q = dynamics(), np.array([[0.3, -0.5]])
     v, a = np.array([[0.7, 0.2]]), np.array([[1.0, -2.0]])
-    torque, _, R, _ = robot.evaluated(q, v, a, None)
+    torque, _, R, *_ = robot.evaluated(q, v, a, None)
     heavier = robot.model.copy()
     heavier.inertias[3] = heavier.inertias[3] + pin.Inertia(0.1, np.array([0.01, 0.0, 0.2]), np.zeros((3, 3)))
-    again, _, _, _ = replace(robot, model=heavier).evaluated(q, v, a, None)
+    again, *_ = replace(robot, model=heavier).evaluated(q, v, a, None)
     dphi = np.zeros(R.shape[2])
     dphi[4:8] = 0.1, 1e-3, 0.0, 0.02
     point = 0.1 * np.array([0.2**2 + 0.01**2])  # of a point mass about its joint, which first moments leave out
@@ -87,9 +87,9 @@ def test_regressors_are_what_other_masses_do() -> None:
 
 def test_a_tilt_of_the_base_is_a_turned_gravity() -> None:
     robot, q, still = dynamics(), np.array([[0.3, -0.5]]), np.zeros((1, 2))
-    torque, _, R, _ = robot.evaluated(q, still, still, None)
+    torque, _, R, *_ = robot.evaluated(q, still, still, None)
     tilted = replace(robot, gravity=9.81 * np.array([np.sin(1e-5), 0.0, -np.cos(1e-5)]))
-    again, _, _, _ = tilted.evaluated(q, still, still, None)
+    again, *_ = tilted.evaluated(q, still, still, None)
     assert (again - torque)[0] / 1e-5 == pytest.approx(R[0, :, -2], rel=1e-4)
 
 
