@@ -270,17 +270,17 @@ def sample(
 @njit(cache=True, error_model="numpy")
 def _gather(tree: RigidTree, work: np.ndarray, j: int, out: TreeDynamics, i: int) -> None:
     """What joint j bears into sample i of `out`, and to the body that carries it."""
-    me, up, column, b, leans = work[j + 1], work[tree.parent[j]], tree.column[j], j + 1, np.zeros(6)
+    me, root, up, column, b = work[j + 1], work[0], work[tree.parent[j]], tree.column[j], j + 1
     out.torque[i, column] = dot(me, _S, me, _F)
     _times(me, _S, me, _X)
-    cross(me, _X, work[0], _A, leans, _R + 3)
+    root[_X:_I] = 0.0  # scratch of the root: how what the joint carries weighs as it turns
+    cross(me, _X, root, _A, root, _X + 3)
     while b > 0:  # the joints that carry this one
         other = tree.column[b - 1]
         out.inertia[i, other, column] = out.inertia[i, column, other] = dot(work[b], _S, me, _X)
-        out.stiffness[i, other, column] = out.stiffness[i, column, other] = dot(work[b], _S, leans, _R)
+        out.stiffness[i, other, column] = out.stiffness[i, column, other] = dot(work[b], _S, root, _X)
         b = tree.parent[b - 1]
-    for c in range(3):
-        out.coupling[i, column, c] = me[_X + c]
+    out.coupling[i, column] = me[_X : _X + 3]
     for c in range(_F, _ROW):  # the twist between is scratch
         up[c] += me[c]
 
