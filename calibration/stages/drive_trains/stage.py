@@ -75,8 +75,8 @@ def fit_drive_trains(  # noqa: PLR0913
         hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
         moved: How the base moved in trials in which that is not taken from its markers.
     """
-    offset, middle = motor_zeros(hand), _middles(trials)
-    weighed = hung_load(urdf, description, offset, [_by_links(trial, middle) for trial in trials])
+    offset, ends = motor_zeros(hand), _ends(trials)
+    weighed = hung_load(urdf, description, offset, [_by_links(trial, ends.mean(axis=0)) for trial in trials])
     hung, unlikely = (None, (_unlikely(weighed),)) if weighed and weighed.departs > DEPARTS else (weighed, ())
     bare = DriveTrains(dynamics(urdf, description, offset, hung), (), urdf, description, hung)
     try:
@@ -89,7 +89,7 @@ def fit_drive_trains(  # noqa: PLR0913
     used = [trial for trial in trials if is_long(trial)]
     loads = side_by_side(lambda trial: loads_of_trial(bare, trial, robot, hand, moved.get(trial.id)), used)
     differences = [(trial.q_motor - trial.q_link)[_complete(trial)] for trial in used]
-    behind = [of.behind(np.nan_to_num(d - middle)) for of, d in zip(loads, differences, strict=True)]
+    behind = [of.behind(_behind(of.t, d, ends)) for of, d in zip(loads, differences, strict=True)]
     tried = _identified(bare, behind, differences, hand)
     trains = tuple(train for train in tried.values() if isinstance(train, DriveTrain))
     slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
@@ -123,13 +123,26 @@ def motor_zeros(hand: HandModel) -> np.ndarray:
     return offset
 
 
-def _middles(trials: Sequence[Trial]) -> np.ndarray:
-    """(n_joints,) motor less link reading in the middle of what links do behind their motors; NaN without encoder."""
+def _ends(trials: Sequence[Trial]) -> np.ndarray:
+    """Motor less link reading (2, n_joints) at either end of what links do behind their motors; NaN without encoder."""
     found = np.concatenate([trial.q_motor - trial.q_link for trial in trials])
     seen = np.isfinite(found).any(axis=0)
     ends = np.full((2, len(seen)), np.nan)
     ends[:, seen] = np.nanquantile(found[:, seen], [_TAIL, 1.0 - _TAIL], axis=0)
-    return np.asarray(ends.mean(axis=0))
+    return ends
+
+
+def _behind(t: np.ndarray, difference: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """How far links are behind their motors (n, k) [rad] at t (n,), by motor less link readings; 0 without an encoder.
+
+    No farther than twice what is usual, by a false reading; in a hole of the readings what is next to it.
+    """
+    width = ends[1] - ends[0]
+    delta = np.clip(difference - ends.mean(axis=0), -width, width)
+    for column in delta.T:
+        rows = np.isfinite(column)
+        column[:] = np.interp(t, t[rows], column[rows]) if rows.any() else 0.0
+    return delta
 
 
 def _by_links(trial: Trial, middle: np.ndarray) -> Trial:

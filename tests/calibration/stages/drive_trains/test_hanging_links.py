@@ -78,7 +78,7 @@ def test_the_middle_of_a_gap_is_found_however_long_a_link_rests_on_either_flank(
     link = np.full(q.shape, np.nan)
     link[:, 6] = q[:, 6] - y
     seen = replace(trial, q_motor=q, q_link=link)
-    middle = stage._middles([seen])
+    middle = stage._ends([seen]).mean(axis=0)
     assert middle[6] == pytest.approx(zero, abs=1e-12) and np.isnan(np.delete(middle, 6)).all()
     np.testing.assert_allclose(np.abs(stage._by_links(seen, middle).q_motor[:, 6]), half, atol=1e-12)
     assert (stage._by_links(seen, middle).q_motor[:, :6] == 0.0).all()
@@ -101,3 +101,18 @@ def test_drive_trains_are_fitted_to_links_where_their_encoders_read_them(monkeyp
     np.testing.assert_allclose(used["loads"][0].torque, expected, atol=1e-9)
     assert np.abs(expected - loads[trial.id].torque).max() > 0.01
     np.testing.assert_allclose(weighed[0].q_motor, trial.q_motor - behind, atol=1e-12)
+
+
+def test_a_hole_in_link_readings_or_a_false_one_moves_no_link() -> None:
+    t, rng = 0.01 * np.arange(300), np.random.default_rng(0)
+    y = np.column_stack([np.where(t < 2.0, 5e-3, -5e-3) + 0.1, np.full(300, np.nan)])
+    ends = np.array([[0.095, np.nan], [0.105, np.nan]])
+    broken = y.copy()
+    broken[rng.choice(180, 40, replace=False), 0] = np.nan
+    np.testing.assert_allclose(
+        stage._behind(t, broken, ends), np.column_stack([y[:, 0] - 0.1, np.zeros(300)]), atol=1e-12
+    )
+    broken = y.copy()
+    broken[50, 0] = 3.0
+    off = stage._behind(t, broken, ends) - stage._behind(t, y, ends)
+    assert off[50, 0] == pytest.approx(5e-3) and (np.delete(off, 50, axis=0) == 0.0).all()
