@@ -67,11 +67,8 @@ def test_hidden_markers_cost_no_posture_and_hardly_any_error(twin, tmp_path):
     assert np.mean(ratios) < 1.05 and max(ratios) < 1.2
 
 
-NAMED = pytest.mark.xfail(reason="docs/limits.md: arm_3 alone on the other side of its gap", strict=True)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [pytest.param(s, marks=NAMED) if s == 931 else s for s in random_cases.MENDED])
+@pytest.mark.parametrize("seed", random_cases.MENDED)
 def test_a_clean_campaign_that_was_once_named_is_not(seed, tmp_path):
     (clean,) = random_cases.tried_robot(seed, 0, tmp_path)
     assert not clean.messages
