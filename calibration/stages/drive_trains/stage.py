@@ -54,7 +54,7 @@ AS_SEEN: Moved = {}
 STAGE = "drive_trains"
 DEFLECTION = 1e-2  # [rad] of a drive at its largest torque, prior
 _SHORTEST = 1.5  # [s] of a trial
-_TAIL = 0.02  # of the readings, beyond what links do behind their motors
+_TAIL = 0.02  # share of the readings beyond either end of what links do behind their motors: false ones
 
 
 def fit_drive_trains(  # noqa: PLR0913
@@ -75,7 +75,8 @@ def fit_drive_trains(  # noqa: PLR0913
         hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
         moved: How the base moved in trials in which that is not taken from its markers.
     """
-    offset, ends = motor_zeros(hand), _ends(trials)
+    offset = motor_zeros(hand)
+    ends = _ends(trials, len(offset))
     weighed = hung_load(urdf, description, offset, [_by_links(trial, ends.mean(axis=0)) for trial in trials])
     hung, unlikely = (None, (_unlikely(weighed),)) if weighed and weighed.departs > DEPARTS else (weighed, ())
     bare = DriveTrains(dynamics(urdf, description, offset, hung), (), urdf, description, hung)
@@ -123,19 +124,20 @@ def motor_zeros(hand: HandModel) -> np.ndarray:
     return offset
 
 
-def _ends(trials: Sequence[Trial]) -> np.ndarray:
-    """Motor less link reading (2, n_joints) at either end of what links do behind their motors; NaN without encoder."""
-    found = np.concatenate([trial.q_motor - trial.q_link for trial in trials])
-    seen = np.isfinite(found).any(axis=0)
-    ends = np.full((2, len(seen)), np.nan)
-    ends[:, seen] = np.nanquantile(found[:, seen], [_TAIL, 1.0 - _TAIL], axis=0)
+def _ends(trials: Sequence[Trial], k: int) -> np.ndarray:
+    """Motor less link reading (2, k) at either end of what links do behind their motors; NaN without an encoder."""
+    found = np.concatenate([np.zeros((0, k)), *(trial.q_motor - trial.q_link for trial in trials)])
+    seen, ends = np.isfinite(found).any(axis=0), np.full((2, k), np.nan)
+    if seen.any():
+        ends[:, seen] = np.nanquantile(found[:, seen], [_TAIL, 1.0 - _TAIL], axis=0)
     return ends
 
 
 def _behind(t: np.ndarray, difference: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """How far links are behind their motors (n, k) [rad] at t (n,), by motor less link readings; 0 without an encoder.
 
-    No farther than twice what is usual, by a false reading; in a hole of the readings what is next to it.
+    A false reading moves it no farther from the middle than twice as far as either of `ends` (2, k); a hole in the
+    readings is bridged.
     """
     width = ends[1] - ends[0]
     delta = np.clip(difference - ends.mean(axis=0), -width, width)

@@ -70,7 +70,7 @@ class LinkLoads:
     stiffness: np.ndarray
 
     def behind(self, delta: np.ndarray) -> "LinkLoads":
-        """Where links are delta (n, k) [rad] behind their motors: each joint's if it followed, as the others move it.
+        """Loads of links that are delta (n, k) [rad] behind their motors; its own acceleration is still its motor's.
 
         tau_i - sum_j G_ij delta_j - sum_(j != i) M_ij d2 delta_j / dt2
         """

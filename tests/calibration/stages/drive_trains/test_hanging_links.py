@@ -78,7 +78,7 @@ def test_the_middle_of_a_gap_is_found_however_long_a_link_rests_on_either_flank(
     link = np.full(q.shape, np.nan)
     link[:, 6] = q[:, 6] - y
     seen = replace(trial, q_motor=q, q_link=link)
-    middle = stage._ends([seen]).mean(axis=0)
+    middle = stage._ends([seen], len(rigid_robot.JOINTS)).mean(axis=0)
     assert middle[6] == pytest.approx(zero, abs=1e-12) and np.isnan(np.delete(middle, 6)).all()
     np.testing.assert_allclose(np.abs(stage._by_links(seen, middle).q_motor[:, 6]), half, atol=1e-12)
     assert (stage._by_links(seen, middle).q_motor[:, :6] == 0.0).all()
@@ -116,3 +116,9 @@ def test_a_hole_in_link_readings_or_a_false_one_moves_no_link() -> None:
     broken[50, 0] = 3.0
     off = stage._behind(t, broken, ends) - stage._behind(t, y, ends)
     assert off[50, 0] == pytest.approx(5e-3) and (np.delete(off, 50, axis=0) == 0.0).all()
+
+
+def test_without_trials_there_is_no_drive_train_and_a_message() -> None:
+    described = rigid_robot.described()
+    found, verdicts, loads = stage.fit_drive_trains(mjcf.urdf(), described, [], joint_data.ROBOT, joint_data.hand())
+    assert not found.trains and not loads and [v.verdict for v in verdicts] == ["missing"]
