@@ -34,7 +34,7 @@ from calibration.stages.suspension.floor_wrench import Load, floor_load
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest, rest_at, upright
 
-_STILL = np.zeros((2, 3))
+_STILL, _LAGS = np.zeros((3, 3)), np.zeros((2, 3))
 _UPRIGHT = 1e-9  # [m/s2] gravity's components in two frames 0 that are one direction
 
 
@@ -163,7 +163,7 @@ class BaseState(NamedTuple):
         y: (k,) where the modes are.
         x: (6,) displacement by the springs on all axes [m, rad, frame 0].
         moved: (1, 4, 4) how the base moved in the lab.
-        acceleration: (2, 3) linear and angular of the base frame [m/s2, rad/s2, lab axes], of a base that slips.
+        moves: (3, 3) how a base that slips accelerates, linear and angular, and turns [m/s2, rad/s2, rad/s, lab axes].
         slip: State of a base that slips; None of one that does not.
         lags: (2, 3) z and tilt through one lag and two, of a base that slips.
     """
@@ -177,9 +177,9 @@ class BaseState(NamedTuple):
     y: np.ndarray
     x: np.ndarray
     moved: np.ndarray
-    acceleration: np.ndarray
+    moves: np.ndarray
     slip: SlipState | None = None
-    lags: np.ndarray = _STILL
+    lags: np.ndarray = _LAGS
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ V that of `LinkAngles` and the readings' random error, as the hand's markers sho
 at least what link encoders showed in dwells. sigma_c, sigma_b are the standard
 deviations of the meshes' and the column's compliance.
 
-The base's tilt and accelerations load the drive trains, where its pose is known. Readings of which no motion is known
-are each taken to be at rest: the load decides the side of a mesh, else the link is anywhere in what friction holds.
+Where its pose is known, the base loads drive trains as it leans, turns and accelerates. Readings of which no motion
+is known are each taken to be at rest: the load decides the side of a mesh, else the link is anywhere in what friction
+holds.
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ from calibration.stages.drive_trains.link_streams import RESTS
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.suspension.floor_wrench import root_in_base
 
-_AT_REST = np.zeros((2, 3))
+_AT_REST = np.zeros((3, 3))
 
 
 class ArmPositions(NamedTuple):
@@ -93,7 +94,7 @@ class BundledArm:
             NotEnoughData: Less than a second of readings and no velocity.
         """
         robot = self.trains.dynamics
-        base = None if T_lab_base is None else self.trains.base_acceleration(t, T_lab_base, t, by_plate)
+        base = None if T_lab_base is None else self.trains.base_motion(t, T_lab_base, t, by_plate)
 
         def under(push: Push | None, delta: np.ndarray | None) -> LinkLoads:
             if velocity is None:
@@ -145,15 +146,16 @@ class BundledArm:
             drives, angles = self._stream.step(before.drives, t, moving, base)
         return ArmState(drives, ArmPositions(angles.q, angles.variance, drives.moment, drives.torque, moving[1:2]))
 
-    def root(self, T_lab_base: np.ndarray | None, accelerations: np.ndarray | None = None) -> np.ndarray | None:
+    def root(self, T_lab_base: np.ndarray | None, moves: np.ndarray | None = None) -> np.ndarray | None:
         """The root (1, 12) as `Dynamics.root` has it, the base frame at T_lab_base (4, 4); None if that is not known.
 
-        `accelerations` (2, 3) of the base frame, linear and angular, lab axes [m/s2, rad/s2]; at rest where not given.
+        `moves` (3, 3): how the base frame accelerates, linear and angular, and turns [m/s2, rad/s2, rad/s, lab axes];
+        at rest where not given.
         """
         if T_lab_base is None:
             return None
-        a = _AT_REST if accelerations is None else accelerations
-        return np.asarray(_root(T_lab_base, self._T_base_root, self.trains.dynamics.gravity, a))
+        a = _AT_REST if moves is None else moves
+        return np.asarray(moving_root(T_lab_base, self._T_base_root, self.trains.dynamics.gravity, a))
 
     def bends(self, hand: HandModel, positions: ArmPositions) -> np.ndarray:
         """Q (n, 4, 4) in the base's marker body."""
@@ -197,8 +199,8 @@ class BundledArm:
 
 
 @njit(cache=True, error_model="numpy")
-def _root(T_lab_base: np.ndarray, T_base_root: np.ndarray, gravity: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """R' (a_base + alpha x p - gravity) and R' alpha of the root after 6 zeros, p its place beside the base [m]."""
+def moving_root(T_lab_base: np.ndarray, T_base_root: np.ndarray, gravity: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """0, R' omega, R' (a_base + alpha x p - gravity) and R' alpha of the root, p its place beside the base [m]."""
     push, R, p, found = np.empty(3), np.zeros((3, 3)), np.zeros(3), np.zeros((1, 12))
     for i in range(3):
         for k in range(3):
@@ -210,6 +212,7 @@ def _root(T_lab_base: np.ndarray, T_base_root: np.ndarray, gravity: np.ndarray, 
         push[i] = a[0, i] + a[1, j] * p[k] - a[1, k] * p[j] - gravity[i]
     for c in range(3):
         for i in range(3):
+            found[0, 3 + c] += R[i, c] * a[2, i]
             found[0, 6 + c] += R[i, c] * push[i]
             found[0, 9 + c] += R[i, c] * a[1, i]
     return found

@@ -247,7 +247,7 @@ class Compensator:
             else:
                 state = self.slipping.stepped(there, t, w, None if v is None else moving, before.base)
                 variance = partial(self.slipping.variance, state)
-        moved, a = (None, None) if state is None else (state.moved, state.acceleration)
+        moved, a = (None, None) if state is None else (state.moved, state.moves)
         T = placed(T_lab_base_start, moved, 1)
         if self.arm is not None and moving is not None:
             arm = self.arm.stepped(t, moving, before.arm, self.arm.root(None if T is None else T[0], a))

@@ -180,6 +180,7 @@ class SlippingBase:
     def _robot(self) -> tuple[RigidTree, tuple[np.ndarray, np.ndarray], np.ndarray, TreeDynamics]:
         """The tree, how T_0_root acts on wrenches and back on twists (6, 6), scratch of the dynamics."""
         T, tree = root_in_base(self.lab.floating, self.lab.description), self.lab.tree
+        T.translation += np.append(self.model.tilting.off, 0.0)  # where wheels have it
         actions = np.array(T.dualAction, order="C"), np.array(T.inverse().action, order="C")
         return tree, actions, scratch(tree), room(1, len(tree.column))
 
@@ -232,12 +233,13 @@ def lagged(h: np.ndarray, before: np.ndarray, lags: np.ndarray, dt: float) -> tu
 
 
 @njit(cache=True, error_model="numpy")
-def accelerating(planar: np.ndarray, heaving: np.ndarray, T_lab_base: np.ndarray) -> np.ndarray:
-    """(2, 3) linear and angular, lab axes, of a base that accelerates by (3,) in the plane, (3,) in heave and tilt."""
-    own, a = np.zeros(6), np.zeros((2, 3))
+def accelerating(planar: np.ndarray, heaving: np.ndarray, T_lab_base: np.ndarray, turns: float) -> np.ndarray:
+    """(3, 3) as of `BaseState`: a base accelerates by (3,) in the plane, (3,) in heave and tilt, and turns [rad/s]."""
+    own, a = np.zeros(6), np.zeros((3, 3))
     for k in range(3):
         own[HEAVE[k]], own[PLANE[k]] = heaving[k], planar[k]
     for i in range(3):
+        a[2, i] = T_lab_base[i, 2] * turns
         for c in range(3):
             a[0, i] += T_lab_base[i, c] * own[c]
             a[1, i] += T_lab_base[i, c] * own[3 + c]
@@ -262,8 +264,7 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     """`SlippingBase.stepped` after the first second: fields of the states.
 
     Returns:
-        wrench, y and u, x, lags, moved, acceleration of `BaseState`; row, state, wheels, learnt of bases, found of
-        `SlipState`.
+        wrench, y and u, x, lags, moved, moves of `BaseState`; row, arrays of bases, found of `SlipState`.
     """
     w, x, own, change, turn = np.zeros((1, 6)), np.empty(6), np.empty((1, 6)), np.empty(6), np.zeros((1, 4, 4))
     row, found, driving = np.empty(COLUMNS), np.empty((5, 3)), UNDRIVEN.copy()
@@ -293,6 +294,7 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     from_vectors(own, turn)
     moved, scratch = place.T_lab_0.copy().reshape(1, 4, 4), np.empty((3, 4))
     shift(moved[0], turn[0], scratch)
-    a = accelerating(mean_of(after.state, ACCELERATION, fitted.members), heaving, moved[0])
+    v, a = mean_of(after.state, VELOCITY, fitted.members), mean_of(after.state, ACCELERATION, fitted.members)
+    a = accelerating(a, heaving, moved[0], v[2])
     shift(moved[0], place.T_0_lab, scratch)
     return sprung[0], modes, x, lags, moved, a, row, after.state, after.wheels, after.learnt, found

@@ -141,7 +141,7 @@ class WristSensor:
     ) -> Push | None:
         """h of a hand that nothing pushes, in the place of what nominally hangs there; None without a second of it.
 
-        `base` (n, 6) is the proper acceleration of the root at t; None: it is at rest.
+        `base` (n, 12) is twist and proper acceleration of the root at t; None: it is at rest.
         """
         try:
             read = smoothed(t, q, wrench)
@@ -182,8 +182,8 @@ class WristSensor:
         return interpolate_columns(t, at, wrench @ pin.SE3(self.body).dualAction.T)
 
     def _moved(self, at: "SmoothReadings", base: np.ndarray | None = None) -> np.ndarray:
-        """f (n, 6) in the sensor's axes about its origin, on a root of proper acceleration (n, 6) or at rest."""
-        root = self.at_rest if base is None else np.concatenate([np.zeros(base.shape), base], axis=1)
+        """f (n, 6) in the sensor's axes about its origin, on a root that moves (n, 12) or is at rest."""
+        root = self.at_rest if base is None else base
         found = dynamics_along(self.tree, at.q, at.v, at.a, root)
         T = self.root @ self.chain.poses(at.q[:, self.chain.columns], self.link)
         R, moment = T[:, :3, :3], found.root[:, 3:] - np.cross(T[:, :3, 3], found.root[:, :3])

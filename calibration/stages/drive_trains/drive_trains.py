@@ -32,7 +32,7 @@ from calibration.stages.drive_trains.torques import (
     Dynamics,
     LinkLoads,
     LoadsUnder,
-    base_acceleration,
+    base_motion,
     dynamics,
     inertials,
 )
@@ -125,15 +125,15 @@ class DriveTrains:
         """The same with other zeros (k,) of the motor readings."""
         return replace(self, dynamics=replace(self.dynamics, offset=offset))
 
-    def base_acceleration(
+    def base_motion(
         self, t: np.ndarray, T_lab_base: np.ndarray, at: np.ndarray, by_plate: bool = False
     ) -> np.ndarray | None:
-        """`torques.base_acceleration` by poses (m, 4, 4) of the base frame."""
+        """`torques.base_motion` by poses (m, 4, 4) of the base frame."""
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
-        return base_acceleration(self.dynamics.gravity, t, T_lab_root, at, by_plate)
+        return base_motion(self.dynamics.gravity, t, T_lab_root, at, by_plate)
 
     def hand(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray, base: np.ndarray | None = None) -> HandLoads:
-        """What the wrist's sensor (n, 6) shows of the hand on a base (n, 6) as `base_acceleration` has it."""
+        """What the wrist's sensor (n, 6) shows of the hand on a base (n, 12) as `base_motion` has it."""
         return hand_load(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist, base)
 
     def loads(

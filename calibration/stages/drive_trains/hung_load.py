@@ -118,7 +118,7 @@ def hand_load(
         t: (n,) [s].
         q: (n, k) motor readings less their zeros, or the links' angles where they are known [rad, m].
         wrench: (n, 6) readings of the sensor.
-        base: (n, 6) proper acceleration of the root, see `torques.base_acceleration`; None: it is at rest.
+        base: (n, 12) how the root moves, see `torques.base_motion`; None: it is at rest.
     """
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
     if sensor is None:

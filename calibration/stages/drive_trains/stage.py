@@ -41,7 +41,7 @@ class MovedBase(NamedTuple):
 
     Attributes:
         T_lab_B: (n, 4, 4) its marker body at the mocap times.
-        by_plate: Whether a plate's wrench predicted it, see `base_acceleration`.
+        by_plate: Whether a plate's wrench predicted it, see `base_motion`.
     """
 
     T_lab_B: np.ndarray
@@ -112,7 +112,7 @@ def loads_of_trial(
             moved = MovedBase(MeasuredTrial.of(description, trial).base.T, by_plate=False)
     if moved is not None and description.marker_frame == "lab":
         T_lab_base = moved.T_lab_B @ inverse(from_vector(hand.base))
-        base = trains.base_acceleration(trial.t_mocap, T_lab_base, robot.to_mocap(t), moved.by_plate)
+        base = trains.base_motion(trial.t_mocap, T_lab_base, robot.to_mocap(t), moved.by_plate)
     own, q = trains.of_trial(trial.id), trial.q_motor[rows]
     return own.loads(trial.id, t, q, base, trial.wrist_wrench[rows])
 

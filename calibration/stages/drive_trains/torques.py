@@ -6,10 +6,10 @@
     tau + R(q, v, a) dphi                  of other masses and first moments (m, m c) by body [kg, kg.m], a tilt of the
                                            base about x and y [rad], and bending of the first joint's column [rad/(N.m)]
 
-at angles q_m - offset. The base is level and at rest, or moves as its markers or a prediction show: its proper
-acceleration a_0 (gravity included) is that of the tree's root. A tilt u turns a_0 by -u x a_0; a column that bends
-turns all it carries by its compliance times the moment of what it carries. 5 mrad are a fifth of a newton metre at the
-shoulder.
+at angles q_m - offset. The base is level and at rest, or moves as its markers or a prediction show: how it turns and
+its proper acceleration a_0 (gravity included) are those of the tree's root. A tilt u turns a_0 by -u x a_0; a column
+that bends turns all it carries by its compliance times the moment of what it carries. 5 mrad are a fifth of a newton
+metre at the shoulder.
 """
 
 from collections.abc import Callable, Sequence
@@ -115,7 +115,7 @@ class Dynamics:
     ) -> LinkLoads:
         """Loads at motor readings q (n, k) taken at t (n,) [s], without NaN.
 
-        `base` (n, 6) as `base_acceleration` has it, `push` on the hand, `delta` (n, k) as of `evaluated`.
+        `base` (n, 12) as `base_motion` has it, `push` on the hand, `delta` (n, k) as of `evaluated`.
         """
         smooth, v, a = derivatives(t, q, CUTOFF)
         found = self.evaluated(smooth, v, a, base, push, delta)
@@ -149,12 +149,8 @@ class Dynamics:
         return torque, found.inertia, R, found.moment, found.stiffness
 
     def root(self, base: np.ndarray | None) -> np.ndarray:
-        """Twist, zero, and proper acceleration (n, 12) of the base; `base` (n, 6) as of `loads`."""
-        if base is None:
-            return np.concatenate([np.zeros(6), -self.gravity, np.zeros(3)])[None]
-        found = np.zeros((len(base), 12))
-        found[:, 6:] = base
-        return found
+        """The base (n, 12) as of `loads`; level and at rest (1, 12) where it is not known."""
+        return np.concatenate([np.zeros(6), -self.gravity, np.zeros(3)])[None] if base is None else base
 
 
 def dynamics(urdf: str, description: Description, offset: np.ndarray, hung: HungLoad | None = None) -> Dynamics:
@@ -198,10 +194,12 @@ def derivatives(t: np.ndarray, q: np.ndarray, cutoff: float) -> tuple[np.ndarray
     return out[0].T.copy(), out[1].T.copy(), out[2].T.copy()
 
 
-def base_acceleration(
+def base_motion(
     gravity: np.ndarray, t: np.ndarray, T_lab_root: np.ndarray, at: np.ndarray, by_plate: bool = False
 ) -> np.ndarray | None:
-    """Proper acceleration (n, 6) of the tree's root at times `at` (n,), linear [m/s2] and angular [rad/s2], its axes.
+    """Twist and proper acceleration (n, 12) of the tree's root at times `at` (n,), linear first, its axes.
+
+    Seen from where the root's origin is at rest: how fast it is [m/s] moves no joint, how fast it turns [rad/s] does.
 
     Args:
         gravity: (3,) in the lab [m/s2].
@@ -219,12 +217,13 @@ def base_acceleration(
     try:
         seen_at = even(t, to_vector(inverse(middle) @ T_lab_root))
     except NotEnoughData:
-        return np.tile(np.append(-gravity @ middle[:3, :3], np.zeros(3)), (len(at), 1))
+        return np.tile(np.concatenate([np.zeros(6), -gravity @ middle[:3, :3], np.zeros(3)]), (len(at), 1))
     bands = _BY_PLATE if by_plate else _BANDS
     moved = from_vector(low_passed(seen_at, bands[0]).x)[:, :3, :3]
     a = _accelerations(seen_at, bands)
     linear = a[:, :3] - (gravity @ middle[:3, :3])
-    columns = np.concatenate([(linear[:, None] @ moved)[:, 0], a[:, 3:]], axis=1)
+    turns = np.gradient(low_passed(seen_at, bands[-1]).x[:, 3:], 1.0 / RATE, axis=0)
+    columns = np.concatenate([0.0 * turns, turns, (linear[:, None] @ moved)[:, 0], a[:, 3:]], axis=1)
     return interpolate_columns(at, seen_at.t, columns)
 
 

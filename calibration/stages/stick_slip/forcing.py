@@ -4,9 +4,9 @@
     vertical load (-Fz, My, -Mx) of the plate, or of inverse dynamics less M_h. d2/dt2 (z, rx, ry)
 
 all about the base frame's origin, in its axes, a plate's in frame 0; p: x, y, yaw, h: z, rx, ry; M(q) the composite
-inertia of the robot as weighed, with the payload of the trial. Heave and tilt are the 6x6 compliance's under that
-source. Forces in the floor's plane count from their mean in the first second. The last of STEPS steps is at its sample.
-Where there are no joint readings the base has no inertia: then the plate alone moves it, at the rate of the correction.
+inertia of the robot as weighed, with the payload of the trial, where it stands. Heave and tilt are the 6x6 compliance's
+under that source. Forces in the floor's plane count from their mean in the first second. The last of STEPS steps is at
+its sample. Without joint readings the base has no inertia: the plate alone moves it, at the rate of the correction.
 """
 
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ from calibration.stages.stick_slip.kernel.heaving import Springs, accelerations,
 from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
 from calibration.stages.suspension.base_response import Forcing, WrenchSources, forcing_of
-from calibration.stages.suspension.floor_wrench import Load, composite_inertia, motion_load, plate_load, vertical
+from calibration.stages.suspension.floor_wrench import Load, composite_inertia, motion_load, moved, plate_load, vertical
 from calibration.stages.suspension.lifting_response import predicted_lifting
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source
@@ -219,7 +219,7 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source, balance
     rows, drive = np.zeros((len(t), 15)), np.zeros((len(fine), COLUMNS))
     rows[:, [0, 3, 5]] = UNMOVED
     if dynamics is not None:
-        M = _resampled(wrenches.t, wrenches.M, t)
+        M = moved(_resampled(wrenches.t, wrenches.M, t), tilting.off)
         rises = _rising(heave, dynamics, main, t, M)(fine) if balanced and main is not dynamics else heave(fine, 2)
         shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], rises)
         drive[:, :3] = (CubicSpline(dynamics.signal.t, dynamics.signal.x)(fine) - shift)[:, PLANE]
@@ -285,7 +285,8 @@ def heave_apart(wrenches: Wrenches, tilting: Tilting, slips: Bases | None) -> np
 def _heaving(wrenches: Wrenches, tilting: Tilting, slips: Bases, forcing: Forcing) -> CubicSpline:
     """z, rx, ry of a base while it slips, see `kernel.heaving`."""
     h, order, t = np.ix_(HEAVE, HEAVE), [*PLANE, *HEAVE], forcing.t
-    standing, M = tilting.standing(wrenches.wheels, "dynamics"), _resampled(wrenches.t, wrenches.M, t)
+    standing = tilting.standing(wrenches.wheels, "dynamics")
+    M = moved(_resampled(wrenches.t, wrenches.M, t), tilting.off)
     K, C, leans = tilting.K[h], tilting.C[h], tilting.leans(vertical(forcing.rest[None])[0])
     springs = Springs(K, damped(K, C), K + forcing.tangent[h], forcing.rest[[*HEAVE]], standing, leans)
     w = CubicSpline(t, forcing.w[:, order])(t[0] + np.arange(STEPS * len(t)) * STEP)

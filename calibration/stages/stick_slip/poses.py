@@ -117,10 +117,10 @@ class Links(NamedTuple):
         The wrist's sensor leans with the base, and the hand weighs downwards: the hand is that of a base upright.
         """
         at, q, _ = self.readings
-        moving, in_plane = self.trains.base_acceleration(t, T_lab_base, at), upright(T_lab_base, self.T_lab_0)
+        moving, in_plane = self.trains.base_motion(t, T_lab_base, at), upright(T_lab_base, self.T_lab_0)
         links, floor = self.trains.likely(self.trains.loads("", at, q, moving, self.wrist)), UNSEEN.floor
         if self.wrist is not None:
-            moving = self.trains.base_acceleration(t, self.T_lab_0 @ from_vector(in_plane), at)
+            moving = self.trains.base_motion(t, self.T_lab_0 @ from_vector(in_plane), at)
             floor = self.trains.hand(at, links, self.wrist, moving).floor
         twist = planar_twist(t, in_plane[:, PLANE], at)
         return motion_load(self.lab, at, links - self.trains.dynamics.offset, self.T_lab_0, CUTOFF, floor, twist)

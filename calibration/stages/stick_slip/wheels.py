@@ -84,8 +84,8 @@ class SlipParameters:
         body_cr: The same about the vertical [N.m.s/rad].
         drive_load: Share of the base's weight on a drive wheel, over what a front caster in its place would bear [-].
         back_load: The same of a back caster [-].
-        load_x: How far ahead of where it is counted the load is [m].
-        load_y: How far to the left.
+        load_x: How far ahead of where it is counted the load is, and the wheels, on which it is counted, behind [m].
+        load_y: How far to the left, and the wheels to the right.
     """
 
     drive_kx: float
@@ -169,7 +169,8 @@ class WheelSet:
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
         parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, np.broadcast_to(self.mass, n.shape)[..., None])
-        return np.concatenate([position + self.shift, *parts], axis=2)
+        ahead = np.stack([of["load_x"], of["load_y"]], axis=1)[:, None]
+        return np.concatenate([position + self.shift - ahead, *parts], axis=2)
 
     def _typed(self, drive: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
         """(k, m) of each wheel, by numbers (k,) of its type."""

@@ -109,6 +109,15 @@ def composite_inertia(
     return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
 
 
+def moved(M: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """Inertias M (n, 6, 6) of a robot that is off (2,) [m] from where it is counted, about the same origin.
+
+    A' M A,  A = [1 -[off]x; 0 1]: the twist of the origin as the robot has it there.
+    """
+    A = pin.SE3(np.eye(3), -np.append(off, 0.0)).action
+    return np.asarray(A.T @ M @ A)
+
+
 def vertical(wrench: np.ndarray) -> np.ndarray:
     """(-Fz, My, -Mx) (n, 3) of wrenches (n, 6)."""
     return np.asarray(wrench[:, (2, 4, 3)] * (-1.0, 1.0, -1.0))

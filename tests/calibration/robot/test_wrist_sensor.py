@@ -84,7 +84,7 @@ def test_a_base_that_accelerates_under_a_pushed_hand_loads_the_joints_once():
     q, w, _ = readings(np.array([5.0, -18.0, 7.0]))
     a, seen = shaken(2.0)
     robot = dynamics(LAB.urdf, HUNG, np.zeros(8))
-    still = np.tile(robot.root(None)[:, 6:], (len(T), 1))
+    still, a = np.tile(robot.root(None), (len(T), 1)), np.hstack([0.0 * a, a])
     at_rest, moving = (robot.loads("", T, q, base=still + x).torque for x in (0.0, a))
     pushed = robot.loads("", T, q, push=hand_push(LAB.urdf, HUNG, T, q, w)).torque - at_rest
     both = robot.loads("", T, q, base=still + a, push=hand_push(LAB.urdf, HUNG, T, q, w + seen)).torque
@@ -97,7 +97,10 @@ def test_a_hand_acts_on_the_floor_as_the_sensor_shows_it_to_move(hertz, known, s
     """What is slow is taken for masses and drift, but what a base does of which it is known how it moves."""
     q, w, _ = readings(np.zeros(3))
     a, seen = shaken(hertz)
-    sensor, base = wrist_sensor(LAB.urdf, HUNG), dynamics(LAB.urdf, HUNG, np.zeros(8)).root(None)[:, 6:] + a
+    sensor, base = (
+        wrist_sensor(LAB.urdf, HUNG),
+        dynamics(LAB.urdf, HUNG, np.zeros(8)).root(None) + np.hstack([0.0 * a, a]),
+    )
     hand = sensor.hand(T, q, w + seen, sensor.tree, base if known else None)
     nominal, moved = (motion_load(LAB, T, q, np.eye(4), 20.0, push).signal.x for push in (None, hand))
     acts = seen @ pin.SE3(LAB.chain.poses(Q[None], LINK)[0]).dualAction.T
@@ -105,6 +108,22 @@ def test_a_hand_acts_on_the_floor_as_the_sensor_shows_it_to_move(hertz, known, s
     off = (moved - nominal)[rows] - share * acts[rows]
     assert (np.abs(off).max(axis=0) < 0.15 * np.abs(acts).max()).all()
     assert not hand.outside and sensor.hand(T[:50], q[:50], w[:50], sensor.tree) is None
+
+
+def test_a_hand_on_a_base_that_turns_is_thrown_outwards():
+    """A base that turns at 0.3 Hz, by its twist and its acceleration: the sensor alone would take it for drift."""
+    q, w, _ = readings(np.zeros(3))
+    base, turns = np.tile(dynamics(LAB.urdf, HUNG, np.zeros(8)).root(None), (len(T), 1)), 0.6 * np.pi
+    base[:, 5], base[:, 11] = 2.0 * np.sin(turns * T), 2.0 * turns * np.cos(turns * T)
+    T_base_sensor = pin.SE3(LAB.chain.poses(Q[None], LINK)[0])
+    V = (root_in_base(LAB.floating, HUNG).inverse() * T_base_sensor).actInv(pin.Motion(np.eye(6)[5]))
+    thrown = -np.outer(base[:, 5] ** 2, V.cross(hung() * V).vector)
+    seen, sensor = thrown - np.outer(base[:, 11], (hung() * V).vector), wrist_sensor(LAB.urdf, HUNG)
+    hands = sensor.hand(T, q, w + seen, sensor.tree, base), sensor.hand(T, q, w, sensor.tree)
+    moved, still = (motion_load(LAB, T, q, np.eye(4), 20.0, hand).signal.x for hand in hands)
+    acts, rows = seen @ T_base_sensor.dualAction.T, slice(120, 380)
+    np.testing.assert_allclose((moved - still)[rows], acts[rows], atol=0.05)
+    assert np.abs(thrown[rows]).max() > 1.0  # [N]
 
 
 def test_a_small_force_is_no_push_and_without_a_sensor_there_is_none():

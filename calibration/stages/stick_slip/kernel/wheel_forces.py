@@ -117,7 +117,7 @@ def yielding(wheels: np.ndarray, h: float, n: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def moving_wheels(wheels: np.ndarray) -> np.ndarray:
-    """M (6,) of the wheels, the first lane's of flat ones."""
+    """M (6,) of the wheels, the first lane's of flat ones: those of others stand within millimetres of them."""
     M = np.zeros(6)
     for i in range(len(wheels) // (WHEEL * LANES)):
         w = wheels[i * WHEEL * LANES :]

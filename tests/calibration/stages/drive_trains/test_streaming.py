@@ -9,14 +9,14 @@ import pytest
 
 from calibration.estimate.plain_values import plain, restored
 from calibration.numerics.lie import from_vector
-from calibration.prediction.bundled_arm import BundledArm
+from calibration.prediction.bundled_arm import BundledArm, moving_root
 from calibration.stages.drive_trains import DriveTrain, DriveTrains, stream_of
 from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.drive_train import Quantity
 from calibration.stages.drive_trains.link_streams import RESTS
 from calibration.stages.drive_trains.torques import (
     Dynamics,
-    base_acceleration,
+    base_motion,
     derivatives,
     inertial_tolerances,
     inertials,
@@ -145,13 +145,28 @@ def test_a_base_that_tilts_and_turns_loads_the_joints_by_its_proper_acceleration
     tilt = from_vector(np.array([0.0, 0.0, 0.0, 0.004, 0.0, 0.0]))
     twist = np.zeros((len(T), 6))
     twist[:, 5] = turn
-    found = base_acceleration(gravity, T, tilt @ from_vector(twist), T)
+    found = base_motion(gravity, T, tilt @ from_vector(twist), T)
     inside = slice(100, -100)
-    assert found[inside, 1] == pytest.approx(9.81 * 0.004 * np.cos(turn[inside]), rel=1e-3)
-    assert found[inside, 5] == pytest.approx(-((2.0 * np.pi * 0.5) ** 2) * turn[inside], abs=2e-3)
-    short = base_acceleration(gravity, T[:50], np.broadcast_to(tilt, (50, 4, 4)), T[:3])
-    assert short[:, 1] == pytest.approx(9.81 * np.sin(0.004), rel=1e-9) and short.shape == (3, 6)
-    assert base_acceleration(gravity, T, np.full((len(T), 4, 4), np.nan), T) is None
+    assert found[inside, 7] == pytest.approx(9.81 * 0.004 * np.cos(turn[inside]), rel=1e-3)
+    assert found[inside, 11] == pytest.approx(-((2.0 * np.pi * 0.5) ** 2) * turn[inside], abs=2e-3)
+    assert found[inside, 5] == pytest.approx(np.gradient(turn, T)[inside], abs=1e-4) and not found[:, :3].any()
+    short = base_motion(gravity, T[:50], np.broadcast_to(tilt, (50, 4, 4)), T[:3])
+    assert short[:, 7] == pytest.approx(9.81 * np.sin(0.004), rel=1e-9) and short.shape == (3, 12)
+    assert base_motion(gravity, T, np.full((len(T), 4, 4), np.nan), T) is None
+
+
+def test_a_sample_of_a_base_that_moves_is_that_of_its_recording() -> None:
+    """In lab axes, of a base that leans by 0.1 rad; its root is 0.2 m beside it."""
+    gravity, lean = np.array([0.0, 0.0, -9.81]), from_vector(np.array([0.3, 0.1, 0.0, 0.1, 0.0, 0.0]))
+    twist, beside = np.zeros((len(T), 6)), from_vector(np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.5]))
+    twist[:, 0], twist[:, 5] = 2e-3 * np.sin(3.0 * T), 5e-3 * np.sin(2.0 * T)
+    poses, i, R = lean @ from_vector(twist), 300, lean[:3, :3]
+    moves = np.zeros((3, 3))
+    moves[:2] = -9.0 * twist[i, 0] * R[:, 0], -4.0 * twist[i, 5] * R[:, 2]
+    moves[2] = 1e-2 * np.cos(2.0 * T[i]) * R[:, 2]
+    seen = base_motion(gravity, T, poses @ beside, T)[i]
+    np.testing.assert_allclose(moving_root(poses[i], beside, gravity, moves)[0, 3:], seen[3:], atol=1e-3)
+    assert np.abs(seen[3:6]).max() > 5e-3
 
 
 def test_a_jolt_of_the_base_stands_above_the_noise_of_its_markers() -> None:
@@ -159,7 +174,7 @@ def test_a_jolt_of_the_base_stands_above_the_noise_of_its_markers() -> None:
     gravity, at, waves = np.array([0.0, 0.0, -9.81]), T - 3.0, np.zeros((2, len(T), 6))
     waves[:, :, 0] = 2e-4 * np.sin(30.0 * np.pi * at) * np.exp(-((at / 0.1) ** 2))
     waves[1, :, 0] += 3e-5 * np.random.default_rng(0).normal(size=len(T))
-    exact, noisy = (base_acceleration(gravity, T, from_vector(x), T)[:, 0] for x in waves)
+    exact, noisy = (base_motion(gravity, T, from_vector(x), T)[:, 6] for x in waves)
     true = np.gradient(np.gradient(waves[0, :, 0], T), T)
     assert exact @ true > 0.6 * true @ true
     assert np.std(noisy[T > 4.0]) < 0.3 * np.std(derivatives(T, waves[1], 20.0)[2][T > 4.0, 0])
@@ -170,5 +185,5 @@ def test_a_plate_says_how_a_base_accelerates_that_hardly_moves() -> None:
     gravity, wave = np.array([0.0, 0.0, -9.81]), np.zeros((len(T), 6))
     wave[:, 0] = 1e-5 * np.sin(16.0 * np.pi * T)
     true, inside = -((16.0 * np.pi) ** 2) * wave[:, 0], slice(100, -100)
-    seen, by_plate = (base_acceleration(gravity, T, from_vector(wave), T, by)[inside, 0] for by in (False, True))
+    seen, by_plate = (base_motion(gravity, T, from_vector(wave), T, by)[inside, 6] for by in (False, True))
     assert np.std(seen) < 0.2 * np.std(true[inside]) and np.std(by_plate) > 0.6 * np.std(true[inside])

@@ -81,6 +81,21 @@ def test_the_last_step_of_a_sample_is_at_its_time(trial):
     np.testing.assert_allclose(np.diff(forcing.drive[:, 3]).std(), np.diff(at_t[:, 2]).std() / STEPS, rtol=0.3)
 
 
+def test_a_robot_that_stands_elsewhere_under_its_markers_resists_there(trial):
+    """Inertia is that of the same bodies, seen from an origin 5 mm behind and 3 mm left of theirs."""
+    off, wrenches = np.array([5e-3, -3e-3]), wrenches_of(SOURCES, trial, T_LAB_BASE)
+    here, there = (planar_forcing(wrenches, Tilting(K, 0.01 * K, o), "dynamics") for o in (0.0 * off, off))
+    A, M, upper = (
+        np.array([[1.0, 0.0, -off[1]], [0.0, 1.0, off[0]], [0.0, 0.0, 1.0]]),
+        np.zeros((3, 3)),
+        np.triu_indices(3),
+    )
+    M[upper] = here.inertia[40, :6]
+    expected = A.T @ (M + np.triu(M, 1).T) @ A
+    np.testing.assert_allclose(there.inertia[40, :6], expected[upper], rtol=1e-9)
+    assert there.inertia[40, 4] - here.inertia[40, 4] > 0.3  # [kg.m]
+
+
 def test_a_base_leans_by_what_stands_on_it(trial):
     """10 mrad forwards under 200 N.m about y; its tilt counts from there."""
     stiff = Tilting(K, 0.01 * K)

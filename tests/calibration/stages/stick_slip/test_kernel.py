@@ -7,6 +7,7 @@ from calibration.stages.stick_slip.forcing import STEP, STEPS
 from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, E, at_rest
 from calibration.stages.stick_slip.kernel.integration import advance, simulated
 from calibration.stages.stick_slip.likelihood import bases_of
+from calibration.stages.stick_slip.wheels import LOGARITHMS
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import MASS, POSITION, TRUTH, WEIGHT, WHEELS
 
@@ -192,12 +193,15 @@ def test_trials_one_after_the_other_do_not_know_of_each_other():
 
 
 def test_bases_side_by_side_do_not_know_of_each_other():
-    """More than a group of them, each with its own parameters and preload: to the last bit as if alone."""
+    """More than a group of them, each with its own parameters and preload: to the last bit as if alone.
+
+    But for where the wheels are, which count in the robot's inertia as those of the first one.
+    """
     rng = np.random.default_rng(5)
     w = slipping.push(rng, seconds=3.0)
     one, k = slipping.forcing(w, w), LANES + 3
     p, e = TRUTH.logarithms + 0.2 * rng.normal(size=(k, len(TRUTH.logarithms))), 1e-4 * rng.normal(size=(k, 6, 2))
-    starts = np.array([0, len(one.inertia)])
+    p[:, LOGARITHMS:], starts = TRUTH.logarithms[LOGARITHMS:], np.array([0, len(one.inertia)])
     x, share, _ = simulated(starts, one.drive, one.inertia, bases_of(WHEELS, p, True, e), STEP, k)
     for i in range(k):
         (alone,), (slid,), _ = simulated(

@@ -34,11 +34,12 @@ def test_the_wheels_bear_the_weight_where_it_is():
 
 
 def test_a_load_that_is_elsewhere_is_borne_there():
-    """As if its moments were counted from a place 2 mm ahead of where they are, and 3 mm to the right."""
+    """As if its moments were counted 2 mm ahead of where they are, and 3 mm to the right; wheels are not there."""
     x, y = 2e-3, -3e-3
     rows, other = WHEELS.rows(replace(TRUTH, load_x=x, load_y=y)), WHEELS.rows(TRUTH)
     N = rows[:, 6] + rows[:, 7:10] @ WEIGHT
     np.testing.assert_allclose(N, other[:, 6] + other[:, 7:10] @ (WEIGHT + WEIGHT[0] * np.array([0.0, x, y])))
+    np.testing.assert_allclose(rows[:, :2], other[:, :2] - (x, y), atol=1e-12)
 
 
 def test_stiffness_is_the_sum_over_wheels():
