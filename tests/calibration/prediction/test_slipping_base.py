@@ -1,13 +1,19 @@
-"""What heave and tilt of the base add to a step."""
+"""What heave and tilt of the base add to a step, and where the robot stands."""
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from calibration.prediction.slipping_base import driven, lagged
+import mjcf
+from calibration.prediction.slipping_base import SlippingBase, driven, lagged
+from calibration.robot.laboratory import Laboratory
 from calibration.robot.rigid_tree import room, scratch, tree_of
-from calibration.stages.stick_slip.forcing import CUTOFF
+from calibration.stages.stick_slip.forcing import CUTOFF, Tilting
 from calibration.stages.stick_slip.kernel.bases import HEAVE, PLANE
+from calibration.stages.stick_slip.model import StickSlip
+from calibration.stages.stick_slip.wheels import wheel_set
+from tests.doubles import rigid_robot
+from tests.doubles.moving_base import WHEELS
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
@@ -45,3 +51,17 @@ def test_heave_and_tilt_push_the_base_by_its_composite_inertia():
     M = actions[0] @ found.composite[0] @ actions[1]
     np.testing.assert_allclose(heaving[:3] - still[:3], -(M[np.ix_(PLANE, HEAVE)] @ a), atol=1e-9)
     np.testing.assert_array_equal(heaving[3:], still[3:])
+
+
+def test_a_sample_s_force_acts_where_the_robot_stands():
+    """5 mm ahead and 3 mm to the right of where its markers have it: so do its inertia and its moment."""
+    lab = Laboratory(mjcf.urdf(), rigid_robot.described(wheels=[w.model_dump() for w in WHEELS]))
+    wheels, off = wheel_set(mjcf.urdf(), WHEELS, 9.81), np.array([5e-3, -3e-3])
+    moving = np.array([np.full(8, 0.2), np.full(8, 0.5), np.linspace(1.0, 4.0, 8)])
+    here, there = (
+        SlippingBase(StickSlip(wheels, Tilting(np.eye(6), np.eye(6), o), ()), lab, "plate")._driven(GRAVITY, moving)
+        for o in (0.0 * off, off)
+    )
+    np.testing.assert_allclose(there[:2], here[:2], atol=1e-9)
+    assert there[2] == pytest.approx(here[2] + off[0] * here[1] - off[1] * here[0], abs=1e-9)
+    assert there[7] == pytest.approx(here[7] + off[0] * here[3], abs=1e-9) and here[:2].any()
