@@ -23,8 +23,8 @@ from calibration.prediction.base_pose import BaseState, LoadedBase
 from calibration.recording.trial import REST
 from calibration.robot.kinematics import shift
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.rigid_tree import RigidTree, TreeDynamics, room, sample, scratch
-from calibration.robot.wrist_sensor import UNSEEN
+from calibration.robot.rigid_tree import RigidTree, scratch
+from calibration.robot.tree_dynamics import TreeDynamics, room, sample
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.forcing import CUTOFF, Readings, wrenches_along
 from calibration.stages.stick_slip.kernel.bases import (
@@ -128,7 +128,7 @@ class SlippingBase:
             NotEnoughData: Less than a second, or nothing says what point the wrench is about.
         """
         load = None if wrench is None else at.load(t, wrench, CUTOFF)
-        hand = UNSEEN if self.trains is None or wrist is None else self.trains.hand(t, q_motor, wrist)
+        hand = None if self.trains is None or wrist is None else self.trains.hand(t, q_motor, wrist)
         readings = Readings(t, q_motor, hand)
         wrenches, links = wrenches_along(self.lab, readings, load, at.T_lab_0), None
         if self.trains is not None:

@@ -34,7 +34,7 @@ from calibration.recording.schema import Description
 from calibration.recording.trial import REST
 from calibration.robot.chain import Chain
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.rigid_tree import RigidTree, dynamics_along
+from calibration.robot.rigid_tree import RigidTree, last_wrench
 
 _CUTOFF = 20.0  # [Hz]
 _AVERAGE = 0.4  # [s]
@@ -60,21 +60,6 @@ class Push(NamedTuple):
     def on(self, tree: RigidTree) -> RigidTree:
         """The robot without what this replaces."""
         return tree._replace(**{name: getattr(tree, name) - getattr(self.hung, name) for name in _MASSES})
-
-
-class HandLoads(NamedTuple):
-    """What the wrist's sensor shows of the hand; None: what nominally hangs there, moved as the motors move.
-
-    Attributes:
-        joints: What loads the joints.
-        floor: What loads the floor.
-    """
-
-    joints: Push | None = None
-    floor: Push | None = None
-
-
-UNSEEN = HandLoads()
 
 
 def hung_bodies(model: pin.Model, data: pin.Data, sensor: int) -> Iterator[pin.Inertia]:
@@ -184,10 +169,10 @@ class WristSensor:
     def _moved(self, at: "SmoothReadings", base: np.ndarray | None = None) -> np.ndarray:
         """f (n, 6) in the sensor's axes about its origin, on a root that moves (n, 12) or is at rest."""
         root = self.at_rest if base is None else base
-        found = dynamics_along(self.tree, at.q, at.v, at.a, root)
+        w = last_wrench(self.tree, at.q, at.v, at.a, root)
         T = self.root @ self.chain.poses(at.q[:, self.chain.columns], self.link)
-        R, moment = T[:, :3, :3], found.root[:, 3:] - np.cross(T[:, :3, 3], found.root[:, :3])
-        f = [(found.root[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]]
+        R, moment = T[:, :3, :3], w[:, 3:] - np.cross(T[:, :3, 3], w[:, :3])
+        f = [(w[:, None, :3] @ R)[:, 0], (moment[:, None] @ R)[:, 0]]
         return np.concatenate(f, axis=1)
 
 

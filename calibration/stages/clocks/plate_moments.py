@@ -31,7 +31,8 @@ from calibration.numerics.time_delay import Pair, coarse_lag
 from calibration.recording.schema import Body, Description
 from calibration.recording.trial import Trial
 from calibration.robot.kinematics import path_of
-from calibration.robot.rigid_tree import dynamics_along, tree_of
+from calibration.robot.rigid_tree import tree_of
+from calibration.robot.tree_dynamics import dynamics_along
 
 _CUTOFF = 4.0  # [Hz]
 _DECIMATED = 0.01  # [s] plate samples averaged together

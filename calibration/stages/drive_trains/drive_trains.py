@@ -21,21 +21,15 @@ import numpy as np
 
 from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
-from calibration.robot.rigid_tree import TreeDynamics, room, scratch
-from calibration.robot.wrist_sensor import HandLoads
+from calibration.robot.rigid_tree import scratch
+from calibration.robot.tree_dynamics import TreeDynamics, room
+from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains import link_streams
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
-from calibration.stages.drive_trains.hung_load import HungLoad, hand_load
+from calibration.stages.drive_trains.hung_load import HungLoad, hand_on_floor, hand_on_joints
 from calibration.stages.drive_trains.link_motion import COMPLIANCE
 from calibration.stages.drive_trains.link_streams import RESTS, TORQUE, Drives
-from calibration.stages.drive_trains.torques import (
-    Dynamics,
-    LinkLoads,
-    LoadsUnder,
-    base_motion,
-    dynamics,
-    inertials,
-)
+from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, LoadsUnder, base_motion, dynamics, inertials
 from calibration.stages.suspension.floor_wrench import root_in_base
 
 RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
@@ -132,9 +126,9 @@ class DriveTrains:
         T_lab_root = T_lab_base @ root_in_base(self.dynamics.model, self.description).homogeneous
         return base_motion(self.dynamics.gravity, t, T_lab_root, at, by_plate)
 
-    def hand(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray, base: np.ndarray | None = None) -> HandLoads:
-        """What the wrist's sensor (n, 6) shows of the hand on a base (n, 12) as `base_motion` has it."""
-        return hand_load(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist, base)
+    def hand(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray, base: np.ndarray | None = None) -> Push | None:
+        """`hand_on_floor` by the wrist's sensor (n, 6), on a base (n, 12) as `base_motion` has it."""
+        return hand_on_floor(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist, base)
 
     def loads(
         self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None, wrist: np.ndarray | None
@@ -144,10 +138,11 @@ class DriveTrains:
 
     def weighed(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray | None, loads: LoadsUnder) -> LinkLoads:
         """Loads under what the wrist's sensor (n, 6) shows of a hand on motors, and then on the links."""
-        if wrist is None or (push := self.hand(t, q, wrist).joints) is None:
+        hand, zeros = partial(hand_on_joints, self.urdf, self.description, self.hung, t), self.dynamics.offset
+        if wrist is None or (push := hand(q - zeros, wrist)) is None:
             return loads(None, None)
         links = self.likely(loads(push, None))
-        return loads(self.hand(t, links, wrist).joints, q - links)
+        return loads(hand(links - zeros, wrist), q - links)
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""

@@ -12,6 +12,7 @@ only the sum is known; how it divides into dphi and d is the prior's.
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -22,8 +23,7 @@ from calibration.recording.schema import Description, Tolerances
 from calibration.recording.trial import Trial
 from calibration.robot.wrist_sensor import (
     STRIDE,
-    UNSEEN,
-    HandLoads,
+    Push,
     SmoothReadings,
     WristSensor,
     smoothed,
@@ -96,20 +96,29 @@ def hung_load(urdf: str, description: Description, offset: np.ndarray, trials: S
     return HungLoad(x[:4], x[4:], C, description.payload_of(), _hung(nominal), float(x @ np.linalg.solve(prior, x)))
 
 
-def hand_load(
-    urdf: str,
-    description: Description,
-    hung: HungLoad | None,
-    t: np.ndarray,
-    q: np.ndarray,
-    wrench: np.ndarray,
-    base: np.ndarray | None = None,
-) -> HandLoads:
-    """What the sensor shows of the hand in a trial beside what hangs there by calibration.
+class _Hanging(NamedTuple):
+    """What hangs on a trial's sensor, or pushes it.
 
-    A push, see `robot.wrist_sensor`; or else, on the floor, how the hand moves; and a payload that is not the
-    campaign's, whose centre the calibration does not tell: the same fit to the trial alone, its prior what the
-    calibration found.
+    Attributes:
+        sensor: With nominal links and the declared payload.
+        known: (4,) what hangs there besides by the calibration: mass [kg], first moment [kg.m].
+        found: (4,) the same by the trial.
+        pushed: What pushes the hand.
+    """
+
+    sensor: WristSensor
+    known: np.ndarray
+    found: np.ndarray
+    pushed: Push | None = None
+
+
+def hand_on_joints(
+    urdf: str, description: Description, hung: HungLoad | None, t: np.ndarray, q: np.ndarray, wrench: np.ndarray
+) -> Push | None:
+    """What the sensor shows of the hand to load joints in a trial, beside what hangs there by calibration.
+
+    A push, see `robot.wrist_sensor`, or what a payload that is not the campaign's has less than was taken for it: its
+    centre the calibration does not tell, but the same fit to the trial alone, its prior what the calibration found.
 
     Args:
         urdf: Nominal robot.
@@ -118,29 +127,54 @@ def hand_load(
         t: (n,) [s].
         q: (n, k) motor readings less their zeros, or the links' angles where they are known [rad, m].
         wrench: (n, 6) readings of the sensor.
-        base: (n, 12) how the root moves, see `torques.base_motion`; None: it is at rest.
     """
+    of = _hanging(urdf, description, hung, t, q, wrench)
+    if of is None or of.pushed is not None:
+        return None if of is None else of.pushed
+    return None if of.found is of.known else of.sensor.alone(of.known - of.found).lacking(len(t))
+
+
+def hand_on_floor(
+    urdf: str,
+    description: Description,
+    hung: HungLoad | None,
+    t: np.ndarray,
+    q: np.ndarray,
+    wrench: np.ndarray,
+    base: np.ndarray | None = None,
+) -> Push | None:
+    """What it shows of the hand to load the floor: a push, or how a hand that nothing pushes moves.
+
+    Arguments as of `hand_on_joints`; `base` (n, 12) how the root moves, see `torques.base_motion`; None: it is at rest.
+    """
+    of = _hanging(urdf, description, hung, t, q, wrench)
+    if of is None:
+        return None
+    if of.pushed is not None:
+        return of.pushed._replace(hung=of.sensor.tree)
+    return of.sensor.carrying(of.found).hand(t, q, wrench, of.sensor.tree, base)
+
+
+def _hanging(
+    urdf: str, description: Description, hung: HungLoad | None, t: np.ndarray, q: np.ndarray, wrench: np.ndarray
+) -> _Hanging | None:
+    """None where the sensor tells nothing."""
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
     if sensor is None:
-        return UNSEEN
+        return None
     mass = description.payload_of()
     known = np.zeros(4) if hung is None else hung.added(mass)
     pushed = sensor.carrying(known).push(t, q, wrench)
-    if pushed is not None:
-        return HandLoads(pushed, pushed._replace(hung=sensor.tree))
-    if hung is None:
-        return UNSEEN
+    if pushed is not None or hung is None:
+        return None if pushed is None else _Hanging(sensor, known, known, pushed)
     if mass == hung.payload:
-        return HandLoads(None, sensor.carrying(known).hand(t, q, wrench, sensor.tree, base))
+        return _Hanging(sensor, known, known)
     try:
-        read = smoothed(t, q, wrench)
-        row = (*_means(sensor, read), mass)
+        row = (*_means(sensor, smoothed(t, q, wrench)), mass)
     except NotEnoughData:
-        return UNSEEN
+        return None
     x, _ = _fitted([row], np.append(hung.links, hung.centre), hung.covariance)
-    found = replace(hung, links=x[:4], centre=x[4:]).added(mass)
-    floor = sensor.carrying(found).hand(t, q, wrench, sensor.tree, base)
-    return HandLoads(sensor.alone(known - found).lacking(len(t)), floor)
+    return _Hanging(sensor, known, replace(hung, links=x[:4], centre=x[4:]).added(mass))
 
 
 def _means(sensor: WristSensor, read: SmoothReadings) -> tuple[np.ndarray, np.ndarray]:

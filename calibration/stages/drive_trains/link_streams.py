@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.numerics.compiled import njit
-from calibration.robot.rigid_tree import RigidTree, TreeDynamics, sample
+from calibration.robot.rigid_tree import RigidTree
+from calibration.robot.tree_dynamics import TreeDynamics, sample
 from calibration.stages.drive_trains.link_motion import LIGHT, STILL, Drive, advanced, along, carried, contact, stepped
 
 Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`

@@ -26,7 +26,8 @@ from calibration.numerics.lie import from_vector, inverse, mean, to_vector
 from calibration.numerics.signals import RATE, Signal, even, interpolate_columns, low_passed
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import floating_model
-from calibration.robot.rigid_tree import RigidTree, dynamics_along, tree_of
+from calibration.robot.rigid_tree import RigidTree, tree_of
+from calibration.robot.tree_dynamics import dynamics_along
 from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.hung_load import HungLoad, inertial_tolerance
 

@@ -20,7 +20,7 @@ from calibration.numerics.signals import RATE, Signal
 from calibration.recording.clock import Clock
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.wrist_sensor import UNSEEN, HandLoads, hand_push
+from calibration.robot.wrist_sensor import Push, hand_push
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.stick_slip.kernel.bases import COLUMNS, HEAVE, PLANE, PLATE, STEPS, Bases, inertia_rows
 from calibration.stages.stick_slip.kernel.heaving import Springs, accelerations, damped, heaving
@@ -156,12 +156,12 @@ class Readings(NamedTuple):
     Attributes:
         t: (n,) [s, mocap clock].
         q: (n, k) [rad, m].
-        hand: What the wrist's sensor shows of the hand.
+        hand: What the wrist's sensor shows of the hand to load the floor.
     """
 
     t: np.ndarray
     q: np.ndarray
-    hand: HandLoads = UNSEEN
+    hand: Push | None = None
 
 
 def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray, arm: DriveTrains | None = None) -> Wrenches:
@@ -173,7 +173,7 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray, arm: 
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)), wheels_of(lab))
     t, q, wrench = readings_of(sources.robot, trial)
     pushed = None if arm else hand_push(lab.urdf, lab.description, t, q, wrench)
-    hand = arm.of_trial(trial.id).hand(t, q, wrench) if arm else HandLoads(floor=pushed)
+    hand = arm.of_trial(trial.id).hand(t, q, wrench) if arm else pushed
     return replace(wrenches_along(lab, Readings(t, q, hand), plate, T_lab_0), trial_id=trial.id, start=start)
 
 
@@ -185,7 +185,7 @@ def readings_of(robot: Clock, trial: Trial) -> tuple[np.ndarray, np.ndarray, np.
 
 def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_lab_0: np.ndarray) -> Wrenches:
     """The wrench of the plate, and that of readings."""
-    t, q, (_, hand) = readings
+    t, q, hand = readings
     dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, hand), composite_inertia(lab, t, q, CUTOFF, hand)
     pushed = hand is not None and hand.outside
     return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab), pushed=pushed)

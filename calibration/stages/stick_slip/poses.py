@@ -16,7 +16,6 @@ from calibration.numerics.signals import RATE, Signal, even, interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.wrist_sensor import UNSEEN
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved
 from calibration.stages.stick_slip.forcing import (
@@ -118,10 +117,10 @@ class Links(NamedTuple):
         """
         at, q, _ = self.readings
         moving, in_plane = self.trains.base_motion(t, T_lab_base, at), upright(T_lab_base, self.T_lab_0)
-        links, floor = self.trains.likely(self.trains.loads("", at, q, moving, self.wrist)), UNSEEN.floor
+        links, floor = self.trains.likely(self.trains.loads("", at, q, moving, self.wrist)), None
         if self.wrist is not None:
             moving = self.trains.base_motion(t, self.T_lab_0 @ from_vector(in_plane), at)
-            floor = self.trains.hand(at, links, self.wrist, moving).floor
+            floor = self.trains.hand(at, links, self.wrist, moving)
         twist = planar_twist(t, in_plane[:, PLANE], at)
         return motion_load(self.lab, at, links - self.trains.dynamics.offset, self.T_lab_0, CUTOFF, floor, twist)
 

@@ -24,7 +24,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.rigid_tree import dynamics_along
+from calibration.robot.tree_dynamics import dynamics_along
 from calibration.robot.wrist_sensor import Push
 
 _DECIMATED = 0.005  # [s] plate samples averaged together

@@ -7,7 +7,8 @@ import pytest
 import mjcf
 from calibration.prediction.slipping_base import SlippingBase, driven, lagged
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.rigid_tree import room, scratch, tree_of
+from calibration.robot.rigid_tree import scratch, tree_of
+from calibration.robot.tree_dynamics import room
 from calibration.stages.stick_slip.forcing import CUTOFF, Tilting
 from calibration.stages.stick_slip.kernel.bases import HEAVE, PLANE
 from calibration.stages.stick_slip.model import StickSlip

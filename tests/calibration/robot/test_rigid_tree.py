@@ -4,7 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from calibration.robot.rigid_tree import dynamics_along, tree_of
+from calibration.robot.rigid_tree import last_wrench, tree_of
+from calibration.robot.tree_dynamics import dynamics_along
 
 KINDS = (pin.JointModelRX, pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned, pin.JointModelRUBZ)
 N, K = 6, 9
@@ -75,3 +76,19 @@ def test_stiffness_is_how_weight_grows_with_position(arm):
     step[columns] = q
     expected = pin.computeGeneralizedGravityDerivatives(held, data, pin.integrate(arm, pin.neutral(arm), step))
     np.testing.assert_allclose(found, expected[np.ix_(columns, columns)], atol=1e-11)
+
+
+def test_the_wrench_that_moves_the_last_body_is_pinocchio_s(arm):
+    joints, rng = tuple(f"joint_{i}" for i in range(K)), np.random.default_rng(4)
+    (q, v, a), root, data = rng.normal(size=(3, N, K)), rng.normal(size=(N, 12)), arm.createData()
+    found = last_wrench(tree_of(arm, joints), q, v, a, root)
+    columns = [arm.joints[arm.getJointId(name)].idx_v for name in joints]
+    for i in range(N):
+        step, rate, push = np.zeros((3, arm.nv))
+        step[columns], rate[columns], push[columns] = q[i], v[i], a[i]
+        rate[:6], push[:6] = root[i, :6], root[i, 6:]
+        at = pin.integrate(arm, pin.neutral(arm), step)
+        pin.forwardKinematics(arm, data, at)
+        pin.rnea(arm, data, at, rate, push)
+        expected = data.oMi[1].actInv(data.oMi[arm.njoints - 1]).act(data.f[arm.njoints - 1])
+        np.testing.assert_allclose(found[i], expected.vector, rtol=1e-11, atol=1e-11)

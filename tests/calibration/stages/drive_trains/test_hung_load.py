@@ -11,10 +11,16 @@ import mjcf
 from calibration.estimate.plain_values import plain, restored
 from calibration.recording.schema import Description
 from calibration.robot.laboratory import Laboratory, floating_model
-from calibration.robot.wrist_sensor import UNSEEN, wrist_sensor
+from calibration.robot.wrist_sensor import wrist_sensor
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.hung_load import HungLoad, hand_load, hung_load, inertial_tolerance
+from calibration.stages.drive_trains.hung_load import (
+    HungLoad,
+    hand_on_floor,
+    hand_on_joints,
+    hung_load,
+    inertial_tolerance,
+)
 from calibration.stages.drive_trains.stage import fit_drive_trains
 from calibration.stages.drive_trains.torques import dynamics, inertial_tolerances
 from tests.doubles import joint_data, rigid_robot
@@ -46,6 +52,11 @@ def angles(seed):
     rng = np.random.default_rng(seed)
     phase, rate = rng.uniform(0.0, 6.0, size=8), rng.uniform(0.1, 0.25, size=8)
     return rigid_robot.CENTRE + [0.02, *7 * [0.6]] * np.sin(2.0 * np.pi * rate * T[:, None] + phase)
+
+
+def hand_loads(description, weighed, q, w):
+    at = mjcf.urdf(), description, weighed, T[: len(q)], q, w
+    return hand_on_joints(*at), hand_on_floor(*at)
 
 
 def readings(description, q, payload, push=0.0):
@@ -147,7 +158,7 @@ def test_a_payload_that_no_trial_had_is_weighed_where_it_is_carried():
     description = described(None)
     known = hung_load(mjcf.urdf(), description, OFFSET, trials(description))
     other, q = description.carrying(2.0), angles(5)
-    push, floor = hand_load(mjcf.urdf(), other, known, T, q, readings(description, q, 2.0))
+    push, floor = hand_loads(other, known, q, readings(description, q, 2.0))
     assert not push.outside and not floor.outside  # the band of a pushed base is not that of one that carries more
     robot = dynamics(mjcf.urdf(), other, np.zeros(8), known)
     true = dynamics(mjcf.urdf(), other, np.zeros(8), replace(known, links=LINKS, centre=CENTRE))
@@ -170,10 +181,10 @@ def test_what_hangs_on_a_link_behind_its_motor_is_weighed_there(push):
     assert np.median(np.abs(links - q)[:, 6]) > 11e-3
     w = readings(other, links, 2.0, push=push)
     true = dynamics(mjcf.urdf(), other, np.zeros(8), replace(known, links=LINKS, centre=CENTRE))
-    pushed = hand_load(mjcf.urdf(), other, known, T, links, w).joints if push else None
+    pushed = hand_on_joints(mjcf.urdf(), other, known, T, links, w) if push else None
     expected = (robot if push else true).loads("", T, links, push=pushed).torque
     found = of.loads("", T, q, None, w)
-    at_motors = robot.loads("", T, q, push=of.hand(T, q, w).joints)
+    at_motors = robot.loads("", T, q, push=hand_on_joints(mjcf.urdf(), other, known, T, q, w))
     still = np.delete(np.arange(100, len(T) - 100), slice(250, 650))  # a push that begins at once is filtered
     left, before = (
         np.median(np.abs(x.behind(q - links).torque - expected)[still, 1:], axis=0) for x in (found, at_motors)
@@ -184,14 +195,14 @@ def test_what_hangs_on_a_link_behind_its_motor_is_weighed_there(push):
 def test_the_campaigns_payload_is_not_weighed_again_and_a_push_is_one(weighed):
     description, q = described(None), angles(5)
     w = readings(description, q, None)
-    found = hand_load(mjcf.urdf(), description, weighed, T, q, w)
-    assert found.joints is None and not found.floor.outside
-    assert hand_load(mjcf.urdf(), description, weighed, T, q, np.full_like(w, np.nan)) == UNSEEN
+    joints, moves = hand_loads(description, weighed, q, w)
+    assert joints is None and not moves.outside
+    assert hand_loads(description, weighed, q, np.full_like(w, np.nan)) == (None, None)
     short = slice(0, 100)
-    assert hand_load(mjcf.urdf(), description.carrying(2.0), weighed, T[short], q[short], w[short]) == UNSEEN
-    pushed, floor = hand_load(mjcf.urdf(), description, weighed, T, q, readings(description, q, None, push=20.0))
+    assert hand_loads(description.carrying(2.0), weighed, q[short], w[short]) == (None, None)
+    pushed, floor = hand_loads(description, weighed, q, readings(description, q, None, push=20.0))
     assert pushed.outside and floor.outside
-    outside = pushed.wrench[:, :3] - found.floor.wrench[:, :3]
+    outside = pushed.wrench[:, :3] - moves.wrench[:, :3]
     assert np.linalg.norm(outside[500]) == pytest.approx(20.0, abs=0.5) and np.linalg.norm(outside[250]) < 0.5
 
 
