@@ -1,6 +1,7 @@
 """Simulation of one trial: set-points in, dense states out, one `mujoco.rollout`, no Python between the steps."""
 
 import logging
+from threading import Lock
 
 import mujoco
 import numpy as np
@@ -19,6 +20,7 @@ from twin.transforms import states_with_their_sensors, transform
 
 SENSOR = "instrument."  # begins the name of a sensor of an instrument of one's own
 _log = logging.getLogger(__name__)
+_setting = Lock()  # two threads that make MuJoCo's first call at once wait for each other for ever
 
 
 def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
@@ -35,12 +37,18 @@ def simulate(twin: Twin, motion: Motion, T_lab_base: np.ndarray) -> States:
     """
     inputs = prepare(twin, motion, T_lab_base)
     model, first = inputs.model, inputs.first
-    mujoco.set_mju_user_warning(_log.debug)  # or it writes MUJOCO_LOG.TXT into the working folder
+    log_warnings()
     after, sensors = rollout.rollout(model, mujoco.MjData(model), first[None], inputs.control[None])
     states = states_with_their_sensors(first, after[0])
     check(inputs, motion, states)
     skip = inputs.settling
     return _unpack(inputs, twin.links, states[skip:], sensors[0][skip:])
+
+
+def log_warnings() -> None:
+    """Have MuJoCo's warnings in this module's log: it would write MUJOCO_LOG.TXT into the working folder."""
+    with _setting:
+        mujoco.set_mju_user_warning(_log.debug)
 
 
 def _unpack(inputs: RolloutInputs, links: tuple[str, ...], states: np.ndarray, sensors: np.ndarray) -> States:

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import replace
 
 import mujoco
@@ -119,3 +121,25 @@ def test_a_payload_weighs_what_its_trial_says(lab, config, nominal):
     assert masses["xyz_2kg"] == pytest.approx(masses["xyz"] + 2.0 - 0.437)
     assert masses["around_z_1kg"] == pytest.approx(masses["around_z"] + 1.0 - 0.437)
     assert trials["around_z_1kg"].role == "calibration" and trials["xyz_2kg"].role == "validation"
+
+
+FIRST = """
+import sys
+from threading import Barrier, Thread
+from twin.simulation.rollout import log_warnings
+sys.setswitchinterval(1e-9)
+together = Barrier(8)
+threads = [Thread(target=lambda: (together.wait(), log_warnings())) for _ in range(8)]
+for thread in threads:
+    thread.start()
+"""
+
+
+def test_trials_that_begin_at_once_do_not_wait_for_each_other():
+    """Without a lock two of three such processes hang: MuJoCo's first call runs Python while others wait for it."""
+    begun = [subprocess.Popen([sys.executable, "-c", FIRST]) for _ in range(5)]
+    try:
+        assert [process.wait(timeout=60) for process in begun] == [0] * 5
+    finally:
+        for process in begun:
+            process.kill()
