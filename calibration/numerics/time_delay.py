@@ -53,6 +53,11 @@ class Pair:
     z: np.ndarray
     u: np.ndarray
 
+    @property
+    def plain(self) -> "Pair":
+        """The same without nuisances."""
+        return replace(self, z=self.z[:, :0], u=self.u[:, :0])
+
     def turned(self, Q: np.ndarray) -> "Pair":
         """The same with x on axes turned by Q (c, c)."""
         return replace(self, x=replace(self.x, x=self.x.x @ Q.T))

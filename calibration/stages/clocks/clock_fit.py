@@ -60,6 +60,7 @@ class TrialLag:
         duration: Of the trial [s].
         wound: Mean lateness that the fit laid to gears wound by friction, not in the lag [s].
         unseen: What the fit would lay to the lag of a winding by 0.1 mrad in all loaded joints [s].
+        plain: The lag without nuisances [s]; NaN where that motion shows none; None where it was not looked for.
     """
 
     trial_id: str
@@ -70,6 +71,12 @@ class TrialLag:
     duration: float = np.inf
     wound: float = 0.0
     unseen: float = 0.0
+    plain: float | None = None
+
+    def contradicts(self, offset: float, drift: float) -> bool:
+        """Whether its motion alone, and not its nuisances, takes the lag from where a clock has it."""
+        line = offset + drift * self.s
+        return self.plain is None or abs(self.plain - line) > 0.5 * abs(self.lag.value - line)
 
 
 def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> tuple[Clock, tuple[str, ...]]:

@@ -129,7 +129,8 @@ def _clock(
         lags = _lags(motions, starts, drift)
         starts = {t.trial_id: t.lag.value for t in lags}
         drift = fit_clock(instrument, lags)[0].drift
-    return concluded(instrument, lags, known)
+    plain = {t.trial_id: t.lag.value for t in _lags([replace(m, pair=m.pair.plain) for m in motions], starts, drift)}
+    return concluded(instrument, [replace(t, plain=plain.get(t.trial_id, np.nan)) for t in lags], known)
 
 
 def concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tuple[Clock, tuple[Verdict, ...]]:
@@ -140,10 +141,10 @@ def concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tuple
     """
     late, common = allowance(instrument, lags, known)
     clock, outliers = fit_clock(instrument, lags, common)
+    usual = _WEAK * float(np.median([t.lag.sigma for t in lags if t.trial_id not in outliers]))
+    strong = [t for t in lags if t.lag.sigma < usual and t.contradicts(clock.offset, clock.drift)]
+    named = [t.trial_id for t in strong if t.trial_id in outliers]
     clock = replace(clock, offset=clock.offset - late)
-    sigma = {t.trial_id: t.lag.sigma for t in lags}
-    usual = float(np.median([sigma[name] for name in sigma if name not in outliers]))
-    named = [name for name in outliers if sigma[name] < _WEAK * usual]
     message = (
         f"{instrument}: offset {clock.offset:.6f} s, drift {1e6 * clock.drift:.1f} ppm, "
         f"{1e3 * clock.sigma:.3f} ms at its middle, {len(lags) - len(outliers)} trials"

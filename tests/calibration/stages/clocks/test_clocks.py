@@ -159,6 +159,21 @@ def test_a_motion_that_hardly_moves_the_plate_contradicts_no_clock():
     assert "jumped" in verdicts[1].message and "sweep" not in verdicts[1].message
 
 
+@pytest.mark.parametrize(("plain", "named"), [(None, True), (1.9801, True), (1.9999, False), (np.nan, False)])
+def test_a_trial_that_only_its_nuisances_take_from_the_others_contradicts_no_clock(plain, named):
+    lags = [TrialLag(f"swing_{i}", 20.0 * i, Lag(2.0 + 1e-5 * i, 3e-4)) for i in range(6)]
+    far = TrialLag("sweep", 130.0, Lag(1.98, 2e-3), plain=plain)
+    clock, verdicts = concluded("plate", [*lags, far], rigid_robot.described().tolerances)
+    assert (len(verdicts) == 2) is named and clock.offset == pytest.approx(2.0, abs=1e-4)
+
+
+def test_a_plate_whose_clock_jumped_in_one_trial_is_named(dataset):
+    trials = [trial for _, trial in dataset.trials("calibration")]
+    moved = [replace(t, t_plate=t.t_plate + 0.03) if t.id == "swing" else t for t in trials]
+    _, verdicts = synchronise(Laboratory(dataset.urdf, dataset.description), moved)
+    assert [v.message.rsplit(": ", 1)[1] for v in verdicts if v.verdict == "warning"] == ["swing"]
+
+
 def test_one_trial_gives_an_offset_and_no_drift():
     clock, _ = fit_clock("robot", [TrialLag("one", 400.0, Lag(2.0, 1e-4))])
     assert clock.drift == 0.0
