@@ -45,6 +45,7 @@ _TRIAL = 5e-5  # [s] floor of a trial's sigma; twice it over the trial is that o
 _MISLAID = 1.0  # share of what the fit laid to gears wound by friction that is the clock's, standard deviation [-]
 _LEFT = 0.2  # at most, of what dry friction winds
 _PLATE = 3e-4  # [s]
+NOT_SHOWN = Lag(np.nan, np.inf)
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class TrialLag:
         duration: Of the trial [s].
         wound: Mean lateness that the fit laid to gears wound by friction, not in the lag [s].
         unseen: What the fit would lay to the lag of a winding by 0.1 mrad in all loaded joints [s].
-        plain: The lag without nuisances [s]; NaN where that motion shows none; None where it was not looked for.
+        plain: The lag without nuisances, `NOT_SHOWN` where that motion shows none; None where it was not looked for.
     """
 
     trial_id: str
@@ -71,12 +72,11 @@ class TrialLag:
     duration: float = np.inf
     wound: float = 0.0
     unseen: float = 0.0
-    plain: float | None = None
+    plain: Lag | None = None
 
     def contradicts(self, offset: float, drift: float) -> bool:
-        """Whether its motion alone, and not its nuisances, takes the lag from where a clock has it."""
-        line = offset + drift * self.s
-        return self.plain is None or abs(self.plain - line) > 0.5 * abs(self.lag.value - line)
+        """Whether its motion alone, without its nuisances, has a lag far from where a clock has it."""
+        return self.plain is None or abs(self.plain.value - offset - drift * self.s) > _FAR * self.plain.sigma
 
 
 def fit_clock(instrument: str, trials: list[TrialLag], common: float = 0.0) -> tuple[Clock, tuple[str, ...]]:

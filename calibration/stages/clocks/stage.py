@@ -26,7 +26,7 @@ from calibration.recording.clock import Clock, shared_clock
 from calibration.recording.schema import Description, Tolerances
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.clocks.clock_fit import TrialLag, allowance, fit_clock
+from calibration.stages.clocks.clock_fit import NOT_SHOWN, TrialLag, allowance, fit_clock
 from calibration.stages.clocks.motions import Motion, plate_motions, robot_motions
 from calibration.stages.clocks.plate_moments import carriers, plate_axes
 from calibration.stages.clocks.pose_refinement import Provisional, provisional, refined
@@ -129,8 +129,8 @@ def _clock(
         lags = _lags(motions, starts, drift)
         starts = {t.trial_id: t.lag.value for t in lags}
         drift = fit_clock(instrument, lags)[0].drift
-    plain = {t.trial_id: t.lag.value for t in _lags([replace(m, pair=m.pair.plain) for m in motions], starts, drift)}
-    return concluded(instrument, [replace(t, plain=plain.get(t.trial_id, np.nan)) for t in lags], known)
+    plain = {t.trial_id: t.lag for t in _lags([replace(m, pair=m.pair.plain) for m in motions], starts, drift)}
+    return concluded(instrument, [replace(t, plain=plain.get(t.trial_id, NOT_SHOWN)) for t in lags], known)
 
 
 def concluded(instrument: str, lags: list[TrialLag], known: Tolerances) -> tuple[Clock, tuple[Verdict, ...]]:

@@ -10,7 +10,7 @@ from calibration.numerics.signals import RATE, Signal, body_rates, even, low_pas
 from calibration.numerics.time_delay import Lag, Pair, coarse_lag, fit_lag
 from calibration.recording.clock import Clock
 from calibration.robot.laboratory import Laboratory
-from calibration.stages.clocks.clock_fit import TrialLag, fit_clock
+from calibration.stages.clocks.clock_fit import NOT_SHOWN, TrialLag, fit_clock
 from calibration.stages.clocks.stage import concluded, synchronise
 from tests.doubles import geared_robot, rigid_robot
 
@@ -159,7 +159,10 @@ def test_a_motion_that_hardly_moves_the_plate_contradicts_no_clock():
     assert "jumped" in verdicts[1].message and "sweep" not in verdicts[1].message
 
 
-@pytest.mark.parametrize(("plain", "named"), [(None, True), (1.9801, True), (1.9999, False), (np.nan, False)])
+@pytest.mark.parametrize(
+    ("plain", "named"),
+    [(None, True), (Lag(1.985, 2e-3), True), (Lag(1.985, 4e-3), False), (Lag(2.0, 2e-3), False), (NOT_SHOWN, False)],
+)
 def test_a_trial_that_only_its_nuisances_take_from_the_others_contradicts_no_clock(plain, named):
     lags = [TrialLag(f"swing_{i}", 20.0 * i, Lag(2.0 + 1e-5 * i, 3e-4)) for i in range(6)]
     far = TrialLag("sweep", 130.0, Lag(1.98, 2e-3), plain=plain)
