@@ -12,7 +12,6 @@ from scenarios import load, run
 
 pytestmark = pytest.mark.slow
 FAR = "half of the wheels slide, and how far is decided by a few newtons of their load: docs/limits.md"
-LINKS = "the base errs as usual: links are known less well than with the usual load, on this robot: docs/limits.md"
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +38,9 @@ def test_a_declared_payload_is_known_to_both(trials):
         ("xyz_0kg", "measured"),
         ("xyz_2kg", "measured"),
         ("push", "measured"),
-        pytest.param("xyz_0kg", "plate", marks=pytest.mark.xfail(reason=LINKS, strict=True)),
+        ("xyz_0kg", "plate"),
         pytest.param("xyz_2kg", "plate", marks=pytest.mark.xfail(reason=FAR, strict=True)),
-        pytest.param("push", "plate", marks=pytest.mark.xfail(reason=FAR, strict=True)),
+        ("push", "plate"),
     ],
 )
 def test_row_full_knows_what_loads_it(trials, trial, base):
