@@ -15,7 +15,8 @@ from calibration.numerics.compiled import njit
 from calibration.numerics.spatial import cross, turned
 from calibration.robot.kinematics import unit_twists
 
-# columns of the work of a body; as numpy's integers, not literals, for each of which numba would compile a function
+# columns of a body's work: orientation, origin, unit twist, twist, acceleration, wrench, scratch, inertia, their end;
+# as numpy's integers, not literals, for each of which numba would compile a function
 R, P, S, V, A, F, X, I, ROW = np.array([0, 9, 12, 18, 24, 30, 36, 42, 78])
 
 

@@ -60,7 +60,7 @@ _TOGETHER, _WORTH = 100, 20.0  # samples that err alike; chi-square that springs
 _LOST = 1e3  # what a base that does not settle is off [noise]
 _STEP, _SAME = 0.02, 1e-4  # of logarithms and LENGTH, for derivatives; share of them that a last step changes
 _PLACED = 5e-4  # [m] to which the plate's place is known at best
-_TOLD = np.array([0.3, 1.0])  # of that place's sigma, along x and across: how far slips may move the load from it
+_BY_SLIPS = np.array([0.3, 1.0])  # of that sigma, along x and across: prior of how far slips move the load from there
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 2))
 _KNOWN = np.array([0.3, 0.03, 0.05, 0.04])  # sigmas of the elements: heave hardly moves
 _MODEL = 0.05  # of a logarithm: loads are shared by more than springs
@@ -137,11 +137,11 @@ def _sharing(log_k: np.ndarray, covariance: np.ndarray, place: np.ndarray) -> Pr
     """The wide prior, its shares of the load as springs of log_k (3,) with a covariance (3, 3) have them.
 
     `place` (2,) is the sigma of where the load is [m]. Slips show it across the base; along x they err by as much as
-    weighing does, and are to move it less.
+    weighing does, so that its prior is narrower there.
     """
     mean, sigma = PRIOR.copy(), PRIOR_SIGMA.copy()
     mean[LOADS], sigma[LOADS] = _RATIOS @ log_k, np.sqrt(np.diag(_RATIOS @ covariance @ _RATIOS.T) + _MODEL**2)
-    sigma[LOGARITHMS:] = place / LENGTH * _TOLD
+    sigma[LOGARITHMS:] = place / LENGTH * _BY_SLIPS
     return Prior(mean, sigma)
 
 
