@@ -38,7 +38,7 @@ from calibration.stages.bundle.stage import BUNDLE
 from calibration.stages.clocks.stage import synchronise
 from calibration.stages.frames.arm_tool_stage import ARM_TOOL
 from calibration.stages.frames.base_rests import MOVES, read_stations
-from calibration.stages.frames.base_stage import BASE_FRAME
+from calibration.stages.frames.base_stage import BASE_FRAME, with_base_frame
 from calibration.stages.geometry.cross_validation import cross_validated
 from calibration.stages.geometry.gear_deflection import GEOMETRY
 from calibration.stages.geometry.model_of_fit import hand_of
@@ -180,6 +180,8 @@ def _after(context: Context, stage: Stage) -> Context:
     absent = stage.lacks(context.data)
     if absent:
         return context.with_findings(Verdict(stage.name, "missing", f"not estimated: {absent}"))
+    if stage is GEOMETRY:
+        context = replace(context, data=with_base_frame(context.data))
     result = stage.run(context.data)
     context = _advised(context.with_result(result), result)
     return context.with_findings(*_changed(context.data)) if stage is GEOMETRY else context

@@ -12,7 +12,8 @@ from calibration.inference.absorption import Absorption
 from calibration.inference.parameters import Combination, Model, Parameter, Status
 from calibration.options import Options
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Description, Name, refuse_repeated
+from calibration.recording.declaration import Name, refuse_repeated
+from calibration.recording.schema import Description
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.joints.model import JointModel
 from calibration.stages.joints.repetitions import RegimeQuality

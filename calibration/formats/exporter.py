@@ -42,9 +42,7 @@ def mapping_of(
     return Mapping(
         urdf="nominal.urdf",
         setup=setup,
-        bodies=tuple(
-            MappedBody(name=b.name, link=b.link, markers=b.markers, placement=b.placement) for b in description.bodies
-        ),
+        bodies=tuple(map(MappedBody.of, description.bodies)),
         trials=tuple(_trial(entry, trial) for entry, trial in trials),
         csv=_tables(description, chain, trials, wrist),
         c3d=C3dLayout(

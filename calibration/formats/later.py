@@ -26,9 +26,7 @@ def of_later_session(mapping: MappingFile, files: Sequence[Path], laboratory: De
         ours, theirs = getattr(laboratory, name), getattr(setup, name)
         if ours != theirs:
             raise mapping.error(f"setup.{name}", f"{theirs}; the estimate is of {ours}")
-    bodies = tuple(
-        MappedBody(name=b.name, link=b.link, markers=b.markers, placement=b.placement) for b in laboratory.bodies
-    )
+    bodies = tuple(map(MappedBody.of, laboratory.bodies))
     reader, by_stem = reader_of(None, mapping), dict[str, list[Path]]()
     for path in files:
         by_stem.setdefault(reader.stem(path), []).append(path)

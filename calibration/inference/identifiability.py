@@ -68,11 +68,12 @@ class Identifiability:
 
 
 def identifiability(J: np.ndarray, parameters: ParameterSet) -> Identifiability:
-    """Rank and combinations of the whitened Jacobian J (m, p)."""
+    """Rank and combinations of the whitened Jacobian J (m, p), and of what was measured of the parameters before."""
     scale = parameters.scale
-    A = J * scale
+    measured = np.eye(len(scale))[parameters.indices(parameters.measured)]
+    A = np.concatenate([J * scale, measured])
     if len(A) > A.shape[1]:
-        A = np.linalg.qr(A, mode="r")  # the same lengths and angles between columns, fewer rows
+        A = np.asarray(np.linalg.qr(A, mode="r"))  # the same lengths and angles between columns, fewer rows
     _, values, Vt = np.linalg.svd(A, full_matrices=len(A) < A.shape[1])
     values = np.concatenate([values, np.zeros(max(0, len(scale) - len(values)))])
     rank = int((values > _CLIFF * values[0]).sum())

@@ -180,6 +180,7 @@ class ParameterSet:
         tolerance: (p,) standard deviations of the prior; inf where there is none.
         group: Label of the parameters whose tolerances share a factor that the data decide, length p; "": fixed
             tolerance. Empty where all are fixed.
+        measured: Names of those whose nominal values were measured on this robot: they count as identified.
     """
 
     names: tuple[str, ...]
@@ -187,6 +188,7 @@ class ParameterSet:
     nominal: np.ndarray
     tolerance: np.ndarray
     group: tuple[str, ...] = ()
+    measured: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.names)
@@ -213,13 +215,14 @@ class ParameterSet:
         labels, units, group = (
             tuple(x[i] for i in kept) for x in (self.names, self.units, self.group or ("",) * len(self))
         )
-        return ParameterSet(labels, units, self.nominal[kept], self.tolerance[kept], group)
+        return ParameterSet(labels, units, self.nominal[kept], self.tolerance[kept], group, self.measured)
 
     def joined(self, other: "ParameterSet") -> "ParameterSet":
         """These parameters, then the other ones."""
         groups = [s.group or ("",) * len(s) for s in (self, other)]
         nominal, tolerance = (np.append(getattr(self, x), getattr(other, x)) for x in ("nominal", "tolerance"))
-        return ParameterSet(self.names + other.names, self.units + other.units, nominal, tolerance, sum(groups, ()))
+        names, units, measured = (getattr(self, x) + getattr(other, x) for x in ("names", "units", "measured"))
+        return ParameterSet(names, units, nominal, tolerance, sum(groups, ()), measured)
 
     @property
     def scale(self) -> np.ndarray:

@@ -3,45 +3,32 @@
 SI units. Nothing in here is a truth: nominal coordinates, datasheet sigmas and tolerances only.
 """
 
-from collections import Counter
-from collections.abc import Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from calibration.errors import NotEnoughData
 from calibration.recording.body_on_link import body_on
+from calibration.recording.declaration import (
+    Declaration,
+    Name,
+    NonNegative,
+    Positive,
+    Positive6,
+    Text,
+    Vector3,
+    Vector6,
+    refuse_repeated,
+)
 
-Number = Annotated[float, Field(ge=-1e9, le=1e9)]
-Vector3 = tuple[Number, Number, Number]
-Vector6 = tuple[Number, Number, Number, Number, Number, Number]
-Positive = Annotated[float, Field(ge=1e-12, le=1e9)]
-NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}$")]
-"""Plain: letters, digits, `_`, `-`, `.`; it becomes the name of files."""
-Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{0,200}$")]
-"""One line for people."""
+Axes = tuple[Vector3, Vector3, Vector3]
 Role = Literal["calibration", "validation", "confirmation"]
 Kind = Literal["static", "sweep", "swing", "spin", "drive"]
 _ORTHOGONAL = 1e-3  # axes of a plate may be rounded [-]
 _GRAVITY = (0.5, 30.0)  # [m/s2]
 _MOST_JOINTS, _MOST_BODIES, _MOST_MARKERS, _MOST_TRIALS = 100, 100, 1000, 10_000
-
-
-class Declaration(BaseModel):
-    """Strict and frozen: an unknown field or a NaN is an error, not a default."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-def refuse_repeated(**groups: Sequence[str]) -> None:
-    """Raise ValueError for the first group that holds a name more than once."""
-    for group, names in groups.items():
-        twice = sorted(n for n, count in Counter(names).items() if count > 1)
-        if twice:
-            raise ValueError(f"{group} named more than once: {twice}")
 
 
 class Joint(Declaration):
@@ -62,13 +49,15 @@ class Marker(Declaration):
 class Body(Declaration):
     """A rigid marker cluster; its frame nominally coincides with the frame of `link`, but for `placement`.
 
-    `placement` is the translation [m] and rotation vector [rad] of T_link_body where no drawing puts the two together.
+    `placement` is the translation [m] and rotation vector [rad] of T_link_body where no drawing puts the two together,
+    `tolerance` its standard deviations where it was measured on this robot, else they are those of `Tolerances`.
     """
 
     name: Name
     link: Name
     markers: Annotated[tuple[Marker, ...], Field(max_length=_MOST_MARKERS)]
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    tolerance: Positive6 | None = None
 
     @field_validator("markers")
     @classmethod
@@ -102,12 +91,12 @@ class Plate(Declaration):
 
     name: Name
     centre: Vector3
-    axes: tuple[Vector3, Vector3, Vector3]
+    axes: Axes
     size: tuple[Positive, Positive]
 
     @field_validator("axes")
     @classmethod
-    def _are_a_rotation(cls, axes: tuple[Vector3, Vector3, Vector3]) -> tuple[Vector3, Vector3, Vector3]:
+    def _are_a_rotation(cls, axes: Axes) -> Axes:
         R = np.array(axes)
         if np.abs(R @ R.T - np.eye(3)).max() > _ORTHOGONAL or np.linalg.det(R) < 0.0:
             raise ValueError("axes are not of unit length, at right angles and right-handed")
@@ -152,6 +141,7 @@ class Tolerances(Declaration):
         joint_windup: By which dry friction winds a gear, friction over stiffness [rad].
         body_translation: Marker cluster on its link, per axis [m].
         body_rotation: Marker cluster on its link, per axis [rad].
+        plate_translation: Centre of a force plate, per axis across its surface [m].
         link_mass: Relative to the link's mass [-].
         link_com: Centre of mass, per axis [m].
     """
@@ -167,6 +157,11 @@ class Tolerances(Declaration):
     joint_delay: Positive = 5e-5
     joint_delay_spread: Positive = 0.6
     joint_windup: Positive = 1e-4
+    plate_translation: Positive = 5e-4
+
+    def body(self, body: Body) -> np.ndarray:
+        """Standard deviations (6,) of a marker body's placement on its link [m, rad]."""
+        return np.array(body.tolerance or [self.body_translation] * 3 + [self.body_rotation] * 3)
 
 
 class TrialEntry(Declaration):

@@ -67,7 +67,7 @@ class Frames(ParameterBlock):
 
     def tolerance(self, known: Known) -> np.ndarray:
         """Of marker bodies on their links."""
-        return np.tile(np.repeat([known.tolerances.body_translation, known.tolerances.body_rotation], 3), 2)
+        return known.frames
 
     def jacobian(self, at: HandKinematics) -> np.ndarray:
         """By both frames."""

@@ -66,6 +66,13 @@ class Laboratory:
         """Nominal pose (4, 4) of the base's marker body in the base frame."""
         return nominal_base_body(self.chain, self.description)
 
+    def with_base_body(self, placement: np.ndarray, sigma: np.ndarray) -> "Laboratory":
+        """With the base's marker body where it was measured: T_base_B as (6,), its sigma (6,) [m, rad]."""
+        description, own = self.description, self.description.base_body
+        measured = {"placement": tuple(map(float, placement)), "tolerance": tuple(map(float, sigma))}
+        bodies = tuple(b.model_copy(update=measured) if b is own else b for b in description.bodies)
+        return replace(self, description=description.model_copy(update={"bodies": bodies}))
+
     @cached_property
     def _payloads(self) -> Mapping[str, float | None]:
         return {entry.id: entry.payload for entry in self.description.trials}

@@ -45,14 +45,18 @@ class Known:
     Attributes:
         chain: The nominal robot.
         tolerances: Of the datasheet.
+        frames: (12,) standard deviations of both marker frames [m, rad].
         tau: (n, k) gravity torques of the postures [N.m, N]; (0, k) where no loaded gear is estimated.
         deflection: Of a gear at its own largest gravity torque, preloaded backlash included [rad].
+        measured: Names of parameters whose nominal values were measured on this robot.
     """
 
     chain: Chain
     tolerances: Tolerances
+    frames: np.ndarray
     tau: np.ndarray
     deflection: float = 3e-2
+    measured: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +117,8 @@ class ParameterBlock:
 
     def parameters(self, known: Known) -> ParameterSet:
         """Names, units, nominal values and priors."""
-        return ParameterSet(self.names, self.units, self.values, self.tolerance(known), self.groups)
+        measured = tuple(name for name in self.names if name in known.measured)
+        return ParameterSet(self.names, self.units, self.values, self.tolerance(known), self.groups, measured)
 
 
 class ReadingError(ParameterBlock):

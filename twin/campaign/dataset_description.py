@@ -60,7 +60,7 @@ def describe_dataset(config: TwinConfig, trials: tuple[TrialEntry, ...]) -> Desc
 def _plates(instruments: Instruments) -> tuple[schema.Plate, ...]:
     spec = mjcf.spec()
     T = T_lab_plate(spec.body(PLATE), instruments.plate_place)
-    axes = cast(tuple[schema.Vector3, schema.Vector3, schema.Vector3], tuple(map(point, T[:3, :3].T)))
+    axes = cast(schema.Axes, tuple(map(point, T[:3, :3].T)))
     cut = PlateGrid(instruments.plate_grid).cut(*(2.0 * spec.geom(PLATE).size[:2]).tolist())
     return tuple(
         schema.Plate(name=t.name, centre=point(T[:3, :3] @ (*t.shift, 0.0) + T[:3, 3]), axes=axes, size=t.size)

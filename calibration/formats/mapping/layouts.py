@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from calibration.recording.schema import Declaration, Positive
+from calibration.recording.declaration import Declaration, Positive
 
 Columns = tuple[str, str, str]
 LENGTHS = {"m": 1.0, "mm": 1e-3}

@@ -16,21 +16,18 @@ from calibration.formats.mapping.layouts import BagLayout, C3dLayout, CsvTable, 
 from calibration.formats.mapping.poses import marker_names as pose_markers
 from calibration.formats.mapping.poses import shape_of
 from calibration.recording.body_on_link import body_on
-from calibration.recording.schema import (
-    Body,
+from calibration.recording.declaration import (
     Declaration,
-    Kind,
-    Marker,
     Name,
     NonNegative,
     Number,
     Positive,
-    Role,
-    Setup,
+    Positive6,
     Text,
     Vector6,
     refuse_repeated,
 )
+from calibration.recording.schema import Body, Kind, Marker, Role, Setup
 
 
 class Standing(Declaration):
@@ -49,6 +46,7 @@ class MappedBody(Declaration):
         link: The link it is fixed on.
         markers: Drawn markers, with their coordinates in the link's frame [m].
         placement: Of drawn markers, where their coordinates are not in the link's frame; see `schema.Body`.
+        tolerance: Of that, where it was measured on this robot.
         pose: Columns or topic of its 6D pose, those of the table or bag (`pose: true` in the file): six markers stand
             for it.
         undrawn: Names of markers whose coordinates nobody measured: their shape is the mean over calibration trials.
@@ -61,6 +59,7 @@ class MappedBody(Declaration):
     link: Name
     markers: tuple[Marker, ...] = ()
     placement: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    tolerance: Positive6 | None = None
     pose: PoseChannels | PoseTopic | None = None
     undrawn: tuple[Name, ...] = ()
     standing: Standing | None = None
@@ -78,6 +77,11 @@ class MappedBody(Declaration):
             )
         return self
 
+    @classmethod
+    def of(cls, body: Body) -> "MappedBody":
+        """A body of a dataset."""
+        return cls.model_validate(body.model_dump())
+
     @property
     def marker_names(self) -> tuple[str, ...]:
         """Of all its markers."""
@@ -91,7 +95,7 @@ class MappedBody(Declaration):
         if self.pose is not None:
             places = (tuple(map(float, x)) for x in shape_of(self.pose))
             markers = tuple(Marker(name=n, xyz=x) for n, x in zip(self.marker_names, places, strict=True))  # type: ignore[arg-type]
-        return Body(name=self.name, link=self.link, markers=markers, placement=self.placement)
+        return Body(name=self.name, link=self.link, markers=markers, placement=self.placement, tolerance=self.tolerance)
 
 
 class MappedTrial(Declaration):

@@ -69,13 +69,13 @@ def locate_arm(lab: Laboratory, postures: Postures, base_frame: Model | None) ->
 
 
 def _parameters(lab: Laboratory) -> ParameterSet:
-    chain, frames, tol = lab.chain, lab.nominal_frames, lab.description.tolerances
+    chain, frames, d, tol = lab.chain, lab.nominal_frames, lab.description, lab.description.tolerances
     base, hand = frame_names()
     return ParameterSet(
         tuple(f"{prefix}.{axis}" for prefix in (base, PREFIX, hand) for axis in AXES),
         ("m", "m", "m", "rad", "rad", "rad") * 3,
         np.concatenate([frames[:6], to_vector(nominal_arm(chain)), frames[6:]]),
-        np.tile(np.repeat([tol.body_translation, tol.body_rotation], 3), 3),
+        np.concatenate([tol.body(d.base_body), *[[tol.body_translation] * 3 + [tol.body_rotation] * 3] * 2]),
     )
 
 

@@ -6,6 +6,7 @@ differ from trial to trial, and what all trials have in common comes on top of t
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,8 +43,7 @@ def locate_base(lab: Laboratory, stations: Stations) -> tuple[Model | None, tupl
 
 
 def _model(description: Description, found: BaseFrame, nominal: np.ndarray, free: np.ndarray) -> Model:
-    tol = description.tolerances
-    tolerance = np.repeat([tol.body_translation, tol.body_rotation], 3)
+    tolerance = description.tolerances.body(description.base_body)
     covariance = max(1.0, found.chi2) * found.covariance[:6, :6] + np.diag(np.where(free, STANDING, tolerance) ** 2)
     status: tuple[Status, ...] = tuple("estimated" if f else "not_identifiable" for f in free)
     rows = zip(AXES, nominal, found.common.base, np.sqrt(np.diag(covariance)), status, strict=True)
@@ -111,6 +111,15 @@ def _eccentricity(planar: np.ndarray) -> np.ndarray:
     A = np.concatenate([np.column_stack([k, -s, one, zero]), np.column_stack([s, k, zero, one])])
     found: np.ndarray = np.linalg.lstsq(A, -planar[:, :2].T.ravel(), rcond=None)[0][:2]
     return found
+
+
+def with_base_frame(data: StageInput) -> StageInput:
+    """With the base's marker body where spins and drives show it; as it was without them."""
+    model = data.model(STAGE)
+    if model is None:
+        return data
+    rows = np.array([(p.value, p.sigma) for p in model.parameters[:6]])  # clocks follow
+    return replace(data, lab=data.lab.with_base_body(rows[:, 0], rows[:, 1]))
 
 
 def _run(data: StageInput) -> StageResult:

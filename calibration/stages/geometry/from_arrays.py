@@ -229,7 +229,7 @@ def _parameters(hand: HandModel, widths: Widths, tau: np.ndarray, oriented: bool
         link_mass=1.0,
         link_com=1.0,
     )
-    known = Known(hand.nominal, tolerances, tau, widths.deflection)
+    known = Known(hand.nominal, tolerances, np.full(12, np.inf), tau, widths.deflection)
     more = parameters_of(hand.blocks, known)
     less = parameters_of([b for b in hand.blocks if not isinstance(b, BacklashPreload)], known)
     frames, width = more.indices(hand.block(Frames).names), np.full(12, np.inf)

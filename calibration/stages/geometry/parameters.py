@@ -68,5 +68,13 @@ def reading_floor(chain: Chain, description: Description) -> np.ndarray:
 def _parameters(
     kinds: Sequence[type[ParameterBlock]], chain: Chain, description: Description, tau: np.ndarray
 ) -> ParameterSet:
-    frames = nominal_frames(chain, description)
-    return parameters_of([kind.nominal(chain, frames) for kind in kinds], Known(chain, description.tolerances, tau))
+    frames, tolerances = Frames.nominal(chain, nominal_frames(chain, description)), description.tolerances
+    bodies, names = (description.base_body, description.hand_body), np.reshape(frames.names, (2, 6))
+    known = Known(
+        chain,
+        tolerances,
+        np.concatenate([tolerances.body(body) for body in bodies]),
+        tau,
+        measured=tuple(name for body, of in zip(bodies, names, strict=True) if body.tolerance for name in of),
+    )
+    return parameters_of([kind.nominal(chain, frames.values) for kind in kinds], known)

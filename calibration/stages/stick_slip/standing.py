@@ -50,7 +50,7 @@ from calibration.stages.suspension.floor_wrench import Load, vertical
 from calibration.stages.suspension.modal_response import predicted
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import Rest
-from calibration.stages.suspension.weighing import seconds_at_rest, weighed
+from calibration.stages.suspension.weighing import declared_place, seconds_at_rest, weighed
 
 SOURCES: tuple[Source, ...] = ("plate", "dynamics")
 
@@ -239,6 +239,6 @@ def plate_place(
             rested = seconds_at_rest(seen, rest, robot, wrench.plate.signal, inverse.signal)
             seconds += [(own, second) for second in rested]
     if not seconds:
-        return np.zeros(2), np.full(2, lab.description.tolerances.body_translation), np.zeros(2)
+        return np.zeros(2), declared_place(lab.description), np.zeros(2)
     found = weighed(seconds, K)
     return found.off, found.sigma, found.seems

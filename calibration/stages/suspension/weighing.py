@@ -9,10 +9,10 @@ height h:
 
     u <- u + |u_1| (0, x + ry h, y - rx h) + yaw (0, -u_3, u_2)
 
-All of them normal: o as a marker body is on its link, links as `Tolerances` has them; the centre of mass of the root,
-which stands as it was built, to 2 mm. Postures tell the links' masses from the plate's place. Links that one robot in a
-thousand is as far from nominal as are not believed: s' S^-2 s of what was found, of tr(1 - C) degrees of freedom, C the
-covariance over the tolerances' S^2.
+All of them normal: o as a marker body is on its link and a plate in the lab, links as `Tolerances` has them; the centre
+of mass of the root, which stands as it was built, to 2 mm. Postures tell the links' masses from the plate's place.
+Links that one robot in a thousand is as far from nominal as are not believed: s' S^-2 s of what was found, of
+tr(1 - C) degrees of freedom, C the covariance over the tolerances' S^2.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,7 +28,7 @@ from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import Signal
 from calibration.recording.clock import Clock
-from calibration.recording.schema import Tolerances
+from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.link_masses import LinkMasses
@@ -103,7 +103,7 @@ def weighed(seconds: Sequence[tuple[Laboratory, Second]], K: np.ndarray | None) 
     A, upright, moved = (np.concatenate(column) for column in zip(*rows, strict=True))
     weight = np.mean([row[0][1, -2] for row in rows])
     noise = np.tile([_FORCE, _LEVER * weight, _LEVER * weight], len(rows))
-    sigma = _tolerances(lab.floating.njoints - 1, lab.description.tolerances)
+    sigma = _tolerances(lab.floating.njoints - 1, lab.description)
     A = A * sigma / noise[:, None]
     covariance = np.linalg.inv(A.T @ A + np.eye(len(sigma)))
     found = covariance @ A.T @ ((upright - moved) / noise)
@@ -144,11 +144,18 @@ def columns_of(lab: Laboratory, second: Second) -> tuple[np.ndarray, np.ndarray,
     return np.hstack([found.reshape(3, -1), second.v[0] * np.eye(3)[:, 1:]]), u[:3], float(u[3])
 
 
-def _tolerances(bodies: int, known: Tolerances) -> np.ndarray:
+def _tolerances(bodies: int, description: Description) -> np.ndarray:
     """Standard deviations of the columns of `columns_of`."""
+    known = description.tolerances
     links = np.tile([known.link_mass, *[known.link_com] * 3], bodies)
     links[1:4] = _ROOT
-    return np.append(links, [known.body_translation] * 2)
+    return np.append(links, declared_place(description))
+
+
+def declared_place(description: Description) -> np.ndarray:
+    """Standard deviations (2,) [m] of how far a plate is from its declared place under the base."""
+    known = description.tolerances
+    return np.hypot(known.body(description.base_body)[:2], known.plate_translation)
 
 
 def seconds_at_rest(

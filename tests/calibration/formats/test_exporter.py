@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from calibration import calibrate, load, save_estimate
+from calibration.formats.mapping.mapping import MappedBody
 from calibration.recording.trial import Trial
 from scenarios.commands import main
 from scenarios.steps import import_export
@@ -176,3 +177,9 @@ def test_importing_into_the_dataset_that_is_added_to_keeps_it_when_it_fails(csv,
         main.main(["import", "csv", *map(str, [*robot, *arguments])])
     assert exit.value.code == 2
     assert (tmp_path / "d/dataset.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("sigma", [None, (1e-4, 1e-4, 2e-3, 2e-3, 2e-3, 1e-3)])
+def test_a_mapping_says_of_a_body_what_the_dataset_does(sigma):
+    base = rigid_robot.described().base_body.model_copy(update={"placement": (0.1,) * 6, "tolerance": sigma})
+    assert MappedBody.of(base).drawn() == base
