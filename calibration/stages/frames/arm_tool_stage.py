@@ -31,13 +31,16 @@ _CHI2 = 3.0  # squared whitened residual per degree of freedom from which the ar
 _STRAY = 60.0  # squared distance of a posture over their median from which it is taken not to belong [-]
 
 
-def locate_arm(lab: Laboratory, postures: Postures, base_frame: Model | None) -> tuple[Model, tuple[Verdict, ...]]:
+def locate_arm(
+    lab: Laboratory, postures: Postures, base_frame: Model | None, followed: bool = False
+) -> tuple[Model, tuple[Verdict, ...]]:
     """Model `arm_tool`: `frame.base.<body>`, `frame.base.arm` and `frame.tool.hand`.
 
     Args:
         lab: Nominal robot and setup.
         postures: Static ones.
         base_frame: Of stage `base_frame`; None: the base's marker body is at its nominal place, to its tolerance.
+        followed: Whether stage `geometry` follows, for which the arm need not be as it is drawn.
 
     Raises:
         NotEnoughData: The arm turns about one axis only.
@@ -65,7 +68,7 @@ def locate_arm(lab: Laboratory, postures: Postures, base_frame: Model | None) ->
         rank=seen.rank,
         condition=seen.condition,
     )
-    return model, tuple(_verdicts(found, M, A, stray, seen))
+    return model, tuple(_verdicts(found, M, A, stray, seen, followed))
 
 
 def _parameters(lab: Laboratory) -> ParameterSet:
@@ -133,7 +136,7 @@ def _whitened(theta: np.ndarray, found: ArmTool, A: np.ndarray, postures: Postur
 
 
 def _verdicts(
-    found: ArmTool, M: np.ndarray, A: np.ndarray, stray: np.ndarray, seen: Identifiability
+    found: ArmTool, M: np.ndarray, A: np.ndarray, stray: np.ndarray, seen: Identifiability, followed: bool
 ) -> Iterator[Verdict]:
     mm, mrad = (1e3 * part for part in _left(found, M, A))
     left = f"{mm:.3f} mm and {mrad:.3f} mrad rms left, {np.sqrt(found.chi2):.1f} times the noise"
@@ -141,11 +144,9 @@ def _verdicts(
         yield Verdict(STAGE, "refused", f"the fit did not come to rest ({left})")
     yield Verdict(STAGE, "ok", f"arm base and tool from {len(M)} postures: {left}")
     if found.chi2 > _CHI2:
-        yield Verdict(
-            STAGE,
-            "warning",
-            f"the arm is not as the factory drew it ({left}); sigmas are widened; stage geometry would calibrate it",
-        )
+        does = "calibrates" if followed else "would calibrate"
+        message = f"the arm is not as the factory drew it ({left}); sigmas are widened; stage geometry {does} it"
+        yield Verdict(STAGE, "ok" if followed else "warning", message)
     if len(stray):
         yield Verdict(STAGE, "warning", f"postures {stray.tolist()} do not belong to the others and count less")
     if seen.rank < 18:
@@ -158,7 +159,7 @@ def _verdicts(
 
 
 def _run(data: StageInput) -> StageResult:
-    model, findings = locate_arm(data.lab, data.static, data.model("base_frame"))
+    model, findings = locate_arm(data.lab, data.static, data.model("base_frame"), data.moving)
     return StageResult((model,), findings)
 
 

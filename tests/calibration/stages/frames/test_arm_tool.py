@@ -203,11 +203,15 @@ def test_the_models_covariance_is_that_of_its_errors(chain, q, base_frame):
     assert 0.90 < covered < 0.98
 
 
-def test_an_arm_that_is_not_the_factorys_is_reported(chain, q, base_frame):
+@pytest.mark.parametrize("followed", [False, True])
+def test_an_arm_that_is_not_the_factorys_is_reported_and_no_warning_where_it_is_calibrated(
+    chain, q, base_frame, followed
+):
     data = postures(chain, q)
     bent = postures(chain, q + 2e-3 * np.random.default_rng(0).normal(size=q.shape))
-    model, said = locate_arm(LAB, replace(bent, q=data.q), base_frame)
-    assert any(v.verdict == "warning" and "not as the factory drew it" in v.message for v in said)
+    model, said = locate_arm(LAB, replace(bent, q=data.q), base_frame, followed)
+    (found,) = (v for v in said if "not as the factory drew it" in v.message)
+    assert found.verdict == ("ok" if followed else "warning")
     assert min(p.sigma for p in model.parameters[12:]) > 1e-4
 
 
