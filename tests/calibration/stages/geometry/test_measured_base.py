@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 import mjcf
+from calibration import pipeline
+from calibration.context import Context
 from calibration.numerics.lie import from_vector, to_vector
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.frames.base_stage import locate_base, with_base_frame
 from calibration.stages.geometry.stage import calibrate_geometry
-from calibration.stages.stage import StageInput
+from calibration.stages.stage import Stage, StageInput, StageResult
 from calibration.stages.suspension.weighing import declared_place
 from tests.doubles import rigid_robot, spinning_base
 
@@ -68,6 +70,16 @@ def test_spins_and_a_drive_measure_it():
     np.testing.assert_allclose(to_vector(data.lab.T_base_B), values, atol=1e-12)
     np.testing.assert_allclose(data.lab.description.tolerances.body(data.lab.description.base_body), sigma)
     assert with_base_frame(StageInput(LAB)).lab is LAB
+
+
+def test_geometry_and_what_follows_have_it_there(estimate, monkeypatch):
+    spun, _ = locate_base(LAB, replace(spinning_base.stations(*spinning_base.path()), ids=("round", "ahead")))
+    given: list[StageInput] = []
+    stage = Stage("geometry", lambda data: given.append(data) or StageResult(), lacks=lambda data: "")
+    monkeypatch.setattr(pipeline, "GEOMETRY", stage)
+    after = pipeline._after(Context(StageInput(LAB, models=(spun,)), estimate), stage).data
+    for lab in (given[0].lab, after.lab):
+        np.testing.assert_allclose(lab.T_base_B[:2, 3], spinning_base.TRUE[:2], atol=1e-4)
 
 
 def test_where_a_plate_is_under_the_base_is_known_to_both_places():
