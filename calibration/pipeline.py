@@ -3,7 +3,8 @@
     clocks -> registration -> base_frame -> arm_tool -> suspension -> geometry -> wrist_load -> joints
 
 A stage that needs another runs it. Only calibration trials are opened. Spins and drives, where the base moves on
-purpose, are for `base_frame` alone; all other stages use the trials in which it stands.
+purpose, are for `base_frame` alone; all other stages use the trials in which it stands, geometry and what follows with
+the base's markers where `base_frame` has them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
