@@ -22,7 +22,7 @@ from calibration.mocap.postures import Postures
 from calibration.numerics.alignment import registration_start
 from calibration.numerics.lie import compose
 from calibration.recording.schema import Tolerances
-from calibration.robot.blocks import BacklashPreload, Frames
+from calibration.robot.blocks import BacklashPreload
 from calibration.robot.chain import Chain, chain_of_frames
 from calibration.robot.hand import HandModel
 from calibration.robot.hand_uncertainty import Predicted, Session, Spread, predicted_points
@@ -229,10 +229,9 @@ def _parameters(hand: HandModel, widths: Widths, tau: np.ndarray, oriented: bool
         link_mass=1.0,
         link_com=1.0,
     )
-    known = Known(hand.nominal, tolerances, np.full(12, np.inf), tau, widths.deflection)
+    frames = np.full(12, np.inf)
+    frames[9:] = np.inf if oriented else _FIXED
+    known = Known(hand.nominal, tolerances, frames, tau, widths.deflection)
     more = parameters_of(hand.blocks, known)
     less = parameters_of([b for b in hand.blocks if not isinstance(b, BacklashPreload)], known)
-    frames, width = more.indices(hand.block(Frames).names), np.full(12, np.inf)
-    width[9:] = np.inf if oriented else _FIXED
-    less.tolerance[frames], more.tolerance[frames] = width, width
     return less, more

@@ -12,7 +12,7 @@ from scenarios import load, run
 
 pytestmark = pytest.mark.slow
 FAR = "half of the wheels slide, and how far is decided by a few newtons of their load: docs/limits.md"
-JOINTS = "arm_1 and arm_5 err more under another load where the campaign is short: docs/limits.md"
+JOINTS = "arm_1 errs more under another load where the campaign is short: docs/limits.md"
 
 
 def open_line(*which: str, reason: str):
