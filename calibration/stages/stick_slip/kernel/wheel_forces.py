@@ -34,24 +34,25 @@ _G = 9.80665  # [m/s2]
 
 
 @njit(cache=True, error_model="numpy")
-def on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float, n: int) -> None:
-    """Add the forces of wheels in n lanes of a flat state, and bit i where wheel i sticks; deflections follow."""
-    rows, rate = WHEEL * LANES, 1.0 / h
-    for i in range(len(wheels) // rows):
-        w, bit, slide = wheels[i * rows : (i + 1) * rows], float(1 << i), 0
+def on_wheels(w: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float, n: int) -> None:
+    """Add the forces of flat wheels in n lanes of a flat state, and bit i where wheel i sticks; deflections follow."""
+    rate = 1.0 / h  # no slices of w: each would be counted as a reference, which takes long
+    for i in range(len(w) // (WHEEL * LANES)):
+        o, bit, slide = i * WHEEL * LANES, float(1 << i), 0
         for l in range(n):
-            px, py, c = w[l], w[LANES + l], w[4 * LANES + l]
+            k = o + l
+            px, py, c = w[k], w[k + LANES], w[k + 4 * LANES]
             d3, d4, d5 = s[LOAD * LANES + l], s[(LOAD + 1) * LANES + l], s[(LOAD + 2) * LANES + l]
-            load = w[6 * LANES + l] + w[7 * LANES + l] * d3 + w[8 * LANES + l] * d4 + w[9 * LANES + l] * d5
+            load = w[k + 6 * LANES] + w[k + 7 * LANES] * d3 + w[k + 8 * LANES] * d4 + w[k + 9 * LANES] * d5
             N = max(load, 0.0)
             turn, spin = s[(D + 2) * LANES + l], s[(NOW + 2) * LANES + l]
-            mass, ux, uy = w[MASS * LANES + l] * rate, w[U * LANES + l], w[(U + 1) * LANES + l]
-            qx, qy, hangs = px - w[E * LANES + l], py - w[(E + 1) * LANES + l], N - _G * w[MASS * LANES + l]
-            ex = w[E * LANES + l] + s[D * LANES + l] - turn * qy
-            ey = w[(E + 1) * LANES + l] + s[(D + 1) * LANES + l] + turn * qx
-            fx = w[2 * LANES + l] * ex + c * (s[NOW * LANES + l] - spin * qy) - hangs * ry + mass * ux
-            fy = w[3 * LANES + l] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + hangs * rx + mass * uy
-            w[E * LANES + l], w[(E + 1) * LANES + l] = ex, ey
+            mass, ux, uy = w[k + MASS * LANES] * rate, w[k + U * LANES], w[k + (U + 1) * LANES]
+            qx, qy, hangs = px - w[k + E * LANES], py - w[k + (E + 1) * LANES], N - _G * w[k + MASS * LANES]
+            ex = w[k + E * LANES] + s[D * LANES + l] - turn * qy
+            ey = w[k + (E + 1) * LANES] + s[(D + 1) * LANES + l] + turn * qx
+            fx = w[k + 2 * LANES] * ex + c * (s[NOW * LANES + l] - spin * qy) - hangs * ry + mass * ux
+            fy = w[k + 3 * LANES] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + hangs * rx + mass * uy
+            w[k + E * LANES], w[k + (E + 1) * LANES] = ex, ey
             s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l], s[(STUCK + 2) * LANES + l] = fx, fy, N
             s[LEANS * LANES + l] += N * ex
             s[(LEANS + 1) * LANES + l] += N * ey
@@ -60,26 +61,27 @@ def on_wheels(wheels: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float,
             s[(F + 1) * LANES + l] += fy
             s[(F + 2) * LANES + l] += (px - ex) * fy - (py - ey) * fx
             s[BITS * LANES + l] += bit
-            limit = w[5 * LANES + l] * N
+            limit = w[k + 5 * LANES] * N
             slide += 1 if (fx * fx + fy * fy > limit * limit) | (ux != 0.0) | (uy != 0.0) else 0
         if slide > 0:
-            _sliding(w, s, bit, h, n)
+            _sliding(w, o, s, bit, h, n)
 
 
 @njit(cache=True, error_model="numpy")
-def _sliding(w: np.ndarray, s: np.ndarray, bit: float, h: float, n: int) -> None:
-    """Let a wheel slide in those of n lanes in which it bears more than friction: as it was left, it sticks."""
+def _sliding(w: np.ndarray, o: int, s: np.ndarray, bit: float, h: float, n: int) -> None:
+    """Let a wheel, element o of w and on, slide in those of n lanes in which it bears more than friction: it stuck."""
     for l in range(n):
-        px, py, N = w[l] - w[E * LANES + l], w[LANES + l] - w[(E + 1) * LANES + l], s[(STUCK + 2) * LANES + l]
+        k = o + l
+        px, py, N = w[k] - w[k + E * LANES], w[k + LANES] - w[k + (E + 1) * LANES], s[(STUCK + 2) * LANES + l]
         fx, fy = s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l]
-        cut = min(w[5 * LANES + l] * N / np.sqrt(fx * fx + fy * fy + _NONE), 1.0)
+        cut = min(w[k + 5 * LANES] * N / np.sqrt(fx * fx + fy * fy + _NONE), 1.0)
         fx, fy = fx * (1.0 - cut), fy * (1.0 - cut)
-        x, y = fx * w[YIELDS * LANES + l], fy * w[(YIELDS + 1) * LANES + l]
-        mass = w[MASS * LANES + l] / h
-        gx, gy = mass * (x - w[U * LANES + l]), mass * (y - w[(U + 1) * LANES + l])
-        w[U * LANES + l], w[(U + 1) * LANES + l] = x, y
-        w[E * LANES + l] -= h * x
-        w[(E + 1) * LANES + l] -= h * y
+        x, y = fx * w[k + YIELDS * LANES], fy * w[k + (YIELDS + 1) * LANES]
+        mass = w[k + MASS * LANES] / h
+        gx, gy = mass * (x - w[k + U * LANES]), mass * (y - w[k + (U + 1) * LANES])
+        w[k + U * LANES], w[k + (U + 1) * LANES] = x, y
+        w[k + E * LANES] -= h * x
+        w[k + (E + 1) * LANES] -= h * y
         s[LEANS * LANES + l] -= N * (h * x)
         s[(LEANS + 1) * LANES + l] -= N * (h * y)
         s[W * LANES + l] += gx
