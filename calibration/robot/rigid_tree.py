@@ -17,7 +17,7 @@ from calibration.robot.kinematics import unit_twists
 
 # columns of a body's work: orientation, origin, unit twist, twist, acceleration, wrench, scratch, inertia, their end;
 # as numpy's integers, not literals, for each of which numba would compile a function
-R, P, S, V, A, F, X, I, ROW = np.array([0, 9, 12, 18, 24, 30, 36, 42, 78])
+P, S, V, A, F, X, I, ROW = np.array([9, 12, 18, 24, 30, 36, 42, 78])
 
 
 class RigidTree(NamedTuple):
@@ -61,8 +61,8 @@ def tree_of(model: pin.Model, joints: tuple[str, ...]) -> RigidTree:
 
 
 def scratch(tree: RigidTree) -> np.ndarray:
-    """Room for one sample of a tree, (k + 1, 78)."""
-    return np.zeros((len(tree.mass), ROW))
+    """Room for one sample of a tree, (k + 2, 78): a row for each body, and one for what is used in between."""
+    return np.zeros((len(tree.mass) + 1, ROW))
 
 
 def last_wrench(tree: RigidTree, q: np.ndarray, v: np.ndarray, a: np.ndarray, root: np.ndarray) -> np.ndarray:
@@ -73,80 +73,83 @@ def last_wrench(tree: RigidTree, q: np.ndarray, v: np.ndarray, a: np.ndarray, ro
 
 
 @njit(cache=True, error_model="numpy")
-def times(me: np.ndarray, at: int, out: np.ndarray, to: int) -> None:
-    """out[to:to + 6] = I me[at:at + 6], I the body's inertia."""
+def times(w: np.ndarray, b: int, at: int, to: int) -> None:
+    """w[b, to:to + 6] = I w[b, at:at + 6], I the inertia of body b."""
     for i in range(6):
-        out[to + i] = 0.0
+        total = 0.0
         for c in range(6):
-            out[to + i] += me[I + 6 * i + c] * me[at + c]
+            total += w[b, I + 6 * i + c] * w[b, at + c]
+        w[b, to + i] = total
 
 
 @njit(cache=True, error_model="numpy")
-def place(tree: RigidTree, j: int, angle: float, up: np.ndarray, me: np.ndarray) -> None:
-    """Orientation, origin and unit twist of joint j at an angle, from the body `up` that carries it."""
-    fixed, axis, w = tree.fixed[j], tree.axis[j], np.empty(3)
-    for i in range(V):
-        me[i] = 0.0
+def place(tree: RigidTree, j: int, angle: float, w: np.ndarray) -> None:
+    """Orientation, origin and unit twist of joint j at an angle, from the body that carries it."""
+    b, up, fixed = j + 1, tree.parent[j], tree.fixed
     for i in range(3):
+        w[b, S + i] = w[b, S + 3 + i] = 0.0
+        w[b, X + i] = tree.axis[j, i]
+        x, y, z = w[up, 3 * i], w[up, 3 * i + 1], w[up, 3 * i + 2]
         for c in range(3):
-            for r in range(3):
-                me[3 * i + c] += up[3 * i + r] * fixed[r, c]
-            me[P + i] += up[3 * i + c] * fixed[c, 3]
-        me[P + i] += up[P + i]
+            w[b, 3 * i + c] = x * fixed[j, 0, c] + y * fixed[j, 1, c] + z * fixed[j, 2, c]
+        w[b, P + i] = x * fixed[j, 0, 3] + y * fixed[j, 1, 3] + z * fixed[j, 2, 3] + w[up, P + i]
     if tree.prismatic[j]:
-        turned(me, axis, me, S)
+        turned(w, b, b, X, S)
         for i in range(3):
-            me[P + i] += me[S + i] * angle
+            w[b, P + i] += w[b, S + i] * angle
         return
-    turned(me, axis, me, S + 3)
-    cross(me, P, me, S + 3, me, S)
+    turned(w, b, b, X, S + 3)
+    cross(w, b, P, b, S + 3, b, S)
     s, c = np.sin(angle), 1.0 - np.cos(angle)
     for i in range(3):
-        for r in range(3):
-            w[r] = me[3 * i + r]
-        for r in range(3):
-            across = w[(r + 1) % 3] * axis[(r + 2) % 3] - w[(r + 2) % 3] * axis[(r + 1) % 3]
-            me[3 * i + r] += s * across + c * (me[S + 3 + i] * axis[r] - w[r])
+        x, y, z, along = w[b, 3 * i], w[b, 3 * i + 1], w[b, 3 * i + 2], w[b, S + 3 + i]
+        w[b, 3 * i] += s * (y * w[b, X + 2] - z * w[b, X + 1]) + c * (along * w[b, X] - x)
+        w[b, 3 * i + 1] += s * (z * w[b, X] - x * w[b, X + 2]) + c * (along * w[b, X + 1] - y)
+        w[b, 3 * i + 2] += s * (x * w[b, X + 1] - y * w[b, X]) + c * (along * w[b, X + 2] - z)
 
 
 @njit(cache=True, error_model="numpy")
-def move(me: np.ndarray, up: np.ndarray, v: float, a: float) -> None:
-    """Twist and acceleration of a body from those of the one that carries it."""
+def move(b: int, up: int, v: float, a: float, w: np.ndarray) -> None:
+    """Twist and acceleration of body b from those of the one that carries it, `up`."""
     for i in range(6):
-        me[X + i] = 0.0
-    cross(up, V + 3, me, S, me, X)
-    cross(up, V, me, S + 3, me, X)
-    cross(up, V + 3, me, S + 3, me, X + 3)
+        w[b, X + i] = 0.0
+    cross(w, up, V + 3, b, S, b, X)
+    cross(w, up, V, b, S + 3, b, X)
+    cross(w, up, V + 3, b, S + 3, b, X + 3)
     for i in range(6):
-        me[V + i] = up[V + i] + me[S + i] * v
-        me[A + i] = up[A + i] + me[S + i] * a + me[X + i] * v
+        w[b, V + i] = w[up, V + i] + w[b, S + i] * v
+        w[b, A + i] = w[up, A + i] + w[b, S + i] * a + w[b, X + i] * v
 
 
 @njit(cache=True, error_model="numpy")
-def weigh(tree: RigidTree, b: int, me: np.ndarray) -> None:
+def weigh(tree: RigidTree, b: int, w: np.ndarray) -> None:
     """Inertia of body b about the root's origin, and the wrench that moves it."""
-    m, inertia, h, square, at = tree.mass[b], tree.inertia[b], np.zeros(3), 0.0, I + 21  # where the angular part is
-    me[F:] = 0.0
-    turned(me, tree.moment[b], h, R)
+    m, square, h, at = tree.mass[b], 0.0, X, I + 21  # where its first moment and the angular part of its inertia are
+    for i in range(F, ROW):
+        w[b, i] = 0.0
     for i in range(3):
-        p = me[P + i]
-        square += p * (2.0 * h[i] + m * p)
-        me[I + 7 * i] = m
+        w[b, h + 3 + i] = tree.moment[b, i]
+    turned(w, b, b, h + 3, h)
+    for i in range(3):
+        p = w[b, P + i]
+        square += p * (2.0 * w[b, h + i] + m * p)
+        w[b, I + 7 * i] = m
         for c in range(3):
+            total = 0.0
             for r in range(3):
                 for s in range(3):
-                    me[at + 6 * i + c] += me[3 * i + r] * inertia[r, s] * me[3 * c + s]
-            me[at + 6 * i + c] -= h[i] * me[P + c] + p * h[c] + m * p * me[P + c]
+                    total += w[b, 3 * i + r] * tree.inertia[b, r, s] * w[b, 3 * c + s]
+            w[b, at + 6 * i + c] = total - (w[b, h + i] * w[b, P + c] + p * w[b, h + c] + m * p * w[b, P + c])
     for i in range(3):
-        me[at + 7 * i] += square
-        j, k, first = (i + 1) % 3, (i + 2) % 3, h[i] + m * me[P + i]
-        me[at - 3 + 6 * k + j] = me[at - 18 + 6 * j + k] = first
-        me[at - 3 + 6 * j + k] = me[at - 18 + 6 * k + j] = -first
-    times(me, A, me, F)
-    times(me, V, me, X)
-    cross(me, V + 3, me, X, me, F)
-    cross(me, V + 3, me, X + 3, me, F + 3)
-    cross(me, V, me, X, me, F + 3)
+        w[b, at + 7 * i] += square
+        j, k, first = (i + 1) % 3, (i + 2) % 3, w[b, h + i] + m * w[b, P + i]
+        w[b, at - 3 + 6 * k + j] = w[b, at - 18 + 6 * j + k] = first
+        w[b, at - 3 + 6 * j + k] = w[b, at - 18 + 6 * k + j] = -first
+    times(w, b, A, F)
+    times(w, b, V, X)
+    cross(w, b, V + 3, b, X, b, F)
+    cross(w, b, V + 3, b, X + 3, b, F + 3)
+    cross(w, b, V, b, X, b, F + 3)
 
 
 @njit(cache=True, error_model="numpy")
@@ -156,19 +159,19 @@ def _last(
     """`last_wrench` into `out` (n, 6)."""
     k = len(tree.parent)
     for i in range(len(q)):
-        stand(work[0], root[min(i, len(root) - 1)])
+        stand(root, min(i, len(root) - 1), work)
         for j in range(k):
-            me, up, column = work[j + 1], work[tree.parent[j]], tree.column[j]
-            place(tree, j, q[i, column], up, me)
-            move(me, up, v[i, column], a[i, column])
-        weigh(tree, k, work[k])
+            column = tree.column[j]
+            place(tree, j, q[i, column], work)
+            move(j + 1, tree.parent[j], v[i, column], a[i, column], work)
+        weigh(tree, k, work)
         for c in range(6):
             out[i, c] = work[k, F + c]
 
 
 @njit(cache=True, error_model="numpy")
-def stand(me: np.ndarray, root: np.ndarray) -> None:
-    """The root itself, its twist and acceleration root[:12]."""
-    me[0] = me[4] = me[8] = 1.0
+def stand(root: np.ndarray, i: int, w: np.ndarray) -> None:
+    """The root itself, its twist and acceleration root[i, :12]."""
+    w[0, 0] = w[0, 4] = w[0, 8] = 1.0
     for c in range(12):
-        me[V + c] = root[c]
+        w[0, V + c] = root[i, c]

@@ -19,7 +19,6 @@ from calibration.robot.rigid_tree import (
     F,
     I,
     P,
-    R,
     RigidTree,
     S,
     V,
@@ -79,57 +78,58 @@ def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
 
 
 @njit(cache=True, error_model="numpy")
-def _unit_forces(me: np.ndarray, out: np.ndarray) -> None:
-    """Wrenches (4, 6) about the root's origin by unit mass and first moments of a body that moves: a(r) = a + B r."""
-    B, axis, w, square = np.zeros((3, 3)), np.empty(3), np.empty(3), 0.0
-    out[:] = 0.0
+def _unit_forces(w: np.ndarray, b: int, f: int) -> None:
+    """Wrenches w[f, :24] about the root's origin by unit mass and first moments of body b, moving: a(r) = a + B r."""
+    B, turn, square = 24, V + 3, 0.0
+    for c in range(33):
+        w[f, c] = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        w[i] = me[V + 3 + i]
-        square += w[i] ** 2
-        B[k, j], B[j, k] = me[A + 3 + i], -me[A + 3 + i]
+        square += w[b, turn + i] ** 2
+        w[f, B + 3 * k + j], w[f, B + 3 * j + k] = w[b, A + 3 + i], -w[b, A + 3 + i]
     for i in range(3):
-        B[i, i] -= square
+        w[f, B + 4 * i] -= square
         for c in range(3):
-            B[i, c] += w[i] * w[c]
-            out[0, i] += B[i, c] * me[P + c]
-        out[0, i] += me[A + i]
-    cross(w, R, me, V, out[0], R)
-    cross(me, P, out[0], R, out[0], R + 3)
+            w[f, B + 3 * i + c] += w[b, turn + i] * w[b, turn + c]
+            w[f, i] += w[f, B + 3 * i + c] * w[b, P + c]
+        w[f, i] += w[b, A + i]
+    cross(w, b, turn, b, V, f, 0)
+    cross(w, b, P, f, 0, f, 3)
     for c in range(3):
-        f = out[1 + c]
+        by = 6 * (1 + c)
         for i in range(3):
-            axis[i] = me[3 * i + c]
             for r in range(3):
-                f[i] += B[i, r] * me[3 * r + c]
-        cross(me, P, f, R, f, R + 3)
+                w[f, by + i] += w[f, B + 3 * i + r] * w[b, 3 * r + c]
+        cross(w, b, P, f, by, f, by + 3)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            f[3 + i] += axis[j] * out[0, k] - axis[k] * out[0, j]
+            w[f, by + 3 + i] += w[b, 3 * j + c] * w[f, k] - w[b, 3 * k + c] * w[f, j]
 
 
 @njit(cache=True, error_model="numpy")
-def _regress(tree: RigidTree, work: np.ndarray, out: np.ndarray) -> None:
-    """Torques of all joints (k, 4 k) by the parameters of the bodies they carry."""
-    forces = np.empty((4, 6))
+def _regress(tree: RigidTree, w: np.ndarray, out: np.ndarray, i: int) -> None:
+    """Torques of all joints, sample i of out (n, k, 4 k), by the parameters of the bodies they carry."""
+    forces = len(tree.parent) + 1
     for b in range(len(tree.parent)):
-        _unit_forces(work[b + 1], forces)
+        _unit_forces(w, b + 1, forces)
         j = b + 1
         while j > 0:
             for c in range(4):
-                out[tree.column[j - 1], 4 * b + c] = dot(work[j], S, forces[c], R)
+                out[i, tree.column[j - 1], 4 * b + c] = dot(w, j, S, forces, 6 * c)
             j = tree.parent[j - 1]
 
 
 @njit(cache=True, error_model="numpy")
-def _relieve(me: np.ndarray, root: np.ndarray) -> None:
-    """Take what pushes a body, root[12:18], off the wrench that moves it."""
-    push = np.zeros(6)
-    turned(me, root[12:15], push, R)
-    turned(me, root[15:], push, R + 3)
-    cross(me, P, push, R, push, R + 3)
+def _relieve(w: np.ndarray, b: int, root: np.ndarray, i: int) -> None:
+    """Take what pushes the last body b, root[i, 12:18], off the wrench that moves it."""
+    push = b + 1
     for c in range(6):
-        me[F + c] -= push[c]
+        w[push, c], w[push, 6 + c] = root[i, 12 + c], 0.0
+    turned(w, b, push, 0, 6)
+    turned(w, b, push, 3, 9)
+    cross(w, b, P, push, 6, push, 9)
+    for c in range(6):
+        w[b, F + c] -= w[push, 6 + c]
 
 
 @njit(cache=True, error_model="numpy")
@@ -139,50 +139,53 @@ def sample(
     """`dynamics_along` for callers in compiled code; `work` as of `scratch`, `out` is filled."""
     k = len(tree.parent)
     for i in range(len(q)):
-        stand(work[0], root[min(i, len(root) - 1)])
-        for b in range(k + 1):
-            if b > 0:
-                me, up, column = work[b], work[tree.parent[b - 1]], tree.column[b - 1]
-                place(tree, b - 1, q[i, column], up, me)
-                move(me, up, v[i, column], a[i, column])
-            weigh(tree, b, work[b])
+        stand(root, min(i, len(root) - 1), work)
+        weigh(tree, 0, work)
+        for j in range(k):
+            column = tree.column[j]
+            place(tree, j, q[i, column], work)
+            move(j + 1, tree.parent[j], v[i, column], a[i, column], work)
+            weigh(tree, j + 1, work)
         if root.shape[1] > 12:
-            _relieve(work[k], root[i])
+            _relieve(work, k, root, i)
         if out.regressor.shape[2]:
-            _regress(tree, work, out.regressor[i])
+            _regress(tree, work, out.regressor, i)
         for j in range(k - 1, -1, -1):
             _gather(tree, work, j, out, i)
-        _borne(work, out, i)
+        _borne(work, min(1, k), out, i)
 
 
 @njit(cache=True, error_model="numpy")
-def _gather(tree: RigidTree, work: np.ndarray, j: int, out: TreeDynamics, i: int) -> None:
+def _gather(tree: RigidTree, w: np.ndarray, j: int, out: TreeDynamics, i: int) -> None:
     """What joint j bears into sample i of `out`, and to the body that carries it."""
-    me, root, up, column, b = work[j + 1], work[0], work[tree.parent[j]], tree.column[j], j + 1
-    out.torque[i, column] = dot(me, S, me, F)
-    times(me, S, me, X)
-    root[X:I] = 0.0  # scratch of the root: how what the joint carries weighs as it turns
-    cross(me, X, root, A, root, X + 3)
+    me, up, column, b = j + 1, tree.parent[j], tree.column[j], j + 1
+    out.torque[i, column] = dot(w, me, S, me, F)
+    times(w, me, S, X)
+    for c in range(6):
+        w[0, X + c] = 0.0  # scratch of the root: how what the joint carries weighs as it turns
+    cross(w, me, X, 0, A, 0, X + 3)
     while b > 0:  # the joints that carry this one
         other = tree.column[b - 1]
-        out.inertia[i, other, column] = out.inertia[i, column, other] = dot(work[b], S, me, X)
-        out.stiffness[i, other, column] = out.stiffness[i, column, other] = dot(work[b], S, root, X)
+        out.inertia[i, other, column] = out.inertia[i, column, other] = dot(w, b, S, me, X)
+        out.stiffness[i, other, column] = out.stiffness[i, column, other] = dot(w, b, S, 0, X)
         b = tree.parent[b - 1]
-    out.coupling[i, column] = me[X : X + 3]
+    for c in range(3):
+        out.coupling[i, column, c] = w[me, X + c]
     for c in range(F, ROW):  # the twist between is scratch
-        up[c] += me[c]
+        w[up, c] += w[me, c]
 
 
 @njit(cache=True, error_model="numpy")
-def _borne(work: np.ndarray, out: TreeDynamics, i: int) -> None:
+def _borne(w: np.ndarray, first: int, out: TreeDynamics, i: int) -> None:
     """What the root and the first joint bear."""
-    first, bears = work[min(1, len(work) - 1)], np.zeros(3)
-    cross(first, F, first, P, bears, R)
     for r in range(6):
-        out.root[i, r] = work[0, F + r]
+        out.root[i, r] = w[0, F + r]
         for c in range(6):
-            out.composite[i, r, c] = work[0, I + 6 * r + c]
+            out.composite[i, r, c] = w[0, I + 6 * r + c]
+    for c in range(3):
+        w[first, X + c] = 0.0
+    cross(w, first, F, first, P, first, X)
     for c in range(2):
         out.moment[i, c] = 0.0
         for r in range(3):
-            out.moment[i, c] += first[3 * r + c] * (bears[r] + first[F + 3 + r])
+            out.moment[i, c] += w[first, 3 * r + c] * (w[first, X + r] + w[first, F + 3 + r])
