@@ -147,8 +147,8 @@ class SlippingBase:
         if before is None or before.slip is None or t <= before.start + REST:
             state = at.sprung(t, wrench, before, self.model.standing)
             driving = None if moving is None else self._driven(at.gravity, moving)
-            slip = None if before is None else before.slip
-            return state._replace(slip=self._stream.stepped(Sample(t, at.action @ wrench, state.x[2:5], driving), slip))
+            slip, swayed = None if before is None else before.slip, np.stack([state.x[2:5], np.zeros(3)])
+            return state._replace(slip=self._stream.stepped(Sample(t, at.action @ wrench, swayed, driving), slip))
         slip, modes, stream = before.slip, at.suspension.modes, self._stream
         place = Place(at.action, self.model.standing, modes.a, modes.b, modes.tau, at.T_lab_0, at.T_0_lab, at.gravity)
         earlier = Earlier(
@@ -271,7 +271,7 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
     for i in range(6):
         for c in range(6):
             w[0, i] += place.action[i, c] * wrench[c]
-    sprung, slid = w.copy(), np.empty((1, 3))
+    sprung, slid, base, swayed = w.copy(), np.empty((1, 3)), np.empty((2, 3)), np.empty((2, 3))
     for k in range(3):
         slid[0, k] = fitted.moves[k] * (before.found[1, k] - before.x[PLANE[k]])
     bear(place.standing, sprung, slid)
@@ -279,12 +279,12 @@ def carried(  # noqa: PLR0913  compiled: arrays alone
         change[i] = sprung[0, i] - before.wrench[i]
     modes = advance_modes((place.a, place.b, place.tau), before.y, before.u, change, dt, x)
     lags, heaving = lagged(x[2:5], before.x[2:5], before.lags, dt)
+    swayed[0], swayed[1] = x[2:5], heaving
     if moving.shape[1]:
-        base = np.empty((2, 3))
         base[0], base[1] = mean_of(bases.state, VELOCITY, fitted.members), heaving
         driving = driven(tree, (dual, back), place.gravity, base, moving, work, room)
     after = Bases(bases.state.copy(), bases.wheels.copy(), bases.lanes, bases.learnt.copy())
-    readings = w[0], x[2:5], driving, before.rest, before.row, before.found
+    readings = w[0], swayed, driving, before.rest, before.row, before.found
     step_members(after, readings, fitted, before.band, dt / STEPS, row, found)
     for i in range(6):
         own[0, i] = x[i]

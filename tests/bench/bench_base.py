@@ -57,7 +57,8 @@ def figures(run: Path) -> dict[str, float]:
         [forcing.drive[::2, 8:10], -forcing.drive[::2, 3], -forcing.drive[::2, 5], forcing.drive[::2, 4]]
     )
     w, M = np.column_stack([w, forcing.drive[::2, 10]]), forcing.inertia[:, :6]
-    rows = [Sample(forcing.t[k], w[k], forcing.heave[k], np.concatenate([forcing.drive[2 * k, :3], M[k]]))
+    swayed = np.stack([forcing.heave, np.zeros_like(forcing.heave)], axis=1)
+    rows = [Sample(forcing.t[k], w[k], swayed[k], np.concatenate([forcing.drive[2 * k, :3], M[k]]))
             for k in range(SAMPLES)]  # fmt: skip
 
     def walk() -> None:

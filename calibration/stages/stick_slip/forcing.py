@@ -5,8 +5,8 @@
 
 all about the base frame's origin, in its axes, a plate's in frame 0; p: x, y, yaw, h: z, rx, ry; M(q) the composite
 inertia of the robot as weighed, with the payload of the trial, where it stands. Heave and tilt are the 6x6 compliance's
-under that source. Forces in the floor's plane count from their mean in the first second. The last of STEPS steps is at
-its sample. Without joint readings the base has no inertia: the plate alone moves it, at the rate of the correction.
+under that source. Forces in the floor's plane count from their mean in the first second. Without joint readings a base
+has no inertia: the plate alone moves it, at the rate of the correction. The last of STEPS steps is at its sample.
 """
 
 from dataclasses import dataclass, field, replace
@@ -22,7 +22,7 @@ from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.robot.wrist_sensor import Push, hand_push
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, HEAVE, PLANE, PLATE, STEPS, Bases, inertia_rows
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, HEAVE, PLANE, PLATE, STEPS, TILTS, Bases, inertia_rows
 from calibration.stages.stick_slip.kernel.heaving import Springs, accelerations, damped, heaving
 from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
@@ -46,7 +46,7 @@ class PlanarForcing:
         trial_id: The trial.
         source: `plate` or `dynamics`.
         t: (n,) [s, mocap clock], spacing 1 / RATE.
-        drive: (STEPS n, 11), see `kernel.integration.advance`.
+        drive: (STEPS n, 13), see `kernel.integration.advance`.
         inertia: (n, 15).
         heave: (n, 3) z, rx, ry by the compliance [m, rad].
         rest: (n,) True in the first second.
@@ -71,7 +71,7 @@ class PlanarForcing:
 
 
 def planar_force(drive: np.ndarray, source: Source, steps: int = STEPS) -> np.ndarray:
-    """Change of Fx, Fy, Mz (n, 3) on the floor by its source, of drives (steps n, 11)."""
+    """Change of Fx, Fy, Mz (n, 3) on the floor by its source, of drives (steps n, 13)."""
     first = PLATE if source == "plate" else 0
     return np.asarray(drive[steps - 1 :: steps, first : first + 3])
 
@@ -223,14 +223,14 @@ def planar_forcing(wrenches: Wrenches, tilting: Tilting, source: Source, balance
         rises = _rising(heave, dynamics, main, t, M)(fine) if balanced and main is not dynamics else heave(fine, 2)
         shift = np.einsum("nij,nj->ni", np.repeat(M, STEPS, axis=0)[:, :, HEAVE], rises)
         drive[:, :3] = (CubicSpline(dynamics.signal.t, dynamics.signal.x)(fine) - shift)[:, PLANE]
-        drive[:, :3] -= drive[rest, :3].mean(axis=0)
+        drive[:, TILTS:], drive[:, :3] = rises[:, 1:], drive[:, :3] - drive[rest, :3].mean(axis=0)
         rows[:, :6] = inertia_rows(M)[:, :6]
         if main is dynamics:
             load, rows = load - np.where(np.isin(np.arange(6), HEAVE), shift, 0.0), inertia_rows(M)
     drive[:, 3:6] = vertical(load)
     if source == "plate":
         drive[:, 4:6] -= drive[:, 3:4] * tilting.off
-        drive[:, PLATE:] = load[:, PLANE] - load[rest][:, PLANE].mean(axis=0)
+        drive[:, PLATE:TILTS] = load[:, PLANE] - load[rest][:, PLANE].mean(axis=0)
     drive[:, 6:8] = (tilt - tilt[rest].mean(axis=0))[:, 1:] + tilting.leans(drive[rest, 3:6].mean(axis=0))
     own = slice(STEPS - 1, None, STEPS)
     return PlanarForcing(wrenches.trial_id, source, t, drive, rows, tilt[own], rest[own], linear(t), wrenches.pushed)

@@ -40,7 +40,7 @@ class Trials:
         wheels: The robot's.
         corrected: Whether a plate corrects the prediction.
         starts: (k + 1,) first sample of each trial, and the number of samples.
-        drive: (steps n, 11).
+        drive: (steps n, 13).
         inertia: (n, 15).
         rest: (n,) True in the first second of a trial.
         motions: Measured.

@@ -22,6 +22,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     MISSED,
     PLATE,
     STEPS,
+    TILTS,
     UNLIKELY,
     Bases,
     X,
@@ -38,7 +39,7 @@ from calibration.stages.stick_slip.wheels import PRELOADS, WheelSet, preloads, v
 
 UNDRIVEN = np.array([0.0] * 3 + [UNMOVED, 0.0, 0.0, UNMOVED, 0.0, UNMOVED])
 _NO_REST = np.zeros(8)
-_LOADS = np.array([0.0] * 3 + [1.0] * 3 + [0.0] * 5)  # of a sample at rest: the vertical load alone
+_LOADS = np.array([0.0] * 3 + [1.0] * 3 + [0.0] * 7)  # of a sample at rest: the vertical load alone
 
 
 class Sample(NamedTuple):
@@ -47,7 +48,7 @@ class Sample(NamedTuple):
     Attributes:
         t: [s].
         wrench: (6,) action on the floor in frame 0, by the plate [N, N.m].
-        heave: (3,) z, rx, ry since the first second [m, rad], as the compliance has them.
+        heave: (2, 3) z, rx, ry since the first second [m, rad], as the compliance has them, and their accelerations.
         driving: (9,) Fx, Fy, Mz of inverse dynamics, tilt's inertia taken off, and M in the plane, row by row, upper;
             None without.
     """
@@ -88,7 +89,7 @@ class SlipState(NamedTuple):
             base leans then (rx, ry).
         n: Samples in that mean.
         noise: (3,) sum of squares about that mean of the plate's.
-        before: (11,) the last sample as the kernel takes it.
+        before: (13,) the last sample as the kernel takes it.
         bases: The members, then the preloaded optimum.
         found: (5, 3) see `banded`.
         band: (4, 3) s, r, (p^2 + g^2)^1/2, l of a trial that begins so.
@@ -138,7 +139,7 @@ class SlipStream:
             row = np.empty(COLUMNS)
             sample_row(sample.wrench, sample.heave, driving, _NO_REST, self.fitted.off, row)
             leans = self.tilting.leans(row[3:6]) if before is None else before.rest[6:]
-            rest, row = np.concatenate([row[PLATE:], row[:3], leans]), row * _LOADS
+            rest, row = np.concatenate([row[PLATE:TILTS], row[:3], leans]), row * _LOADS
             row[6:PLATE] = leans
             if before is None:
                 return self._first(sample.t, row, rest)
@@ -209,7 +210,7 @@ def advance_members(
 
     Args:
         bases: States, deflections and what was learnt of the members are changed.
-        drive: (steps, 11).
+        drive: (steps, 13).
         inertia: (15,).
         h: [s].
         members: Of the ensemble.
@@ -243,12 +244,13 @@ def advance_members(
 def sample_row(
     wrench: np.ndarray, heave: np.ndarray, driving: np.ndarray, rest: np.ndarray, off: np.ndarray, row: np.ndarray
 ) -> None:
-    """A sample as `advance` takes it (11,), by what rests (8,), see `SlipState`."""
+    """A sample as `advance` takes it (13,), by what rests (8,), see `SlipState`."""
     for a in range(3):
         row[a] = driving[a] - rest[3 + a]
     row[3], row[4], row[5] = -wrench[2], wrench[4] + wrench[2] * off[0], -wrench[3] + wrench[2] * off[1]
-    row[6], row[7] = heave[1] + rest[6], heave[2] + rest[7]
+    row[6], row[7] = heave[0, 1] + rest[6], heave[0, 2] + rest[7]
     row[8], row[9], row[10] = wrench[0] - rest[0], wrench[1] - rest[1], wrench[5] - rest[2]
+    row[TILTS], row[TILTS + 1] = heave[1, 1], heave[1, 2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -269,7 +271,7 @@ def step_members(
         fitted: Members, bases and K_0^-1.
         band: (4, 3) of `banded`.
         h: [s].
-        row: (11,) of this sample, filled.
+        row: (13,) of this sample, filled.
         found: (5, 3) of `banded`, filled.
     """
     wrench, heave, driving, rest, earlier, before = readings
@@ -283,4 +285,4 @@ def step_members(
     for i in range(3):
         for c in range(3):
             elastic[i] += fitted.compliance[i, c] * row[PLATE + c]
-    banded(advance_members(bases, drive, inertia, h, fitted.members, fitted.k), before, band, elastic, heave, found)
+    banded(advance_members(bases, drive, inertia, h, fitted.members, fitted.k), before, band, elastic, heave[0], found)

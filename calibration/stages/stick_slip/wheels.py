@@ -138,6 +138,7 @@ class WheelSet:
         position: (m, 2) contact points [m, base frame].
         weight: (m,) their own [N].
         shift: (2,) how far they are from there in the base frame as its markers show it [m].
+        radius: (m,) on which they roll as the base tilts [m]; 0 of estimates that do not have it.
     """
 
     names: tuple[str, ...]
@@ -145,8 +146,11 @@ class WheelSet:
     position: np.ndarray
     weight: np.ndarray
     shift: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    radius: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
+        if not len(self.radius):
+            object.__setattr__(self, "radius", np.zeros(len(self.names)))
         if not len(self.names) == len(self.types) == len(self.weight):
             raise ShapeError("weight", self.weight.shape, (len(self.names),))
 
@@ -156,11 +160,11 @@ class WheelSet:
         return self.weight / STANDARD_GRAVITY
 
     def rows(self, p: SlipParameters) -> np.ndarray:
-        """(m, 11) x, y, kx, ky, c, mu, n, G, mass as the kernel takes them."""
+        """(m, 12) x, y, kx, ky, c, mu, n, G, mass, r as the kernel takes them."""
         return self.each(p.values[None])[0]
 
     def each(self, values: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
-        """Rows (k, m, 11) by parameters (k, 15) in the order of NAMES; the wheels at places (k, m, 2) if given."""
+        """Rows (k, m, 12) by parameters (k, 15) in the order of NAMES; the wheels at places (k, m, 2) if given."""
         of = dict(zip(NAMES, values.T, strict=True))
         kx, ky = (self._typed(of[drive], of["front_k"], of["back_k"]) for drive in ("drive_kx", "drive_ky"))
         c = self._typed(of["drive_c"], of["caster_c"], of["caster_c"])
@@ -168,7 +172,8 @@ class WheelSet:
         position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
-        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, np.broadcast_to(self.mass, n.shape)[..., None])
+        own = np.broadcast_to(np.stack([self.mass, self.radius], axis=1), (*n.shape, 2))
+        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, own)
         ahead = np.stack([of["load_x"], of["load_y"]], axis=1)[:, None]
         return np.concatenate([position + self.shift - ahead, *parts], axis=2)
 
@@ -234,7 +239,8 @@ def wheel_set(urdf: str, wheels: tuple[Wheel, ...], gravity: float) -> WheelSet:
     drives = [w.type == "drive" for w in wheels]
     axle = float(position[drives if any(drives) else slice(None), 0].mean())
     types = tuple("drive" if w.type == "drive" else "front" if w.contact[0] >= axle else "back" for w in wheels)
-    return WheelSet(tuple(w.name for w in wheels), types, position, np.array(weights))
+    radius = np.array([w.centre[2] - w.contact[2] for w in wheels])
+    return WheelSet(tuple(w.name for w in wheels), types, position, np.array(weights), radius=radius)
 
 
 def preloads(wheels: WheelSet, p: SlipParameters, load: np.ndarray) -> np.ndarray:

@@ -8,11 +8,12 @@ PLATE = 8  # first of the plate's columns of `drive`
 PLANE, HEAVE = (0, 1, 5), (2, 3, 4)  # of x, y, z, rx, ry, yaw
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # elements of a symmetric matrix (3, 3), row by row
 STEPS = 3  # of the integration to a sample
-COLUMNS = 11  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3)
+COLUMNS = 13  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3), accelerations of rx, ry
+TILTS = 11  # first of the last two
 LANES = 16  # bases side by side
 VECTOR = 8  # lanes that one instruction takes, two of an older processor
-WHEEL, E, U = 17, 10, 12  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), mass, see `yielding` (2)
-MASS, YIELDS = 14, 15
+WHEEL, E, U = 18, 10, 12  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), mass, r, see `yielding` (2)
+MASS, RADIUS, YIELDS = 14, 15, 16
 VELOCITY, ACCELERATION = 3, 9  # three rows each of a state
 X, V, DX, STICKS, P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels that stuck plus one, P
 D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, force, wheels that slide, which stick
@@ -53,7 +54,7 @@ def at_rest(
     """Bases at rest.
 
     Args:
-        wheels: (k, m, 11) x, y, kx, ky, c, mu, n, G, mass.
+        wheels: (k, m, 12) x, y, kx, ky, c, mu, n, G, mass, r.
         bodies: (k, 4), see BODY.
         preload: (k, m, 2) deflections [m]; None: none.
         noise: sigma (3,) of the plate's force, by which bases are judged; None: they are not.

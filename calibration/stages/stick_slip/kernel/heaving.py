@@ -19,7 +19,7 @@ import numpy as np
 
 from calibration.numerics.compiled import njit
 from calibration.numerics.signals import Signal, low_passed
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, HEAVE, STEPS, F, W
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, HEAVE, STEPS, TILTS, F, W
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest, moving_wheels
 
@@ -211,5 +211,6 @@ def heaving(  # noqa: PLR0913
             out[k, i] = h[0, i]
         drive[0, 3], drive[0, 4], drive[0, 5] = -left[0], left[2], -left[1]
         drive[0, 6], drive[0, 7] = of.leans[0] + h[0, 1], of.leans[1] + h[0, 2]
+        drive[0, TILTS], drive[0, TILTS + 1] = h[2, 1], h[2, 2]
         advance(state, wheels, drive, rows[k // STEPS], step, lanes)
     return out

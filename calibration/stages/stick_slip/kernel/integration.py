@@ -1,21 +1,23 @@
 """Integration of a rigid base that sticks and slips on its wheels, in the floor's plane.
 
     M(t) dv/dt + sum_i A_i' g_i + B v = w(t),     dx/dt = R(yaw) v,     x = (x, y, yaw)
-    g_i = K_i e_i + C_i de_i/dt + (N_i - m_i G) (-ry, rx),    m_i du_i/dt = g_i - f_i,   |f_i| <= mu_i N_i
+    g_i = K_i e_i + C_i de_i/dt + (N_i - m_i G) (-ry, rx) + m_i r_i d2/dt2 (-ry, rx)
+    m_i du_i/dt = g_i - f_i,   |f_i| <= mu_i N_i
     de_i/dt = A_i v - u_i,    A_i = [1 0 -(y_i - e_iy); 0 1 x_i - e_ix]       u_i how fast wheel i slides, 0: it sticks
     N_i = n_i + G_i (-Fz, My, -Mx)                                            shares of the load about the wheels
 
 Velocities, forces and deflections are in the axes of the base, which turn with yaw, x is in frame 0. f_i is wheel i's
 action on the floor and g_i the base's on the wheel [N]; M is of the robot without wheels. The bushings lean with the
 base, by (rx, ry) from the vertical, which brings a share of what they carry into the floor's plane: N_i less the weight
-m_i G of the wheel. At rest no wheel pushes the floor sideways. A wheel whose force would exceed mu_i N_i slides: the
-force is cut to that length, and u_i is what that leaves, implicit in time. The rest is explicit, velocity first
+m_i G of the wheel; braked, it rolls on its radius r_i, its hub by r_i (ry, -rx). At rest no wheel pushes the floor
+sideways. A wheel whose force would exceed mu_i N_i slides: the force is cut to that length, and u_i is what that
+leaves, implicit in time; how far it slides follows by the trapezoidal rule. The rest is explicit, velocity first
 (symplectic Euler): a step's position is that of the time of its load, its velocity half a step older. Dampers feel
 v + h/2 dv/dt, that of the time of the load: without it they take a hundredth of the inertia away.
 
-A wheel bears where it touches the floor, e_i behind its place under the base, by the forces of the step before:
+A wheel bears where it touches the floor, e_i behind its place under the base and rolled on, by the step before:
 
-    (My, -Mx) <- (My, -Mx) + sum_i N_i e_i
+    (My, -Mx) <- (My, -Mx) + sum_i N_i (e_i - r_i (ry, -rx))
 
 and does not pull, see `lifted`. A force plate stands still: (My, -Mx) about the base is
 R(yaw)' ((My, -Mx)_0 + Fz (x, y)). Seven millimetres move 10 N from one drive to the other.
@@ -128,7 +130,7 @@ def _corrected(s: np.ndarray, fx: float, fy: float, mz: float, h: float, n: int)
 
 @njit(cache=True, error_model="numpy")
 def _judged(s: np.ndarray, u: np.ndarray, dt: float, n: int) -> None:
-    """What n lanes miss of the plate's force in the drive u (11,), and dt [s] of it added to how unlikely they are."""
+    """What n lanes miss of the plate's force in the drive u (13,), and dt [s] of it added to how unlikely they are."""
     if s[NOISE * LANES] == 0.0:
         return
     for l in range(n):
@@ -179,7 +181,7 @@ def _advance(  # noqa: PLR0913
                 if s[PULL * LANES + l] < 0.0:
                     lifted(wheels, s, l)
                     s[PULL * LANES + l] = 0.0
-        on_wheels(wheels, s, u[6], u[7], h, n)
+        on_wheels(wheels, s, u, h, n)
         if s[(BODY + 2) * LANES] > 0.0:
             if _changed(s, n) > 0:
                 for l in range(n):
@@ -198,7 +200,7 @@ def advance(state: np.ndarray, wheels: np.ndarray, drive: np.ndarray, inertia: n
     Args:
         state: (ROWS, LANES); wheels that slid are counted in row SLID.
         wheels: (m, WHEEL, LANES).
-        drive: (k, 11) at k steps of h [s]: w, (-Fz, My, -Mx), (rx, ry), plate's force.
+        drive: (k, 13) at k steps of h [s]: w, (-Fz, My, -Mx), (rx, ry), plate's force, how (rx, ry) accelerate.
         inertia: (15,) M's six elements (row by row, upper) and what an acceleration adds to (-Fz, My, -Mx), (3, 3).
         h: [s].
         n: A multiple of VECTOR.
@@ -217,7 +219,7 @@ def simulated(  # noqa: PLR0913
 
     Args:
         starts: Sample at which each trial starts, and n.
-        drive: (n steps, 11).
+        drive: (n steps, 13).
         inertia: (n, 15).
         bases: At rest: so each trial starts.
         h: Length of a step [s].

@@ -1,10 +1,12 @@
 """Forces of wheels side by side: as if all stuck, then those are let slide whose friction does not bear them.
 
-    g = K e + C de/dt + (N - m G) (-ry, rx),   f' = g + m / h u,   f = f' min(mu N / |f'|, 1)
-    u <- (f' - f) / (K h + C + m / h),    e <- e - h u,    W <- W + A' m / h (u - u_before)
+    g = K e + C de/dt + (N - m G) (-ry, rx) + m r d2/dt2 (-ry, rx),   f' = g + m / h u,   f = f' min(mu N / |f'|, 1)
+    u <- (f' - f) / (K h / 2 + C + m / h),    e <- e - h / 2 (u_before + u),    W <- W + A' m / h (u - u_before)
 
 of one wheel, see `integration`: f' bears what a wheel that slid loses when it stops; K in the denominator is what the
-spring gives way in the step. Few wheels slide at a time, and only those need a root and a quotient.
+spring gives way in the step, e the one after the wheel has slid on by h / 2 u_before. Few wheels slide at a time, and
+only those need a root and a quotient. A braked wheel of radius r rolls as the base tilts: its hub goes by r (ry, -rx),
+and it bears its load at p - e + r (ry, -rx).
 """
 
 import numpy as np
@@ -18,8 +20,10 @@ from calibration.stages.stick_slip.kernel.bases import (
     MASS,
     NOW,
     PULL,
+    RADIUS,
     SLID,
     STUCK,
+    TILTS,
     WHEEL,
     YIELDS,
     D,
@@ -34,9 +38,10 @@ _G = 9.80665  # [m/s2]
 
 
 @njit(cache=True, error_model="numpy")
-def on_wheels(w: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float, n: int) -> None:
+def on_wheels(w: np.ndarray, s: np.ndarray, u: np.ndarray, h: float, n: int) -> None:
     """Add the forces of flat wheels in n lanes of a flat state, and bit i where wheel i sticks; deflections follow."""
-    rate = 1.0 / h  # no slices of w: each would be counted as a reference, which takes long
+    # No slices of w: each would be counted as a reference, which takes long.
+    rx, ry, ax, ay, half, rate = u[6], u[7], u[TILTS], u[TILTS + 1], 0.5 * h, 1.0 / h
     for i in range(len(w) // (WHEEL * LANES)):
         o, bit, slide = i * WHEEL * LANES, float(1 << i), 0
         for l in range(n):
@@ -48,14 +53,16 @@ def on_wheels(w: np.ndarray, s: np.ndarray, rx: float, ry: float, h: float, n: i
             turn, spin = s[(D + 2) * LANES + l], s[(NOW + 2) * LANES + l]
             mass, ux, uy = w[k + MASS * LANES] * rate, w[k + U * LANES], w[k + (U + 1) * LANES]
             qx, qy, hangs = px - w[k + E * LANES], py - w[k + (E + 1) * LANES], N - _G * w[k + MASS * LANES]
-            ex = w[k + E * LANES] + s[D * LANES + l] - turn * qy
-            ey = w[k + (E + 1) * LANES] + s[(D + 1) * LANES + l] + turn * qx
-            fx = w[k + 2 * LANES] * ex + c * (s[NOW * LANES + l] - spin * qy) - hangs * ry + mass * ux
-            fy = w[k + 3 * LANES] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + hangs * rx + mass * uy
+            ex = w[k + E * LANES] + s[D * LANES + l] - turn * qy - half * ux
+            ey = w[k + (E + 1) * LANES] + s[(D + 1) * LANES + l] + turn * qx - half * uy
+            r, rolls = w[k + RADIUS * LANES], w[k + MASS * LANES] * w[k + RADIUS * LANES]
+            behind, left = hangs * ry + rolls * ay, hangs * rx + rolls * ax
+            fx = w[k + 2 * LANES] * ex + c * (s[NOW * LANES + l] - spin * qy) - behind + mass * ux
+            fy = w[k + 3 * LANES] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + left + mass * uy
             w[k + E * LANES], w[k + (E + 1) * LANES] = ex, ey
             s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l], s[(STUCK + 2) * LANES + l] = fx, fy, N
-            s[LEANS * LANES + l] += N * ex
-            s[(LEANS + 1) * LANES + l] += N * ey
+            s[LEANS * LANES + l] += N * (ex - r * ry)
+            s[(LEANS + 1) * LANES + l] += N * (ey + r * rx)
             s[PULL * LANES + l] += min(load, 0.0)
             s[F * LANES + l] += fx
             s[(F + 1) * LANES + l] += fy
@@ -80,10 +87,10 @@ def _sliding(w: np.ndarray, o: int, s: np.ndarray, bit: float, h: float, n: int)
         mass = w[k + MASS * LANES] / h
         gx, gy = mass * (x - w[k + U * LANES]), mass * (y - w[k + (U + 1) * LANES])
         w[k + U * LANES], w[k + (U + 1) * LANES] = x, y
-        w[k + E * LANES] -= h * x
-        w[k + (E + 1) * LANES] -= h * y
-        s[LEANS * LANES + l] -= N * (h * x)
-        s[(LEANS + 1) * LANES + l] -= N * (h * y)
+        w[k + E * LANES] -= 0.5 * h * x
+        w[k + (E + 1) * LANES] -= 0.5 * h * y
+        s[LEANS * LANES + l] -= 0.5 * N * h * x
+        s[(LEANS + 1) * LANES + l] -= 0.5 * N * h * y
         s[W * LANES + l] += gx
         s[(W + 1) * LANES + l] += gy
         s[(W + 2) * LANES + l] += px * gy - py * gx
@@ -96,7 +103,7 @@ def _sliding(w: np.ndarray, o: int, s: np.ndarray, bit: float, h: float, n: int)
 
 @njit(cache=True, error_model="numpy")
 def deflect_at_rest(wheels: np.ndarray, u: np.ndarray, n: int) -> None:
-    """Deflect flat wheels of n lanes so that none pushes the floor sideways under the drive u (11,) at rest."""
+    """Deflect flat wheels of n lanes so that none pushes the floor sideways under the drive u (13,) at rest."""
     for i in range(len(wheels) // (WHEEL * LANES)):
         w = wheels[i * WHEEL * LANES : (i + 1) * WHEEL * LANES]
         for l in range(n):
@@ -108,13 +115,13 @@ def deflect_at_rest(wheels: np.ndarray, u: np.ndarray, n: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def yielding(wheels: np.ndarray, h: float, n: int) -> None:
-    """Speeds of flat wheels, n lanes, that slide by the force that friction does not bear: 1 / (K h + c + m / h)."""
+    """Speeds of sliding wheels, flat, n lanes, by the force that friction does not bear: 1 / (K h / 2 + c + m / h)."""
     for i in range(len(wheels) // (WHEEL * LANES)):
         w = wheels[i * WHEEL * LANES : (i + 1) * WHEEL * LANES]
         for l in range(n):
             own = w[4 * LANES + l] + w[MASS * LANES + l] / h
-            w[YIELDS * LANES + l] = 1.0 / (w[2 * LANES + l] * h + own)
-            w[(YIELDS + 1) * LANES + l] = 1.0 / (w[3 * LANES + l] * h + own)
+            w[YIELDS * LANES + l] = 1.0 / (0.5 * w[2 * LANES + l] * h + own)
+            w[(YIELDS + 1) * LANES + l] = 1.0 / (0.5 * w[3 * LANES + l] * h + own)
 
 
 @njit(cache=True, error_model="numpy")

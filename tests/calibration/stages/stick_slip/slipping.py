@@ -6,7 +6,7 @@ import numpy as np
 
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing
-from calibration.stages.stick_slip.kernel.bases import F
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, F
 from calibration.stages.stick_slip.kernel.integration import advance
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks
@@ -18,6 +18,7 @@ WHEELS = WheelSet(
     ("drive", "drive", "front", "front", "back", "back"),
     POSITION,
     np.array([40.0, 40.0, 0.0, 0.0, 0.0, 0.0]),
+    radius=np.array([0.1, 0.1, 0.03, 0.03, 0.03, 0.03]),
 )
 TRUTH = SlipParameters(4200.0, 7700.0, 14e3, 24e3, 0.55, 0.24, 0.065, 140.0, 70.0, 3.0, 0.5, 1.05, 0.95)
 MASS = np.array([[74.0, 0.0, -1.5], [0.0, 74.0, 2.0], [-1.5, 2.0, 3.5]])
@@ -66,18 +67,18 @@ def literal(
         now = v + 0.5 * h * a
         floor, on_base = np.array([p.body_c, p.body_c, p.body_cr]) * now, np.zeros(3)
         slides = np.zeros(len(rows), dtype=bool)
-        for i, (kx, ky, c, mu, n, *G, m) in enumerate(rows[:, 2:]):
+        for i, (kx, ky, c, mu, n, *G, m, r) in enumerate(rows[:, 2:]):
             N, K, A, faster = n + np.dot(G, load), np.array([kx, ky]), across(rows[i, :2] - e[i]), np.zeros(2)
-            stuck = e[i] + A @ v * h
+            stuck = e[i] + A @ v * h - 0.5 * h * u[i]
             f = K * stuck + c * A @ now + (N - WHEELS.weight[i]) * leaning(*tilt[k]) + m / h * u[i]
             at = across(rows[i, :2] - stuck)
             if np.linalg.norm(f) > mu * N:
                 left = f * (1.0 - mu * N / np.linalg.norm(f))
-                f, slides[i], faster = f - left, True, left / (m / h + c + K * h)
+                f, slides[i], faster = f - left, True, left / (m / h + c + 0.5 * K * h)
             g = f + m * (faster - u[i]) / h
-            e[i] = stuck - faster * h
+            e[i] = stuck - 0.5 * h * faster
             u[i] = faster
-            more[1:] += N * e[i]
+            more[1:] += N * (e[i] + r * leaning(*tilt[k]))
             floor, on_base = floor + at.T @ f, on_base + at.T @ (g - f)
         yaw = x[2] + 0.5 * h * v[2]
         x = x + h * np.array([np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1], v[2]])
@@ -97,7 +98,7 @@ def slid(  # noqa: PLR0913
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n, 3) and forces on the floor (n, 3) at every step, by the kernel itself, under w (n, 3)."""
     (state,), (wheels,), (lanes,), _ = bases_of(of, p.logarithms[None], False, preload)
-    drive, inertia = np.zeros((len(w), 11)), np.zeros(15)
+    drive, inertia = np.zeros((len(w), COLUMNS)), np.zeros(15)
     drive[:, :3], drive[:, 3:6], inertia[:6] = w, load, mass[np.triu_indices(3)]
     x, force = np.empty((len(w), 3)), np.empty((len(w), 3))
     for k in range(len(w)):
@@ -119,10 +120,10 @@ def push(rng: np.random.Generator, seconds: float = 8.0, size: float = 1.0) -> n
 def forcing(w: np.ndarray, plate: np.ndarray | None = None) -> PlanarForcing:
     """What the kernel takes under w (n, 3), with a plate that reads `plate` (n, 3) or without."""
     n = len(w) // STEPS
-    drive = np.zeros((n * STEPS, 11))
+    drive = np.zeros((n * STEPS, COLUMNS))
     drive[:, :3], drive[:, 3:6] = w[: n * STEPS], WEIGHT
     if plate is not None:
-        drive[:, 8:] = plate[: n * STEPS]
+        drive[:, 8:11] = plate[: n * STEPS]
     inertia = np.zeros((n, 15))
     inertia[:, :6] = MASS[np.triu_indices(3)]
     t = np.arange(n) / RATE

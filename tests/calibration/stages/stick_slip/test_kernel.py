@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from calibration.stages.stick_slip.forcing import STEP, STEPS
-from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, E, at_rest
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, LEANS, LOAD, TILTS, E, F, at_rest
 from calibration.stages.stick_slip.kernel.integration import advance, simulated
+from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.wheels import LOGARITHMS
 from tests.calibration.stages.stick_slip import slipping
@@ -63,10 +64,24 @@ def test_markers_that_are_elsewhere_on_the_base_see_the_same_wheels_slip():
     np.testing.assert_allclose(middle, x[:, :2], atol=1e-7)
 
 
+def test_a_braked_wheel_rolls_as_the_base_tilts():
+    """It bears its load ahead of where it stood, and its mass takes force to be rolled there."""
+    (state,), (wheels,), (lanes,), _ = bases_of(WHEELS, STUCK.logarithms[None], False)
+    rows, rx, ry, ax, ay = WHEELS.rows(STUCK), 2e-3, -3e-3, 1.5, -0.7
+    drive, inertia = np.zeros((1, COLUMNS)), np.concatenate([1e6 * np.eye(3)[np.triu_indices(3)], np.zeros(9)])
+    drive[0, 3:6], drive[0, 6:8], drive[0, TILTS:] = WEIGHT, (rx, ry), (ax, ay)
+    deflect_at_rest(wheels.reshape(-1), drive[0], lanes)
+    e = wheels[:, E : E + 2, 0].copy()
+    advance(state, wheels, drive, inertia, STEP, lanes)
+    shift = (rows[:, 6] + rows[:, 7:10] @ WEIGHT) @ (e - WHEELS.radius[:, None] * [ry, -rx])
+    np.testing.assert_allclose(state[LEANS : LEANS + 2, 0], shift, rtol=1e-12)
+    np.testing.assert_allclose(state[F : F + 2, 0], (WHEELS.mass @ WHEELS.radius) * np.array([-ay, ax]), atol=1e-9)
+
+
 @pytest.mark.parametrize("load", [(730.0, 75.0, 20.0), (730.0, 95.0, 0.0), (730.0, -120.0, 30.0)])
 def test_where_wheels_are_off_the_floor_the_others_bear_the_load(load):
     ((state,), (wheels,), (lanes,), _), rows = bases_of(WHEELS, STUCK.logarithms[None], False), WHEELS.rows(STUCK)
-    drive, inertia = np.zeros((2, 11)), np.concatenate([MASS[np.triu_indices(3)], np.zeros(9)])
+    drive, inertia = np.zeros((2, COLUMNS)), np.concatenate([MASS[np.triu_indices(3)], np.zeros(9)])
     drive[:, 3:6] = load
     advance(state, wheels, drive, inertia, STEP, lanes)
     N = rows[:, 6] + rows[:, 7:10] @ state[LOAD : LOAD + 3, 0]
@@ -148,12 +163,12 @@ def test_a_sprung_base_keeps_its_energy_without_dampers():
 
 def test_a_wheel_carried_back_and_forth_dissipates_what_jenkins_element_does():
     k, mu, N, amplitude, h = 14e3, 0.25, 190.0, 8e-3, 1e-3
-    row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, 0.0, 0.0, 0.0, 0.0]]])
+    row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, 0.0, 0.0, 0.0, 0.0, 0.0]]])
     u = amplitude * np.sin(np.linspace(0.0, 4.0 * np.pi, 40001))
     (state,), (wheels,), (lanes,), _ = at_rest(row, np.zeros((1, 4)))
     inertia, force = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0, *np.zeros(9)]), np.zeros(len(u))
     for n in range(1, len(u)):
-        state[3], drive = (u[n] - u[n - 1]) / h, np.zeros((1, 11))
+        state[3], drive = (u[n] - u[n - 1]) / h, np.zeros((1, COLUMNS))
         advance(state, wheels, drive, inertia, h, lanes)
         force[n] = -state[9, 0]  # of a mass of 1 kg that nothing else accelerates
     loop = slice(20000, 40001)

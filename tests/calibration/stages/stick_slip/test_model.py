@@ -122,7 +122,7 @@ def test_samples_one_by_one_are_what_a_recording_is(model, new):
         now = forcing.drive[STEPS * k + STEPS - 1]
         wrench = np.array([*now[8:10], -WEIGHT[0], -WEIGHT[2], WEIGHT[1], now[10]])
         driving = np.concatenate([now[:3], MASS[np.triu_indices(3)]])
-        sample = Sample(float(t), wrench, np.zeros(3), driving)
+        sample = Sample(float(t), wrench, np.zeros((2, 3)), driving)
         state = stream.stepped(sample, state)
         x.append(state.x)
     moved = np.abs(batch.x).max(axis=0)
@@ -139,7 +139,9 @@ def test_heave_and_tilt_are_as_uncertain_sample_by_sample_as_in_a_recording(mode
     known = replace(model, directions=(direction,))
     stream, state, expected = slip_stream(known), None, known.displacement(replace(forcing, heave=heave))[1][:, 2:5]
     for t, h in zip(forcing.t, heave, strict=True):
-        state = stream.stepped(Sample(float(t), np.array([0.0, 0.0, -700.0, 0.0, 0.0, 0.0]), h), state)
+        state = stream.stepped(
+            Sample(float(t), np.array([0.0, 0.0, -700.0, 0.0, 0.0, 0.0]), np.stack([h, np.zeros(3)])), state
+        )
     np.testing.assert_allclose(direction.heave.variance(state.found[4]), expected[-1], rtol=1e-12)
     assert expected[-1, 1] == pytest.approx(25e-12 + 4e-4 * 1e-6, rel=1e-2)
 
@@ -150,7 +152,7 @@ def test_a_plate_alone_moves_a_base_of_no_inertia(model, new):
     for k, t in enumerate(forcing.t):
         last = forcing.drive[STEPS * k + STEPS - 1]
         wrench = np.array([*last[8:10], -WEIGHT[0], -WEIGHT[2], WEIGHT[1], last[10]])
-        state = stream.stepped(Sample(float(t), wrench, np.zeros(3)), state)
+        state = stream.stepped(Sample(float(t), wrench, np.zeros((2, 3))), state)
         x.append(state.x)
     error = np.abs(np.array(x) - true).mean(axis=0)
     assert np.all(error < 0.5 * np.abs(true).mean(axis=0))

@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -12,8 +13,12 @@ from calibration.stages.stick_slip.wheels import (
     preloads,
     wheel_set,
 )
+from scenarios import load
 from tests.calibration.stages.stick_slip.slipping import POSITION, TRUTH, WEIGHT, WHEELS
 from tests.doubles.moving_base import WHEELS as DECLARED
+from twin.campaign import laboratory
+from twin.motions.trial_schedule import schedule
+from twin.simulation.setpoints import prepare
 
 
 def test_parameters_are_their_logarithms():
@@ -102,3 +107,27 @@ def test_wheels_of_a_base_that_has_slid_bear_the_load_where_they_are():
     found = borne(WHEELS.standing(), wrench, far[None])
     np.testing.assert_allclose(found, at_rest, atol=0.1)  # to first order in the turn: 1e-3 of 60 N.m
     assert np.abs(wrench - at_rest).max() > 3.0
+
+
+def test_the_wheels_of_a_tilted_twin_bear_its_load_where_they_have_rolled():
+    """MuJoCo's contacts are a spring's deflection behind the wheels' places, and as far ahead as their radius rolls."""
+    lab = laboratory(load("humanoids2024").twin, 0)
+    inputs = prepare(lab.twin, schedule(lab.config.campaign, mjcf.model(), 0)[0], lab.T_lab_base)
+    model, data = inputs.model, mujoco.MjData(inputs.model)
+    mujoco.mj_setState(model, data, inputs.first, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    data.ctrl = inputs.control[0]
+    base = model.body(lab.robot.wheels[0].body_name).parentid[0]
+    data.xfrc_applied[base] = [10.0, -10.0, 0.0, 20.0, 10.0, 0.0]
+    mujoco.mj_step(model, data, 3000)
+    R = data.xmat[base].reshape(3, 3)
+    yaw = np.arctan2(R[1, 0], R[0, 0])
+    upright = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    ry, rx = upright @ R[:2, 2] * (1.0, -1.0)
+    touches = {int(g): c.pos[:2] for c in data.contact[: data.ncon] for g in (c.geom1, c.geom2)}
+    wheels = [w for w in lab.robot.wheels if model.geom(w.contact_geom).id in touches]
+    at = np.array([touches[model.geom(w.contact_geom).id] for w in wheels])
+    found = (at - data.xpos[base, :2]) @ upright.T
+    e = -np.array([[data.joint(f"{w.name}.{axis}").qpos[0] for axis in "xy"] for w in wheels])
+    rolled = np.array([w.centre[2] - w.contact[2] for w in wheels])[:, None] * [ry, -rx]
+    assert len(wheels) > 3 and np.abs(rolled).max() > 4e-4
+    np.testing.assert_allclose(found, np.array([w.contact[:2] for w in wheels]) - e + rolled, atol=2e-5)
