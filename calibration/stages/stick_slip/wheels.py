@@ -138,7 +138,7 @@ class WheelSet:
         position: (m, 2) contact points [m, base frame].
         weight: (m,) their own [N].
         shift: (2,) how far they are from there in the base frame as its markers show it [m].
-        radius: (m,) on which they roll as the base tilts [m]; 0 of estimates that do not have it.
+        radius: (m,) on which they roll as the base tilts [m]; (1,) 0 of estimates that do not have it.
     """
 
     names: tuple[str, ...]
@@ -146,13 +146,13 @@ class WheelSet:
     position: np.ndarray
     weight: np.ndarray
     shift: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    radius: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    radius: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def __post_init__(self) -> None:
-        if not len(self.radius):
-            object.__setattr__(self, "radius", np.zeros(len(self.names)))
         if not len(self.names) == len(self.types) == len(self.weight):
             raise ShapeError("weight", self.weight.shape, (len(self.names),))
+        if len(self.radius) not in (1, len(self.names)):
+            raise ShapeError("radius", self.radius.shape, (len(self.names),))
 
     @property
     def mass(self) -> np.ndarray:
@@ -172,8 +172,8 @@ class WheelSet:
         position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
-        own = np.broadcast_to(np.stack([self.mass, self.radius], axis=1), (*n.shape, 2))
-        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, own)
+        own = np.stack([self.mass, np.broadcast_to(self.radius, self.mass.shape)], axis=1)
+        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, np.broadcast_to(own, (*n.shape, 2)))
         ahead = np.stack([of["load_x"], of["load_y"]], axis=1)[:, None]
         return np.concatenate([position + self.shift - ahead, *parts], axis=2)
 

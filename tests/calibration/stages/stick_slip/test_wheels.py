@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 
 import mjcf
+from calibration.errors import ShapeError
 from calibration.stages.stick_slip.kernel.lifted import borne
 from calibration.stages.stick_slip.wheels import (
     NAMES,
     PRIOR,
     SlipParameters,
+    WheelSet,
     preloads,
     wheel_set,
 )
@@ -131,3 +133,11 @@ def test_the_wheels_of_a_tilted_twin_bear_its_load_where_they_have_rolled():
     rolled = np.array([w.centre[2] - w.contact[2] for w in wheels])[:, None] * [ry, -rx]
     assert len(wheels) > 3 and np.abs(rolled).max() > 4e-4
     np.testing.assert_allclose(found, np.array([w.contact[:2] for w in wheels]) - e + rolled, atol=2e-5)
+
+
+def test_wheels_of_an_estimate_without_their_radius_do_not_roll():
+    bare = WheelSet(WHEELS.names, WHEELS.types, POSITION, WHEELS.weight).rows(TRUTH)
+    np.testing.assert_array_equal(bare[:, :11], WHEELS.rows(TRUTH)[:, :11])
+    np.testing.assert_array_equal(bare[:, 11], 0.0)
+    with pytest.raises(ShapeError, match="radius"):
+        replace(WHEELS, radius=np.zeros(2))
