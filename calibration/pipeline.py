@@ -181,7 +181,7 @@ def _after(context: Context, stage: Stage) -> Context:
     absent = stage.lacks(context.data)
     if absent:
         return context.with_findings(Verdict(stage.name, "missing", f"not estimated: {absent}"))
-    if stage is GEOMETRY:  # no earlier: the suspension has the markers as drawn, as its predictions do
+    if stage is GEOMETRY:  # the suspension, before it, takes the markers as drawn, as its predictions do
         context = replace(context, data=with_base_frame(context.data))
     result = stage.run(context.data)
     context = _advised(context.with_result(result), result)

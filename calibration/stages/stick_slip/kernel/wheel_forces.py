@@ -56,9 +56,9 @@ def on_wheels(w: np.ndarray, s: np.ndarray, u: np.ndarray, h: float, n: int) -> 
             ex = w[k + E * LANES] + s[D * LANES + l] - turn * qy - half * ux
             ey = w[k + (E + 1) * LANES] + s[(D + 1) * LANES + l] + turn * qx - half * uy
             r, rolls = w[k + RADIUS * LANES], w[k + MASS * LANES] * w[k + RADIUS * LANES]
-            behind, left = hangs * ry + rolls * ay, hangs * rx + rolls * ax
-            fx = w[k + 2 * LANES] * ex + c * (s[NOW * LANES + l] - spin * qy) - behind + mass * ux
-            fy = w[k + 3 * LANES] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + left + mass * uy
+            by_ry, by_rx = hangs * ry + rolls * ay, hangs * rx + rolls * ax
+            fx = w[k + 2 * LANES] * ex + c * (s[NOW * LANES + l] - spin * qy) - by_ry + mass * ux
+            fy = w[k + 3 * LANES] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + by_rx + mass * uy
             w[k + E * LANES], w[k + (E + 1) * LANES] = ex, ey
             s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l], s[(STUCK + 2) * LANES + l] = fx, fy, N
             s[LEANS * LANES + l] += N * (ex - r * ry)
@@ -76,7 +76,7 @@ def on_wheels(w: np.ndarray, s: np.ndarray, u: np.ndarray, h: float, n: int) -> 
 
 @njit(cache=True, error_model="numpy")
 def _sliding(w: np.ndarray, o: int, s: np.ndarray, bit: float, h: float, n: int) -> None:
-    """Let a wheel, element o of w and on, slide in those of n lanes in which it bears more than friction: it stuck."""
+    """Let the wheel from element o of w on, stuck so far, slide in those of n lanes in which friction does not hold."""
     for l in range(n):
         k = o + l
         px, py, N = w[k] - w[k + E * LANES], w[k + LANES] - w[k + (E + 1) * LANES], s[(STUCK + 2) * LANES + l]
