@@ -41,7 +41,7 @@ class TreeDynamics(NamedTuple):
         root: (n, 6) wrench on the root [N, N.m].
         moment: (n, 2) about x and y of the first joint's frame, of the force it passes on [N.m].
         composite: (n, 6, 6) inertia of the whole about the root's origin.
-        coupling: (n, k, 3) force on the root by unit acceleration of each joint.
+        coupling: (n, k, 6) wrench on the root by unit acceleration of each joint.
         stiffness: (n, k, k) how tau grows with the joints' positions by what bodies weigh, symmetric [N.m, N].
         regressor: (n, k, 4 k) by mass, then first moments, body by body; (n, k, 0) where not asked for.
     """
@@ -73,7 +73,7 @@ def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
     """What dynamics of n samples of k joints are written to."""
     return TreeDynamics(
         np.empty((n, k)), np.zeros((n, k, k)), np.empty((n, 6)), np.empty((n, 2)), np.empty((n, 6, 6)),
-        np.empty((n, k, 3)), np.zeros((n, k, k)), np.zeros((n, k, 4 * k if regressors else 0)),
+        np.empty((n, k, 6)), np.zeros((n, k, k)), np.zeros((n, k, 4 * k if regressors else 0)),
     )  # fmt: skip
 
 
@@ -169,7 +169,7 @@ def _gather(tree: RigidTree, w: np.ndarray, j: int, out: TreeDynamics, i: int) -
         out.inertia[i, other, column] = out.inertia[i, column, other] = dot(w, b, S, me, X)
         out.stiffness[i, other, column] = out.stiffness[i, column, other] = dot(w, b, S, 0, X)
         b = tree.parent[b - 1]
-    for c in range(3):
+    for c in range(6):
         out.coupling[i, column, c] = w[me, X + c]
     for c in range(F, ROW):  # the twist between is scratch
         w[up, c] += w[me, c]

@@ -9,8 +9,7 @@ Drive trains sample by sample: the state is passed from one to the next, nothing
 
     state, angles = stream.step(state, t, [q_motor, velocity, acceleration])
 
-Velocities and accelerations are the caller's; with those that `torques.derivatives` has of a recording, the angles are
-those of the recording in one go.
+With the velocities and accelerations that `torques.derivatives` has of a recording, the angles are those in one go.
 """
 
 from dataclasses import dataclass, replace
@@ -146,38 +145,45 @@ class DriveTrains:
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
-        q, deltas = loads.q.astype(float).copy(), self._deltas(loads, 1)
+        return self.behind(loads, self._deltas(loads, 1)[..., 0])
+
+    def behind(self, loads: LinkLoads, deltas: np.ndarray) -> np.ndarray:
+        """The same by how far (m, n) [rad] the links are behind."""
+        q = loads.q.astype(float).copy()
         for train, delta in zip(self.trains, deltas, strict=True):
             j = self.joints.index(train.joint)
-            q[:, j] = loads.q[:, j] - train.harmonics(loads.angle[:, j]) - delta[:, 0]
+            q[:, j] -= train.harmonics(loads.angle[:, j]) + delta
         return q
 
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""
-        q, deltas = loads.q.astype(float).copy(), self._deltas(loads, RUNS)
+        deltas = self._deltas(loads, RUNS)
+        q = self.behind(loads, deltas[..., 0])
         low, high, variance = q.copy(), q.copy(), np.zeros(q.shape)
         for train, delta in zip(self.trains, deltas, strict=True):
-            j = self.joints.index(train.joint)
-            bare = loads.q[:, j] - train.harmonics(loads.angle[:, j])
-            q[:, j], low[:, j], high[:, j] = bare - delta[:, 0], bare - delta.max(axis=1), bare - delta.min(axis=1)
-            moves = np.abs(loads.v[:, j]) >= RESTS
-            variance[:, j] = train.variance(bare - high[:, j], bare - low[:, j], moves)
+            j, least, most = self.joints.index(train.joint), delta.min(axis=1), delta.max(axis=1)
+            low[:, j], high[:, j] = q[:, j] + delta[:, 0] - most, q[:, j] + delta[:, 0] - least
+            variance[:, j] = train.variance(least, most, np.abs(loads.v[:, j]) >= RESTS)
         return LinkAngles(q, low, high, variance)
 
     def _deltas(self, loads: LinkLoads, runs: int) -> np.ndarray:
         """(m, n, runs) [rad] of each drive train, what its torques are off by taken off as a mesh in contact has it."""
         if not self.trains:
             return np.zeros((0, len(loads.t), runs))
+        drives, states, samples = self.prepared_for(loads, runs)
+        found = link_streams.walked(states, loads.t, samples, loads.inertia, loads.stiffness, LONGEST, drives)
+        return np.asarray(np.moveaxis(found - drives.shifts[:, :runs], 1, 0))
+
+    def prepared_for(self, loads: LinkLoads, runs: int = 1) -> tuple[Drives, np.ndarray, np.ndarray]:
+        """What `link_streams` take of a trial: parameters, states (m, runs, 3) at its start, samples (n, 4, m)."""
         samples = np.empty((len(loads.t), 4, len(self.trains)))
         for i, train in enumerate(self.trains):
-            column = self.joints.index(train.joint)
-            own = drive_motion([loads], column, train.inertials if len(train.inertials) else None)
+            j, phi = self.joints.index(train.joint), train.inertials if len(train.inertials) else None
+            own = drive_motion([loads], j, phi)
             torque = own.torque + train.link_inertia * own.a
             samples[:, :, i] = np.stack([own.q, own.v, torque, train.moved_inertia(own.inertia)], axis=1)
         drives = prepared(self)
-        states = np.ascontiguousarray(begun(self, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs])
-        found = link_streams.walked(states, loads.t, samples, loads.inertia, loads.stiffness, LONGEST, drives)
-        return np.asarray(np.moveaxis(found - drives.shifts[:, :runs], 1, 0))
+        return drives, begun(self, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs].copy(), samples
 
 
 class StreamState(NamedTuple):

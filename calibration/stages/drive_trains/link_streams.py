@@ -123,11 +123,11 @@ def together(
 def streamed(
     states: np.ndarray, before: np.ndarray, samples: np.ndarray, M: np.ndarray, G: np.ndarray, dt: float,
     longest: float, drives: Drives,
-) -> None:  # fmt: skip
+) -> np.ndarray:  # fmt: skip
     """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`.
 
-    M and G (k, k) are inertia and stiffness of all joints at `samples`. The first runs, the likely ones, move together;
-    each other one moves alone, loaded by what the first runs of the other links do.
+    M and G (k, k) are inertia and stiffness of all joints at `samples`. The first runs, the likely ones, move together,
+    and their mean accelerations (m,) are returned; each other one moves alone, loaded by what these do.
     """
     m, columns = samples.shape[1], drives.columns
     room = np.zeros((5, m))
@@ -149,6 +149,7 @@ def streamed(
                 x[0] = carried(x[0] + b.q[i] - a.q[i], b, i, drives.values[i])
             else:
                 x[0], x[1], x[2] = advanced(x[0], x[1], x[2], a, i, b, i, longest, c)
+    return acceleration
 
 
 @njit(cache=True, error_model="numpy")

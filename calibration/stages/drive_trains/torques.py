@@ -56,6 +56,7 @@ class LinkLoads:
         regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
         stiffness: (n, k, k) G, how tau grows with the joints' positions [N.m/rad, N].
+        coupling: (n, k, 6) wrench on the tree's root by unit acceleration of each joint.
     """
 
     trial_id: str
@@ -69,6 +70,7 @@ class LinkLoads:
     regressor: np.ndarray
     moment: np.ndarray
     stiffness: np.ndarray
+    coupling: np.ndarray
 
     def behind(self, delta: np.ndarray) -> "LinkLoads":
         """Loads of links that are delta (n, k) [rad] behind their motors; its own acceleration is still its motor's.
@@ -125,8 +127,8 @@ class Dynamics:
     def evaluated(  # noqa: PLR0913
         self, q: np.ndarray, v: np.ndarray, a: np.ndarray, base: np.ndarray | None, push: Push | None = None,
         delta: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-        """Torques (n, k), inertias (n, k, k), regressors (n, k, p), moments (n, 2), stiffnesses at readings (n, k).
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Torques, inertias, regressors, moments, stiffnesses and couplings, see `LinkLoads`, at readings (n, k).
 
         Where links are about delta (n, k) behind their motors, torques are tau(q - delta) + G delta: those that, less G
         times what links are behind, are right there, a push in the axes of the hand included.
@@ -147,7 +149,7 @@ class Dynamics:
         )
         bending = -(tilt @ found.moment[..., None])
         R = np.concatenate([found.regressor, tilt, bending], axis=2)
-        return torque, found.inertia, R, found.moment, found.stiffness
+        return torque, found.inertia, R, found.moment, found.stiffness, found.coupling
 
     def root(self, base: np.ndarray | None) -> np.ndarray:
         """The base (n, 12) as of `loads`; level and at rest (1, 12) where it is not known."""

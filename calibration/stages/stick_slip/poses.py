@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
@@ -17,7 +18,9 @@ from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.link_streams import Q, V
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved
+from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.stick_slip.forcing import (
     CUTOFF,
     STEP,
@@ -29,13 +32,14 @@ from calibration.stages.stick_slip.forcing import (
     readings_of,
     wrenches_of,
 )
-from calibration.stages.stick_slip.kernel.bases import HEAVE, LOAD, PLANE
+from calibration.stages.stick_slip.kernel.bases import HEAVE, LOAD, PLANE, Bases
 from calibration.stages.stick_slip.kernel.integration import advance
+from calibration.stages.stick_slip.kernel.together import Carried, walked
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bases_of
-from calibration.stages.stick_slip.model import StickSlip
+from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
-from calibration.stages.suspension.floor_wrench import Load, motion_load
+from calibration.stages.suspension.floor_wrench import Load, motion_load, root_in_base
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 
@@ -110,14 +114,18 @@ class Links(NamedTuple):
     T_lab_0: np.ndarray
     wrist: np.ndarray | None = None
 
-    def load(self, t: np.ndarray, T_lab_base: np.ndarray) -> Load:
-        """Their inverse dynamics on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known.
+    def loads(self, t: np.ndarray, T_lab_base: np.ndarray) -> LinkLoads:
+        """What moves them on a base that moves as T_lab_base (m, 4, 4) at t (m,), NaN where not known."""
+        at, q, _ = self.readings
+        return self.trains.loads("", at, q, self.trains.base_motion(t, T_lab_base, at), self.wrist)
+
+    def load(self, t: np.ndarray, T_lab_base: np.ndarray, angles: np.ndarray | None = None) -> Load:
+        """Their inverse dynamics on such a base, at their likely angles where others (n, k) are not given.
 
         The wrist's sensor leans with the base, and the hand weighs downwards: the hand is that of a base upright.
         """
-        at, q, _ = self.readings
-        moving, in_plane = self.trains.base_motion(t, T_lab_base, at), upright(T_lab_base, self.T_lab_0)
-        links, floor = self.trains.likely(self.trains.loads("", at, q, moving, self.wrist)), None
+        at, in_plane, floor = self.readings.t, upright(T_lab_base, self.T_lab_0), None
+        links = self.trains.likely(self.loads(t, T_lab_base)) if angles is None else angles
         if self.wrist is not None:
             moving = self.trains.base_motion(t, self.T_lab_0 @ from_vector(in_plane), at)
             floor = self.trains.hand(at, links, self.wrist, moving)
@@ -172,28 +180,76 @@ def planar_twist(t: np.ndarray, seen: np.ndarray, at: np.ndarray) -> np.ndarray 
 
 
 def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | None) -> PlanarForcing:
-    """What drives the base; inverse dynamics are of the links, on the base that a first prediction has.
+    """What drives the base; inverse dynamics are of the links, on a base that moves.
 
-    A plate's moments are about where the base has slid to.
+    By a plate that is the base of a first prediction, and moments are about where that has slid to. By inverse dynamics
+    a base that slips is moved together with the links.
 
     Raises:
         NotEnoughData: The wrench was not recorded.
         NoSuchElement: The model was not fitted from that source.
     """
     found, links = model.direction(source), links if links is not None and links.trains.trains else None
-    slips, forcing = found.slips, planar_forcing(wrenches, model.tilting, source, found.by_plate)
-    if links is None and not slips.any():
+    slips, likely = found.slips, bases_of(model.wheels, found.logarithms[None], found.corrected)
+    if source == "dynamics" and slips.any():
+        wrenches = replace(wrenches, slips=likely)
+    forcing = planar_forcing(wrenches, model.tilting, source, found.by_plate)
+    if links is None and (source == "dynamics" or not slips.any()):
         return forcing
+    if links is not None and wrenches.slips is not None:
+        wrenches = replace(wrenches, links=_load_of_both(likely, forcing, links, found))
+        return planar_forcing(wrenches, model.tilting, source, found.by_plate)
     x, _ = model.displacement(forcing)
     if links is not None:
         wrenches = replace(wrenches, links=links.load(forcing.t, links.T_lab_0 @ from_vector(x)))
-    if slips.any() and source == "plate":
+    if slips.any():
         far = np.where(slips, x[:, PLANE] - forcing.linear, 0.0)
         wrenches = replace(wrenches, slid=Signal(forcing.t, far, np.ones(len(far), dtype=bool)))
-    elif slips.any():
-        likely = model.direction(source).logarithms
-        wrenches = replace(wrenches, slips=bases_of(model.wheels, likely[None], corrected=False))
     return planar_forcing(wrenches, model.tilting, source, found.by_plate)
+
+
+def _load_of_both(bases: Bases, forcing: PlanarForcing, links: Links, found: Direction) -> Load:
+    """Inverse dynamics of links that are moved together with a base."""
+    x = np.zeros((len(forcing.t), 6))
+    x[:, HEAVE] = forcing.heave
+    loads = links.loads(forcing.t, links.T_lab_0 @ from_vector(x))
+    slid, angles = moved_together(bases, forcing, links.trains, loads)
+    x[:, PLANE] = np.where(found.slips, slid, np.where(found.linear, forcing.linear, 0.0))
+    return links.load(forcing.t, links.T_lab_0 @ from_vector(x), angles)
+
+
+def moved_together(
+    bases: Bases, forcing: PlanarForcing, trains: DriveTrains, loads: LinkLoads
+) -> tuple[np.ndarray, np.ndarray]:
+    """x, y, yaw (n, 3) [m, rad, frame 0] of the first of `bases` since the first second of a forcing, and its links.
+
+    Args:
+        bases: At rest.
+        forcing: By inverse dynamics of the motors, or a plate.
+        trains: Drive trains of the arm.
+        loads: On a base that does not accelerate in the floor's plane.
+
+    Returns:
+        The positions, and link angles (r, k) [rad, m] at the times of the loads, zeros of the readings included.
+    """
+    steps = forcing.t[0] + (np.arange(len(forcing.drive)) - (STEPS - 1)) * STEP
+    links = _carried(trains, loads, steps)
+    x, delta = walked(bases, forcing.drive, forcing.inertia, links, STEP)
+    behind = interpolate_columns(loads.t, steps, delta - links.drives.shifts[:, 0])
+    return x - x[forcing.rest].mean(axis=0), trains.behind(loads, behind.T)
+
+
+def _carried(trains: DriveTrains, loads: LinkLoads, t: np.ndarray) -> Carried:
+    """Links at steps t (s,) of a base; beyond their readings they stay."""
+    drives, states, samples = trains.prepared_for(loads)
+    dual = root_in_base(trains.dynamics.model, trains.description).dualAction[list(PLANE)]
+    P = np.ascontiguousarray(loads.coupling[:, drives.columns] @ dual.T)
+    row = np.minimum(np.searchsorted(loads.t, t), len(loads.t) - 1)
+    own = interpolate_columns(t, loads.t, samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
+    inside = (t > loads.t[0]) & (t < loads.t[-1])
+    motor = CubicHermiteSpline(loads.t, samples[:, Q], samples[:, V])
+    own[inside, Q], own[inside, V], own[~inside, V] = motor(t[inside]), motor(t[inside], 1), 0.0
+    return Carried(states, np.ascontiguousarray(own), row, loads.inertia, loads.stiffness, P, drives)
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:

@@ -48,7 +48,7 @@ def test_dynamics_are_pinocchio_s(arm):
         H = np.triu(pin.crba(arm, data, at))
         H += np.triu(H, 1).T
         Y = pin.computeJointTorqueRegressor(arm, data, at, rate, push)[columns][:, masses]
-        expected += [H[np.ix_(columns, columns)], H[:6, :6], H[:3, columns].T, Y]
+        expected += [H[np.ix_(columns, columns)], H[:6, :6], H[:6, columns].T, Y]
         ours = (found.torque, found.root, found.moment, found.inertia, found.composite, found.coupling, found.regressor)
         for x, y in zip(ours, expected, strict=True):
             np.testing.assert_allclose(x[i], y, rtol=1e-12, atol=1e-12 * np.abs(y).max())

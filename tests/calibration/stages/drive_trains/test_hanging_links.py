@@ -62,7 +62,7 @@ def test_a_joint_bears_what_the_other_links_weigh_and_do_behind_their_motors() -
 def test_torques_about_other_positions_are_right_there() -> None:
     q, still = np.array([[0.3, -0.7]]), np.zeros((1, 2))
     delta = np.array([[0.02, -0.03]])
-    torque, _, _, _, G = robot().evaluated(q, still, still, None, delta=delta)
+    torque, _, _, _, G, _ = robot().evaluated(q, still, still, None, delta=delta)
     np.testing.assert_allclose(torque[0] - G[0] @ delta[0], held((q - delta)[0]), rtol=1e-12)
     plain, *_ = robot().evaluated(q, still, still, None)
     assert np.abs(plain[0] - held(q[0])).max() < 1e-12

@@ -8,6 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import mjcf
+from calibration.numerics.lie import from_vector
 from calibration.numerics.signals import Signal, even, low_passed
 from calibration.recording.clock import Clock
 from calibration.stages.drive_trains import DriveTrain, DriveTrains
@@ -22,9 +23,10 @@ from calibration.stages.stick_slip.forcing import (
     planar_forcing,
     readings_of,
 )
-from calibration.stages.stick_slip.kernel.bases import PLANE, TILTS
+from calibration.stages.stick_slip.kernel.bases import HEAVE, PLANE, TILTS
+from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import Direction, StickSlip
-from calibration.stages.stick_slip.poses import Links, forced, planar_twist, upright
+from calibration.stages.stick_slip.poses import Links, forced, moved_together, planar_twist, upright
 from calibration.stages.stick_slip.wheels import wheel_set
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.cross_validation import HeldOut
@@ -169,6 +171,30 @@ def test_links_that_strike_in_their_gaps_move_the_base(trial):
     )
     assert np.abs(tight - by_motors).max() < 0.01 * np.abs(by_motors).max()
     assert np.abs(loose - by_motors).max() > 0.1 * np.abs(by_motors).max()
+
+
+def test_a_base_and_links_that_are_moved_together_agree_with_each_other(trial):
+    """The base moves as those links throw it, and they as it does; one after the other, what comes next is another."""
+    of, behind, wrenches = model(), links(trial, 1e-3), wrenches_of(SOURCES, trial, T_LAB_BASE)
+    (train,) = behind.trains.trains
+    softer = replace(train, values=np.array([1e-3, 1e-4, 0.5, 0.5, 6e-3, 0.0, 0.0]), dynamic=True)
+    behind = behind._replace(trains=replace(behind.trains, trains=(softer,)))
+    forcing = planar_forcing(wrenches, of.tilting, "dynamics")
+    x, bases = np.zeros((len(forcing.t), 6)), bases_of(of.wheels, TRUTH.logarithms[None], False)
+    x[:, HEAVE] = forcing.heave
+
+    def next_of(x, angles):
+        """The base that inverse dynamics of links on a base move, and links that this base moves."""
+        T = behind.T_lab_0 @ from_vector(x)
+        of_links = planar_forcing(replace(wrenches, links=behind.load(forcing.t, T, angles)), of.tilting, "dynamics")
+        return of.displacement(of_links)[0][:, 5], behind.trains.likely(behind.loads(forcing.t, T))[:, 1]
+
+    loads = behind.loads(forcing.t, behind.T_lab_0 @ from_vector(x))
+    x[:, PLANE], angles = moved_together(bases, forcing, behind.trains, loads)
+    first = of.displacement(forcing)[0]
+    (yaw, link), (other, _) = next_of(x, angles), next_of(first, None)
+    assert np.std(yaw - x[:, 5]) < 0.5 * np.std(other - first[:, 5])
+    assert np.std(link - angles[:, 1]) < 0.5 * np.std(next_of(first, angles)[1] - angles[:, 1])
 
 
 def test_the_base_tilts_as_it_slips(trial):
