@@ -4,9 +4,8 @@
     vertical load (-Fz, My, -Mx) of the plate, or of inverse dynamics less M_h. d2/dt2 (z, rx, ry)
 
 all about the base frame's origin, in its axes, a plate's in frame 0; p: x, y, yaw, h: z, rx, ry; M(q) the composite
-inertia of the robot as weighed, with the payload of the trial, where it stands. Heave and tilt are the 6x6 compliance's
-under that source. Forces in the floor's plane count from their mean in the first second. Without joint readings a base
-has no inertia: the plate alone moves it, at the rate of the correction. The last of STEPS steps is at its sample.
+inertia of the robot as weighed, with the trial's payload. Heave and tilt are the 6x6 compliance's under that source.
+Forces in the plane count from their mean in the first second. Without joint readings the plate alone moves the base.
 """
 
 from dataclasses import dataclass, field, replace
@@ -34,7 +33,7 @@ from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.weighing import leans
 
 CUTOFF = 20.0  # [Hz]: peaks of 50 ms make wheels slip
-STEP = 1.0 / (RATE * STEPS)
+STEP = 1.0 / (RATE * STEPS)  # [s]; the last of STEPS is at its sample
 UNMOVED = 1e12  # [kg, kg.m2]: an inertia that no force moves
 
 
@@ -130,6 +129,7 @@ class Wrenches:
         slid: How far the base has slid (k, 3), on which the plate stands still, where that is known: predicted, or in
             a calibration trial as its markers show it. Then the plate shows heave and tilt, whatever is to move it.
         pushed: As of `PlanarForcing`.
+        P: (k, n_joints, 6) of base and joints, see `composite_inertia`.
     """
 
     trial_id: str
@@ -143,6 +143,7 @@ class Wrenches:
     slips: Bases | None = None
     slid: Signal | None = None
     pushed: bool = False
+    P: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 6)))
 
     @property
     def inverse_dynamics(self) -> Load | None:
@@ -172,8 +173,7 @@ def wrenches_of(sources: WrenchSources, trial: Trial, T_lab_0: np.ndarray, arm: 
     if sources.robot is None or not len(trial.t_robot):
         return Wrenches(trial.id, start, plate, None, np.zeros(0), np.zeros((0, 6, 6)), wheels_of(lab))
     t, q, wrench = readings_of(sources.robot, trial)
-    pushed = None if arm else hand_push(lab.urdf, lab.description, t, q, wrench)
-    hand = arm.of_trial(trial.id).hand(t, q, wrench) if arm else pushed
+    hand = arm.of_trial(trial.id).hand(t, q, wrench) if arm else hand_push(lab.urdf, lab.description, t, q, wrench)
     return replace(wrenches_along(lab, Readings(t, q, hand), plate, T_lab_0), trial_id=trial.id, start=start)
 
 
@@ -186,9 +186,9 @@ def readings_of(robot: Clock, trial: Trial) -> tuple[np.ndarray, np.ndarray, np.
 def wrenches_along(lab: Laboratory, readings: Readings, plate: Load | None, T_lab_0: np.ndarray) -> Wrenches:
     """The wrench of the plate, and that of readings."""
     t, q, hand = readings
-    dynamics, M = motion_load(lab, t, q, T_lab_0, CUTOFF, hand), composite_inertia(lab, t, q, CUTOFF, hand)
+    dynamics, (at, M, P) = motion_load(lab, t, q, T_lab_0, CUTOFF, hand), composite_inertia(lab, t, q, CUTOFF, hand)
     pushed = hand is not None and hand.outside
-    return Wrenches("readings", float(t[0]), plate, dynamics, *M, wheels_of(lab), pushed=pushed)
+    return Wrenches("readings", float(t[0]), plate, dynamics, at, M, wheels_of(lab), pushed=pushed, P=P)
 
 
 def wheels_of(lab: Laboratory) -> WheelSet:

@@ -39,7 +39,7 @@ from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import Direction, StickSlip
 from calibration.stages.suspension.base_response import WrenchSources
-from calibration.stages.suspension.floor_wrench import Load, motion_load, root_in_base
+from calibration.stages.suspension.floor_wrench import Load, elsewhere, motion_load, root_in_base
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 
@@ -197,7 +197,9 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
     if links is None and (source == "dynamics" or not slips.any()):
         return forcing
     if links is not None and wrenches.slips is not None:
-        wrenches = replace(wrenches, links=_load_of_both(likely, forcing, links, found))
+        P = wrenches.P @ elsewhere(model.tilting.off)[:, PLANE]
+        shared = Signal(wrenches.t, P, np.ones(len(P), dtype=bool))
+        wrenches = replace(wrenches, links=_load_of_both(likely, forcing, shared, links, found))
         return planar_forcing(wrenches, model.tilting, source, found.by_plate)
     x, _ = model.displacement(forcing)
     if links is not None:
@@ -208,48 +210,45 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
     return planar_forcing(wrenches, model.tilting, source, found.by_plate)
 
 
-def _load_of_both(bases: Bases, forcing: PlanarForcing, links: Links, found: Direction) -> Load:
+def _load_of_both(bases: Bases, forcing: PlanarForcing, shared: Signal, links: Links, found: Direction) -> Load:
     """Inverse dynamics of links that are moved together with a base."""
     x = np.zeros((len(forcing.t), 6))
     x[:, HEAVE] = forcing.heave
     loads = links.loads(forcing.t, links.T_lab_0 @ from_vector(x))
-    slid, angles = moved_together(bases, forcing, links.trains, loads)
+    slid, angles = moved_together(bases, forcing, shared, links.trains, loads)
     x[:, PLANE] = np.where(found.slips, slid, np.where(found.linear, forcing.linear, 0.0))
     return links.load(forcing.t, links.T_lab_0 @ from_vector(x), angles)
 
 
 def moved_together(
-    bases: Bases, forcing: PlanarForcing, trains: DriveTrains, loads: LinkLoads
+    bases: Bases, forcing: PlanarForcing, shared: Signal, trains: DriveTrains, loads: LinkLoads
 ) -> tuple[np.ndarray, np.ndarray]:
     """x, y, yaw (n, 3) [m, rad, frame 0] of the first of `bases` since the first second of a forcing, and its links.
 
     Args:
         bases: At rest.
         forcing: By inverse dynamics of the motors, or a plate.
+        shared: P (s, k, 3) of the joints, see `Carried`.
         trains: Drive trains of the arm.
         loads: On a base that does not accelerate in the floor's plane.
 
     Returns:
         The positions, and link angles (r, k) [rad, m] at the times of the loads, zeros of the readings included.
     """
-    steps = forcing.t[0] + (np.arange(len(forcing.drive)) - (STEPS - 1)) * STEP
-    links = _carried(trains, loads, steps)
-    x, delta = walked(bases, forcing.drive, forcing.inertia, links, STEP)
-    behind = interpolate_columns(loads.t, steps, delta - links.drives.shifts[:, 0])
-    return x - x[forcing.rest].mean(axis=0), trains.behind(loads, behind.T)
-
-
-def _carried(trains: DriveTrains, loads: LinkLoads, t: np.ndarray) -> Carried:
-    """Links at steps t (s,) of a base; beyond their readings they stay."""
     drives, states, samples = trains.prepared_for(loads)
-    dual = root_in_base(trains.dynamics.model, trains.description).dualAction[list(PLANE)]
-    P = np.ascontiguousarray(loads.coupling[:, drives.columns] @ dual.T)
+    t = forcing.t[0] + (np.arange(len(forcing.drive)) - (STEPS - 1)) * STEP
     row = np.minimum(np.searchsorted(loads.t, t), len(loads.t) - 1)
-    own = interpolate_columns(t, loads.t, samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
-    inside = (t > loads.t[0]) & (t < loads.t[-1])
+    at_steps = interpolate_columns(t, loads.t, samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
+    read = (t > loads.t[0]) & (t < loads.t[-1])
     motor = CubicHermiteSpline(loads.t, samples[:, Q], samples[:, V])
-    own[inside, Q], own[inside, V], own[~inside, V] = motor(t[inside]), motor(t[inside], 1), 0.0
-    return Carried(states, np.ascontiguousarray(own), row, loads.inertia, loads.stiffness, P, drives)
+    at_steps[read, Q], at_steps[read, V], at_steps[~read, V] = motor(t[read]), motor(t[read], 1), 0.0
+    dual, own = root_in_base(trains.dynamics.model, trains.description).dualAction[list(PLANE)], drives.columns
+    P = interpolate_columns(loads.t, shared.t, shared.x[:, own].reshape(len(shared.x), -1)).reshape(-1, len(own), 3)
+    R = np.ascontiguousarray(loads.coupling[:, own] @ dual.T)
+    links = Carried(states, np.ascontiguousarray(at_steps), row, loads.inertia, loads.stiffness, P, R, drives)
+    x, delta = walked(bases, forcing.drive, forcing.inertia, links, STEP)
+    behind = interpolate_columns(loads.t, t, delta - drives.shifts[:, 0])
+    return x - x[forcing.rest].mean(axis=0), trains.behind(loads, behind.T)
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:

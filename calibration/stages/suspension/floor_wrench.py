@@ -100,13 +100,16 @@ def motion_load(
 
 def composite_inertia(
     lab: Laboratory, t: np.ndarray, q_motor: np.ndarray, cutoff: float, push: Push | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Times (k,) [s, mocap clock] and M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times (k,) [s, mocap clock], M (k, 6, 6) of the whole robot about the origin of frame 0, in its axes, and P.
+
+    P (k, n_joints, 6): the wrench that accelerates the robot as a joint does by 1 rad/s2, or 1 m/s2.
+    """
     q = low_passed(even(t, q_motor), cutoff)
     T_0_root, rows = root_in_base(lab.floating, lab.description), q.x[::_INERTIA_STRIDE]
     none, tree = np.zeros_like(rows), lab.tree if push is None else push.on(lab.tree)
-    M = dynamics_along(tree, rows, none, none, np.zeros((1, 12))).composite
-    return q.t[::_INERTIA_STRIDE], T_0_root.dualAction @ M @ T_0_root.inverse().action
+    found, dual = dynamics_along(tree, rows, none, none, np.zeros((1, 12))), T_0_root.dualAction
+    return q.t[::_INERTIA_STRIDE], dual @ found.composite @ T_0_root.inverse().action, found.coupling @ dual.T
 
 
 def moved(M: np.ndarray, off: np.ndarray) -> np.ndarray:
@@ -114,8 +117,12 @@ def moved(M: np.ndarray, off: np.ndarray) -> np.ndarray:
 
     A' M A,  A = [1 -[off]x; 0 1]: the twist of the origin as the robot has it there.
     """
-    A = pin.SE3(np.eye(3), -np.append(off, 0.0)).action
-    return np.asarray(A.T @ M @ A)
+    return np.asarray(elsewhere(off).T @ M @ elsewhere(off))
+
+
+def elsewhere(off: np.ndarray) -> np.ndarray:
+    """A (6, 6), see `moved`; wrenches w (n, 6) about the origin are w A."""
+    return np.asarray(pin.SE3(np.eye(3), -np.append(off, 0.0)).action)
 
 
 def vertical(wrench: np.ndarray) -> np.ndarray:

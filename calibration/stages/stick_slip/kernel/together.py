@@ -1,13 +1,14 @@
 """A base that sticks and slips, and links that strike in their gaps on it, moved together: each throws the other.
 
     M_b a_b = w - wheels + sum_i P_i d2 delta_i / dt2            a_0 what the base does if links follow their motors
-    tau_i <- tau_i + P_i' a_0,    M_ij <- M_ij - P_i' M_b^-1 P_j              P_i base x link i of the robot's inertia
+    tau_i <- tau_i + R_i' a_0,    M_ij <- M_ij - R_i' M_b^-1 P_j              P_i base x link i of the robot's inertia
 
 w of inverse dynamics by motors, delta_i how far link i is behind, tau_i its load on a base that does not accelerate in
 the floor's plane, M_b without the wheels, which stick. Simulated one after the other, each along a whole trial, they do
 not converge: an arm stretched out that strikes in its gap turns the base, and is turned by it, by nearly as much as it
 would turn alone. Within a step of the base the force of its wheels is known, so that the second line is exact: links
-move with the inertia that is left them by a base that yields, and then the base does.
+move with the inertia that is left them by a base that yields, and then the base does. R = P but for what hangs on the
+wrist's sensor, which accelerates links, and shows by its reading, not by P and M_b, what it does to the base.
 """
 
 from typing import NamedTuple
@@ -35,7 +36,8 @@ class Carried(NamedTuple):
         row: (s,) which of n samples of what follows is that of a step.
         M: (n, k, k) inertia.
         G: (n, k, k) stiffness.
-        P: (n, m, 3) Fx, Fy, Mz on the base by unit acceleration of each link, in its axes.
+        P: (n, m, 3) Fx, Fy, Mz that accelerate the robot as each link does by 1 rad/s2, in the base's axes.
+        R: (n, m, 3) the same of what loads the links.
         drives: Their parameters.
     """
 
@@ -45,6 +47,7 @@ class Carried(NamedTuple):
     M: np.ndarray
     G: np.ndarray
     P: np.ndarray
+    R: np.ndarray
     drives: Drives
 
 
@@ -67,7 +70,7 @@ def walked(
             a[c] = state[ACCELERATION + c, 0]
         row = links.row[k]
         after, M = links.samples[k].copy(), links.M[row].copy()
-        yields = left(after, M, links.P[row], sample[:6] - own, a, links.drives.columns)
+        yields = left(after, M, (links.P[row], links.R[row]), sample[:6] - own, a, links.drives.columns)
         if k > 0:
             thrown = streamed(states, before, after, M, links.G[row], h, LONGEST, links.drives)
             for c in range(3):
@@ -84,21 +87,23 @@ def walked(
 
 @njit(cache=True, error_model="numpy")
 def left(
-    sample: np.ndarray, M: np.ndarray, P: np.ndarray, base: np.ndarray, a: np.ndarray, columns: np.ndarray
-) -> np.ndarray:
+    sample: np.ndarray, M: np.ndarray, shared: tuple[np.ndarray, np.ndarray], base: np.ndarray, a: np.ndarray,
+    columns: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """A sample (4, m) of links, and M (k, k), become those on a base that yields; M_b^-1 P (m, 3) is returned.
 
-    P (m, 3), M_b (6,) of the base, a_0 (3,), columns (m,) of the links in M.
+    Shared are P and R (m, 3), M_b (6,) of the base, a_0 (3,), columns (m,) of the links in M.
     """
+    P, R = shared
     m = len(P)
     yields = np.empty((m, 3))
     for i in range(m):
         yields[i, 0], yields[i, 1], yields[i, 2] = solved(base, P[i, 0], P[i, 1], P[i, 2])
     for i in range(m):
         for c in range(3):
-            sample[TORQUE, i] += P[i, c] * a[c]
+            sample[TORQUE, i] += R[i, c] * a[c]
         for j in range(m):
-            less = P[i, 0] * yields[j, 0] + P[i, 1] * yields[j, 1] + P[i, 2] * yields[j, 2]
+            less = R[i, 0] * yields[j, 0] + R[i, 1] * yields[j, 1] + R[i, 2] * yields[j, 2]
             M[columns[i], columns[j]] -= less
             if i == j and sample[INERTIA, i] > LIGHT:
                 sample[INERTIA, i] = max(sample[INERTIA, i] - less, _LEFT * sample[INERTIA, i])

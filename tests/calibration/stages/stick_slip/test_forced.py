@@ -182,6 +182,7 @@ def test_a_base_and_links_that_are_moved_together_agree_with_each_other(trial):
     forcing = planar_forcing(wrenches, of.tilting, "dynamics")
     x, bases = np.zeros((len(forcing.t), 6)), bases_of(of.wheels, TRUTH.logarithms[None], False)
     x[:, HEAVE] = forcing.heave
+    shared = Signal(wrenches.t, wrenches.P[..., PLANE], np.ones(len(wrenches.t), dtype=bool))
 
     def next_of(x, angles):
         """The base that inverse dynamics of links on a base move, and links that this base moves."""
@@ -190,7 +191,7 @@ def test_a_base_and_links_that_are_moved_together_agree_with_each_other(trial):
         return of.displacement(of_links)[0][:, 5], behind.trains.likely(behind.loads(forcing.t, T))[:, 1]
 
     loads = behind.loads(forcing.t, behind.T_lab_0 @ from_vector(x))
-    x[:, PLANE], angles = moved_together(bases, forcing, behind.trains, loads)
+    x[:, PLANE], angles = moved_together(bases, forcing, shared, behind.trains, loads)
     first = of.displacement(forcing)[0]
     (yaw, link), (other, _) = next_of(x, angles), next_of(first, None)
     assert np.std(yaw - x[:, 5]) < 0.5 * np.std(other - first[:, 5])
