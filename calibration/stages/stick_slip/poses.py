@@ -234,6 +234,9 @@ def moved_together(
 
     Returns:
         The positions, and link angles (r, k) [rad, m] at the times of the loads, zeros of the readings included.
+
+    Raises:
+        NotEnoughData: They throw each other apart, as if links were heavier than the robot.
     """
     drives, states, samples = trains.prepared_for(loads)
     t = forcing.t[0] + (np.arange(len(forcing.drive)) - (STEPS - 1)) * STEP
@@ -247,6 +250,10 @@ def moved_together(
     R = np.ascontiguousarray(loads.coupling[:, own] @ dual.T)
     links = Carried(states, np.ascontiguousarray(at_steps), row, loads.inertia, loads.stiffness, P, R, drives)
     x, delta = walked(bases, forcing.drive, forcing.inertia, links, STEP)
+    if not np.isfinite(x).all():
+        raise NotEnoughData(
+            f"{forcing.trial_id}: the base and the arm throw each other apart: check the masses of links"
+        )
     behind = interpolate_columns(loads.t, t, delta - drives.shifts[:, 0])
     return x - x[forcing.rest].mean(axis=0), trains.behind(loads, behind.T)
 

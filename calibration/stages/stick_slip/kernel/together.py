@@ -102,9 +102,9 @@ def left(
     for i in range(m):
         for c in range(3):
             sample[TORQUE, i] += R[i, c] * a[c]
+        whole = M[columns[i], columns[i]]
         for j in range(m):
-            less = R[i, 0] * yields[j, 0] + R[i, 1] * yields[j, 1] + R[i, 2] * yields[j, 2]
-            M[columns[i], columns[j]] -= less
-            if i == j and sample[INERTIA, i] > LIGHT:
-                sample[INERTIA, i] = max(sample[INERTIA, i] - less, _LEFT * sample[INERTIA, i])
+            M[columns[i], columns[j]] -= R[i, 0] * yields[j, 0] + R[i, 1] * yields[j, 1] + R[i, 2] * yields[j, 2]
+        if sample[INERTIA, i] > LIGHT:
+            sample[INERTIA, i] *= max(M[columns[i], columns[i]] / whole, _LEFT)
     return yields

@@ -8,6 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import mjcf
+from calibration.errors import NotEnoughData
 from calibration.numerics.lie import from_vector
 from calibration.numerics.signals import Signal, even, low_passed
 from calibration.recording.clock import Clock
@@ -193,6 +194,8 @@ def test_a_base_and_links_that_are_moved_together_agree_with_each_other(trial):
     loads = behind.loads(forcing.t, behind.T_lab_0 @ from_vector(x))
     x[:, PLANE], angles = moved_together(bases, forcing, shared, behind.trains, loads)
     first = of.displacement(forcing)[0]
+    with pytest.raises(NotEnoughData, match="masses of links"):
+        moved_together(bases, forcing, replace(shared, x=10.0 * shared.x), behind.trains, loads)
     (yaw, link), (other, _) = next_of(x, angles), next_of(first, None)
     assert np.std(yaw - x[:, 5]) < 0.5 * np.std(other - first[:, 5])
     assert np.std(link - angles[:, 1]) < 0.5 * np.std(next_of(first, angles)[1] - angles[:, 1])
