@@ -43,7 +43,10 @@ OPEN = {  # lines that do not hold, with their sizes in docs/limits.md
     "fixed, ladder of model_2 measured motor dynamic",
     "fixed, ladder of model_3 measured motor dynamic",
     "fixed, band of registration plate dynamic",
-    "sampled, band of full dynamics dynamic",
+    "sampled, band of full plate dynamic",
+    "sampled, band of full plate static",
+    "sampled, band of model_3 plate dynamic",
+    "sampled, band of model_2 plate dynamic",
 }
 SKILL = {"fixed": (0.95, 0.90), "sampled": (0.88, 0.78)}  # median, worst
 
