@@ -190,17 +190,12 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
         NoSuchElement: The model was not fitted from that source.
     """
     found, links = model.direction(source), links if links is not None and links.trains.trains else None
-    slips, likely = found.slips, bases_of(model.wheels, found.logarithms[None], found.corrected)
+    slips = found.slips
     if source == "dynamics" and slips.any():
-        wrenches = replace(wrenches, slips=likely)
+        return _forced_together(model, found, wrenches, links)
     forcing = planar_forcing(wrenches, model.tilting, source, found.by_plate)
-    if links is None and (source == "dynamics" or not slips.any()):
+    if links is None and not slips.any():
         return forcing
-    if links is not None and wrenches.slips is not None:
-        P = wrenches.P @ elsewhere(model.tilting.off)[:, PLANE]
-        shared = Signal(wrenches.t, P, np.ones(len(P), dtype=bool))
-        wrenches = replace(wrenches, links=_load_of_both(likely, forcing, shared, links, found))
-        return planar_forcing(wrenches, model.tilting, source, found.by_plate)
     x, _ = model.displacement(forcing)
     if links is not None:
         wrenches = replace(wrenches, links=links.load(forcing.t, links.T_lab_0 @ from_vector(x)))
@@ -210,14 +205,21 @@ def forced(model: StickSlip, wrenches: Wrenches, source: Source, links: Links | 
     return planar_forcing(wrenches, model.tilting, source, found.by_plate)
 
 
-def _load_of_both(bases: Bases, forcing: PlanarForcing, shared: Signal, links: Links, found: Direction) -> Load:
-    """Inverse dynamics of links that are moved together with a base."""
-    x = np.zeros((len(forcing.t), 6))
+def _forced_together(model: StickSlip, found: Direction, wrenches: Wrenches, links: Links | None) -> PlanarForcing:
+    """Inverse dynamics on a base that slips, and of links that are moved together with it."""
+    bases = bases_of(model.wheels, found.logarithms[None], corrected=False)
+    wrenches = replace(wrenches, slips=bases)
+    forcing = planar_forcing(wrenches, model.tilting, "dynamics")
+    if links is None:
+        return forcing
+    x, P = np.zeros((len(forcing.t), 6)), wrenches.P @ elsewhere(model.tilting.off)[:, PLANE]
     x[:, HEAVE] = forcing.heave
     loads = links.loads(forcing.t, links.T_lab_0 @ from_vector(x))
+    shared = Signal(wrenches.t, P, np.ones(len(P), dtype=bool))
     slid, angles = moved_together(bases, forcing, shared, links.trains, loads)
     x[:, PLANE] = np.where(found.slips, slid, np.where(found.linear, forcing.linear, 0.0))
-    return links.load(forcing.t, links.T_lab_0 @ from_vector(x), angles)
+    load = links.load(forcing.t, links.T_lab_0 @ from_vector(x), angles)
+    return planar_forcing(replace(wrenches, links=load), model.tilting, "dynamics")
 
 
 def moved_together(
