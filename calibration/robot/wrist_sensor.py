@@ -100,18 +100,8 @@ class WristSensor:
     body: np.ndarray
     at_rest: np.ndarray
 
-    def push(self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> Push | None:
-        """What a hand that is pushed does to the sensor at t (n,) [s]; None: nothing pushes it.
-
-        Args:
-            t: Times.
-            q: (n, k) motor readings [rad, m].
-            wrench: (n, 6) readings.
-        """
-        try:
-            read = smoothed(t, q, wrench)
-        except NotEnoughData:
-            return None
+    def push(self, t: np.ndarray, read: "SmoothReadings") -> Push | None:
+        """What a hand that is pushed does to the sensor at t (n,) [s], by its readings; None: nothing pushes it."""
         limit = _SHARE * float(self.tree.mass[-1] * np.linalg.norm(self.at_rest[0, 6:9]))
         few = read.thinned(STRIDE)
         p = self._moved(few) + few.wrench
@@ -121,17 +111,11 @@ class WristSensor:
             return None
         return Push(self._on_body(t, read.t, read.wrench - zero), self.tree)
 
-    def hand(
-        self, t: np.ndarray, q: np.ndarray, wrench: np.ndarray, nominal: RigidTree, base: np.ndarray | None = None
-    ) -> Push | None:
-        """h of a hand that nothing pushes, in the place of what nominally hangs there; None without a second of it.
+    def hand(self, t: np.ndarray, read: "SmoothReadings", nominal: RigidTree, base: np.ndarray | None = None) -> Push:
+        """h of a hand that nothing pushes, in the place of what nominally hangs there.
 
         `base` (n, 12) is twist and proper acceleration of the root at t; None: it is at rest.
         """
-        try:
-            read = smoothed(t, q, wrench)
-        except NotEnoughData:
-            return None
         off = self._moved(read, None if base is None else interpolate_columns(read.t, t, base)) + read.wrench
         slow = low_passed(Signal(read.t, off, np.ones(len(off), dtype=bool)), _SLOW).x
         return Push(self._on_body(t, read.t, read.wrench - slow), nominal, outside=False)
@@ -239,4 +223,7 @@ def wrist_sensor(urdf: str, description: Description) -> WristSensor | None:
 def hand_push(urdf: str, description: Description, t: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> Push | None:
     """`WristSensor.push` of a robot with its payload; None without readings or a sensor, or where nothing pushes."""
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
-    return None if sensor is None else sensor.push(t, q, wrench)
+    try:
+        return None if sensor is None else sensor.push(t, smoothed(t, q, wrench))
+    except NotEnoughData:
+        return None

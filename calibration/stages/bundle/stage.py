@@ -17,6 +17,7 @@ from calibration.errors import NotEnoughData
 from calibration.inference.parameters import Model, Parameter
 from calibration.numerics.lie import from_vector
 from calibration.numerics.side_by_side import side_by_side
+from calibration.numerics.signals import interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
@@ -36,9 +37,9 @@ from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.parameters import covariance_of, wheel_parameters
-from calibration.stages.stick_slip.poses import Arm, slipping_base_poses
+from calibration.stages.stick_slip.poses import Arm, driven
 from calibration.stages.stick_slip.stage import fit_stick_slip
-from calibration.stages.stick_slip.standing import SOURCES
+from calibration.stages.stick_slip.standing import SOURCES, Read
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.weighing import weighed_links
@@ -112,32 +113,33 @@ def fit_bundle(
         found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link), _moment_sigma(lab)))
-    base = None
+    base, read = None, []
     if suspension is not None:
         sources = replace(sources, T_base_B=from_vector(hand.base))
-        base, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)
+        base, read, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)
         found += more
     at_rest = other = np.zeros(0)
     if refitted is not None:
-        trains, at_rest, other = _in_use(base, sources, trials, trains, hand, rough.moved)
+        trains, at_rest, other = _in_use(base, sources, trials, read, trains, hand, rough.moved)
     parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, other, trains.hung, links)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
 
 
 def _in_use(  # noqa: PLR0913
-    base: StickSlip | None, sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains, hand: HandModel,
-    moved: Moved,
+    base: StickSlip | None, sources: WrenchSources, trials: Sequence[Trial], read: Sequence[Read], trains: DriveTrains,
+    hand: HandModel, moved: Moved,
 ) -> tuple[DriveTrains, np.ndarray, np.ndarray]:  # fmt: skip
     """The drive trains with what predictions left; s_j (m,) at rest, and where inverse dynamics move the base.
 
-    The last is empty where no plate moves the base better. `moved` is for trials in which no base was identified.
+    The last is empty where no plate moves the base better. `moved` is for trials that are not `read`, or have no base.
     """
     robot, known = sources.robot, () if base is None else tuple(d.source for d in base.directions)
     if robot is None:
         return trains, np.zeros(0), np.zeros(0)
 
     def corrected(by: Source | None, trials: Sequence[Trial]) -> list[CorrectedTrial]:
-        bases = moved if base is None or by is None else {**moved, **_moved_by(base, sources, trials, trains, by)}
+        shown = [one for one in read if one.trial.id in {trial.id for trial in trials}]
+        bases = moved if base is None or by is None else {**moved, **_moved_by(base, sources, shown, trains, by)}
         return side_by_side(lambda t: corrected_trial(trains, t, robot, hand, bases.get(t.id)), trials)
 
     shown = corrected(known[0] if known else None, trials)
@@ -148,17 +150,19 @@ def _in_use(  # noqa: PLR0913
 
 
 def _moved_by(
-    base: StickSlip, sources: WrenchSources, trials: Sequence[Trial], trains: DriveTrains, source: Source
+    base: StickSlip, sources: WrenchSources, read: Sequence[Read], trains: DriveTrains, source: Source
 ) -> Moved:
     """How a wrench moves the base in the trials that have it."""
 
-    def moved(trial: Trial) -> MovedBase | None:
+    def moved(one: Read) -> MovedBase | None:
         with suppress(NotEnoughData):
-            return MovedBase(slipping_base_poses(base, sources, trial, source, trains).T_lab_B, source == "plate")
+            forcing = driven(base, sources, one, source, trains)
+            x = interpolate_columns(one.trial.t_mocap, forcing.t, base.displacement(forcing)[0])
+            return MovedBase(one.rest.poses(x), source == "plate")
         return None
 
-    found = side_by_side(moved, trials)
-    return {trial.id: one for trial, one in zip(trials, found, strict=True) if one is not None}
+    found = side_by_side(moved, read)
+    return {one.trial.id: base for one, base in zip(read, found, strict=True) if base is not None}
 
 
 def _completed(  # noqa: PLR0913

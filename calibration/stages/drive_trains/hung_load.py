@@ -85,10 +85,12 @@ def hung_load(urdf: str, description: Description, offset: np.ndarray, trials: S
         known = np.isfinite(trial.q_motor).all(axis=1) & np.isfinite(trial.wrist_wrench).all(axis=1)
         sensor = wrist_sensor(urdf, description.carrying(mass)) if known.any() else None
         readings = trial.t_robot[known], trial.q_motor[known] - offset, trial.wrist_wrench[known]
-        if sensor is None or sensor.push(*readings) is not None:
+        if sensor is None:
             continue
         with suppress(NotEnoughData):
-            rows.append((*_means(sensor, smoothed(*readings)), mass))
+            read = smoothed(*readings)
+            if sensor.push(trial.t_robot[known], read) is None:
+                rows.append((*_means(sensor, read), mass))
     if nominal is None or not rows:
         return None
     prior = _prior(nominal, description.tolerances)
@@ -101,12 +103,14 @@ class _Hanging(NamedTuple):
 
     Attributes:
         sensor: With nominal links and the declared payload.
+        read: What it read, and the motors or links.
         known: (4,) what hangs there besides by the calibration: mass [kg], first moment [kg.m].
         found: (4,) the same by the trial.
         pushed: What pushes the hand.
     """
 
     sensor: WristSensor
+    read: SmoothReadings
     known: np.ndarray
     found: np.ndarray
     pushed: Push | None = None
@@ -152,7 +156,7 @@ def hand_on_floor(
         return None
     if of.pushed is not None:
         return of.pushed._replace(hung=of.sensor.tree)
-    return of.sensor.carrying(of.found).hand(t, q, wrench, of.sensor.tree, base)
+    return of.sensor.carrying(of.found).hand(t, of.read, of.sensor.tree, base)
 
 
 def _hanging(
@@ -164,17 +168,18 @@ def _hanging(
         return None
     mass = description.payload_of()
     known = np.zeros(4) if hung is None else hung.added(mass)
-    pushed = sensor.carrying(known).push(t, q, wrench)
-    if pushed is not None or hung is None:
-        return None if pushed is None else _Hanging(sensor, known, known, pushed)
-    if mass == hung.payload:
-        return _Hanging(sensor, known, known)
     try:
-        row = (*_means(sensor, smoothed(t, q, wrench)), mass)
+        read = smoothed(t, q, wrench)
+        pushed = sensor.carrying(known).push(t, read)
+        if pushed is not None or hung is None:
+            return None if pushed is None else _Hanging(sensor, read, known, known, pushed)
+        if mass == hung.payload:
+            return _Hanging(sensor, read, known, known)
+        row = (*_means(sensor, read), mass)
     except NotEnoughData:
         return None
     x, _ = _fitted([row], np.append(hung.links, hung.centre), hung.covariance)
-    return _Hanging(sensor, known, replace(hung, links=x[:4], centre=x[4:]).added(mass))
+    return _Hanging(sensor, read, known, replace(hung, links=x[:4], centre=x[4:]).added(mass))
 
 
 def _means(sensor: WristSensor, read: SmoothReadings) -> tuple[np.ndarray, np.ndarray]:

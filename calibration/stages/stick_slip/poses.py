@@ -38,6 +38,7 @@ from calibration.stages.stick_slip.kernel.together import Carried, walked
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bases_of
 from calibration.stages.stick_slip.model import Direction, StickSlip
+from calibration.stages.stick_slip.standing import Read
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.floor_wrench import Load, elsewhere, motion_load, root_in_base
 from calibration.stages.suspension.model import Source
@@ -86,15 +87,30 @@ def slipping_base_poses(
         NoSuchElement: The model was not fitted from that source.
     """
     rest = rest_of(sources.lab.description, trial, sources.T_base_B)
-    wrenches, links = wrenches_of(sources, trial, rest.T_lab_0, trains), None
-    if trains is not None and sources.robot is not None and len(trial.t_robot):
-        links = links_of(sources.lab, trains, sources.robot, trial, rest.T_lab_0)
-    forcing = forced(model, wrenches, source, links)
+    read = Read(
+        MeasuredTrial.of(sources.lab.description, trial), rest, wrenches_of(sources, trial, rest.T_lab_0, trains)
+    )
+    forcing = driven(model, sources, read, source, trains)
     moment = forcing.force[:, 2:]
     found = (*model.displacement(forcing), moment, friction_use(model, forcing))
     x, variance, moment, use = (interpolate_columns(trial.t_mocap, forcing.t, columns) for columns in found)
     motion = SlippingMotion(x, variance, moment[:, 0], use, model.wheels.names)
     return BasePrediction(rest.poses(x), motion)
+
+
+def driven(
+    model: StickSlip, sources: WrenchSources, read: Read, source: Source, trains: DriveTrains | None
+) -> PlanarForcing:
+    """What drives the base in a trial, by its wrenches and motors alone: not as markers show that it slid.
+
+    Raises:
+        NotEnoughData: The wrench was not recorded.
+        NoSuchElement: The model was not fitted from that source.
+    """
+    links, trial = None, read.trial
+    if trains is not None and sources.robot is not None and len(trial.t_robot):
+        links = links_of(sources.lab, trains, sources.robot, trial, read.rest.T_lab_0)
+    return forced(model, replace(read.wrenches, links=None, slid=None), source, links)
 
 
 class Links(NamedTuple):

@@ -71,15 +71,16 @@ def fit_stick_slip(
     suspension: Suspension,
     arm: Arm | None = None,
     rough: np.ndarray | None = None,
-) -> tuple[StickSlip | None, tuple[Verdict, ...]]:
+) -> tuple[StickSlip | None, list[Read], tuple[Verdict, ...]]:
     """The base by calibration trials in which it is not driven, None where it is not identified, and the findings.
 
-    By inverse dynamics of link angles, where drive trains are known; from rough parameters (15,), where they are.
+    By inverse dynamics of link angles, where drive trains are known; from rough parameters (15,), where they are. Those
+    that show the base are returned as they were read.
     """
     try:
         campaign = campaign_of(sources, trials, suspension, arm)
     except NotEnoughData as error:
-        return None, (Verdict(STAGE, "missing", str(error)),)
+        return None, [], (Verdict(STAGE, "missing", str(error)),)
     wheels, read, usable = campaign.wheels, campaign.read, campaign.by_source
     (source, _, first), *others = usable
     fits = [fit_direction(source, first, searched(first, rough))]
@@ -99,7 +100,7 @@ def fit_stick_slip(
     misplaced = _misplaced(wheels.names, shift, chi2) if directions[0].is_of_wheels else ()
     worth = [_judged(d, own.ids) for d, (_, _, own) in zip(directions, usable, strict=True)]
     findings = (*worth, *misplaced, *_doubted(directions), *_moved(directions[0], usable[0][2].ids))
-    return model, findings
+    return model, read, findings
 
 
 def campaign_of(

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.errors import NotEnoughData
 from calibration.mocap.measured_trial import MeasuredTrial
@@ -107,7 +107,7 @@ def weighed(seconds: Sequence[tuple[Laboratory, Second]], K: np.ndarray | None) 
     A = A * sigma / noise[:, None]
     covariance = np.linalg.inv(A.T @ A + np.eye(len(sigma)))
     found = covariance @ A.T @ ((upright - moved) / noise)
-    likely = (found[:-2] ** 2).sum() < chi2.isf(_UNLIKELY, (1.0 - np.diag(covariance)[:-2]).sum())
+    likely = (found[:-2] ** 2).sum() < chdtri((1.0 - np.diag(covariance)[:-2]).sum(), _UNLIKELY)
     found, left = sigma * found, sigma * np.sqrt(np.diag(covariance))
     bodies = found[:-2].reshape(-1, 4)
     links = LinkMasses(tuple(lab.floating.names)[1:], bodies[:, 0].copy(), bodies[:, 1:].copy())

@@ -6,7 +6,7 @@ import pytest
 
 import mjcf
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.wrist_sensor import hand_push, hung_bodies, wrist_sensor
+from calibration.robot.wrist_sensor import hand_push, hung_bodies, smoothed, wrist_sensor
 from calibration.stages.drive_trains.torques import dynamics
 from calibration.stages.suspension.floor_wrench import motion_load, root_in_base
 from calibration.stages.wrist_load import expected_load
@@ -101,13 +101,13 @@ def test_a_hand_acts_on_the_floor_as_the_sensor_shows_it_to_move(hertz, known, s
         wrist_sensor(LAB.urdf, HUNG),
         dynamics(LAB.urdf, HUNG, np.zeros(8)).root(None) + np.hstack([0.0 * a, a]),
     )
-    hand = sensor.hand(T, q, w + seen, sensor.tree, base if known else None)
+    hand = sensor.hand(T, smoothed(T, q, w + seen), sensor.tree, base if known else None)
     nominal, moved = (motion_load(LAB, T, q, np.eye(4), 20.0, push).signal.x for push in (None, hand))
     acts = seen @ pin.SE3(LAB.chain.poses(Q[None], LINK)[0]).dualAction.T
     rows = slice(150, 350)
     off = (moved - nominal)[rows] - share * acts[rows]
     assert (np.abs(off).max(axis=0) < 0.15 * np.abs(acts).max()).all()
-    assert not hand.outside and sensor.hand(T[:50], q[:50], w[:50], sensor.tree) is None
+    assert not hand.outside and hand_push(LAB.urdf, HUNG, T[:50], q[:50], w[:50]) is None
 
 
 def test_a_hand_on_a_base_that_turns_is_thrown_outwards():
@@ -119,7 +119,10 @@ def test_a_hand_on_a_base_that_turns_is_thrown_outwards():
     V = (root_in_base(LAB.floating, HUNG).inverse() * T_base_sensor).actInv(pin.Motion(np.eye(6)[5]))
     thrown = -np.outer(base[:, 5] ** 2, V.cross(hung() * V).vector)
     seen, sensor = thrown - np.outer(base[:, 11], (hung() * V).vector), wrist_sensor(LAB.urdf, HUNG)
-    hands = sensor.hand(T, q, w + seen, sensor.tree, base), sensor.hand(T, q, w, sensor.tree)
+    hands = (
+        sensor.hand(T, smoothed(T, q, w + seen), sensor.tree, base),
+        sensor.hand(T, smoothed(T, q, w), sensor.tree),
+    )
     moved, still = (motion_load(LAB, T, q, np.eye(4), 20.0, hand).signal.x for hand in hands)
     acts, rows = seen @ T_base_sensor.dualAction.T, slice(120, 380)
     np.testing.assert_allclose((moved - still)[rows], acts[rows], atol=0.05)

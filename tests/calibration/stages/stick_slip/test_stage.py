@@ -72,7 +72,8 @@ def suspension():
 
 
 def fit(trials, suspension, robot=ROBOT, plate=PLATE, description=DESCRIPTION):
-    return fit_stick_slip(laboratory(mjcf.urdf(), description, robot, plate), trials, suspension)
+    model, _, said = fit_stick_slip(laboratory(mjcf.urdf(), description, robot, plate), trials, suspension)
+    return model, said
 
 
 def test_without_joints_the_plate_alone_moves_the_base(recorded, suspension):
