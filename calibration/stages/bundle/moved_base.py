@@ -27,7 +27,7 @@ _SLOWLY = 3.5  # [Hz] below which markers show a base's motion better than a wre
 
 
 class RoughBase(NamedTuple):
-    """How the base moved in each trial that shows it, and parameters (15,) of its wheels, None where none are known."""
+    """How the base moved in each trial that shows it, and parameters (17,) of its wheels, None where none are known."""
 
     moved: Moved
     logarithms: np.ndarray | None = None

@@ -113,7 +113,7 @@ def fit_bundle(
         found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link), _moment_sigma(lab)))
-    base, read = None, []
+    base, read = None, list[Read]()
     if suspension is not None:
         sources = replace(sources, T_base_B=from_vector(hand.base))
         base, read, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)

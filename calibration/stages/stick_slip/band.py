@@ -46,10 +46,11 @@ from scipy.optimize import minimize
 from scipy.special import ndtri, stdtrit
 
 from calibration.numerics.compiled import njit
+from calibration.stages.stick_slip.kernel.bases import FAR
 from calibration.stages.stick_slip.kernel.preloaded import LEFT
 from calibration.stages.stick_slip.likelihood import Trials
 from calibration.stages.stick_slip.measured import blocks
-from calibration.stages.stick_slip.wheels import DRIVES, NAMES
+from calibration.stages.stick_slip.wheels import DRIVES, HELD, NAMES
 
 MEMBERS = 16
 _DRAWS = 64  # from which the members are chosen
@@ -70,7 +71,7 @@ SURE = 10.0  # by which -2 log of the likelihood falls; robots on the model's gr
 _LARGER = np.log([1.0, 2.0, 4.0, 8.0, 16.0])  # u
 TRIED = 0.1  # least share of preloads that is tried
 _HIGHEST = 0.975  # share below the band's upper end
-OTHER, FAR = 0.8, 25.0  # [-] of the most that wheels can be preloaded, [N.m] from the usual load
+OTHER = 0.8  # [-] of the most that wheels can be preloaded, far from the usual load
 _PLAIN, _PLAIN_WIDTH = 0.3, np.array([1.5, 1.5])  # r, and what the logarithms of s and r are uncertain by
 
 
@@ -173,7 +174,7 @@ def ensemble_of(trials: Trials, logarithms: np.ndarray, covariance: np.ndarray) 
     """
     rng = np.random.Generator(np.random.PCG64(len(trials.ids)))
     variances, axes = np.linalg.eigh(covariance)
-    far = rng.standard_normal((_DRAWS, len(logarithms)))
+    far = np.hstack([rng.standard_normal((_DRAWS, n)) for n in (HELD.start, len(logarithms) - HELD.start)])
     root = (axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T  # symmetric: axes may change sign for next to nothing
     draws = logarithms + far @ root
     every = np.concatenate([draws, logarithms[None]])

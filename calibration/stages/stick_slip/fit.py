@@ -38,9 +38,9 @@ class Fitted:
     """Parameters by one source of the wrench.
 
     Attributes:
-        logarithms: (15,) see `wheels.NAMES`.
-        covariance: (15, 15).
-        others: (k, 15) without each of the trials.
+        logarithms: (17,) see `wheels.NAMES`.
+        covariance: (17, 17).
+        others: (k, 17) without each of the trials.
         cost: -2 log of the posterior.
     """
 
@@ -76,7 +76,7 @@ def _scatter(H_k: np.ndarray, g_k: np.ndarray, prior: np.ndarray) -> float:
 
 
 def _one_sided(trials: Trials, best: Point) -> np.ndarray:
-    """Standard deviations (15,) by the side on which a friction goes farther alone; 0 of all but frictions."""
+    """Standard deviations (17,) by the side on which a friction goes farther alone; 0 of all but frictions."""
     sigma, directions = np.zeros(len(best.logarithms)), np.eye(len(best.logarithms))[list(FRICTIONS)]
     steps = np.concatenate([-_REACH[1:], _REACH[1:]])
     points = tried(trials, best.logarithms + np.concatenate([np.outer(steps, axis) for axis in directions]))
@@ -93,7 +93,7 @@ def _without(H: np.ndarray, H_k: np.ndarray, g_k: np.ndarray, longest: np.ndarra
 
 
 def _others(trials: Trials, best: Point, steps: np.ndarray) -> np.ndarray:
-    """Parameters (k, 15) without each trial: as much of its step (k, 15) as the other trials bear best."""
+    """Parameters (k, 17) without each trial: as much of its step (k, 17) as the other trials bear best."""
     at = best.logarithms + np.multiply.outer([0.0, *_PARTS], steps)
     costs = np.empty(at.shape[:2])
     costs[0] = best.cost - trials.costs(best.errors)
@@ -193,7 +193,7 @@ def _preloaded(trials: Trials, p: SlipParameters, x: np.ndarray) -> np.ndarray:
 
 
 def left_out(trials: Trials, others: np.ndarray) -> np.ndarray:
-    """Positions (n, 3) of each trial by the parameters (k, 15) of the others."""
+    """Positions (n, 3) of each trial by the parameters (k, 17) of the others."""
     return np.concatenate([trials.alone(k).simulated(own[None])[0][0] for k, own in enumerate(others)])
 
 

@@ -202,7 +202,7 @@ def _by_window(e: np.ndarray, index: np.ndarray, counts: np.ndarray) -> np.ndarr
 
 
 def bodies(values: np.ndarray, corrected: bool) -> np.ndarray:
-    """(k, 4) as the kernel takes them, by parameters (k, 15) in the order of NAMES."""
+    """(k, 4) as the kernel takes them, by parameters (k, 17) in the order of NAMES."""
     found = np.empty((len(values), 4))
     found[:, :2] = values[:, [NAMES.index("body_c"), NAMES.index("body_cr")]]
     found[:, 2:] = CORRECTION[0] if corrected else 0.0, CORRECTION[1]

@@ -45,9 +45,9 @@ class Direction:
 
     Attributes:
         source: Of the wrench.
-        logarithms: (15,) of the parameters, see `wheels.NAMES`.
-        covariance: (15, 15).
-        ensemble: (e, 15) draws of the posterior, the optimum first.
+        logarithms: (p,) of the parameters, see `wheels.NAMES`; estimates of before have no preloads.
+        covariance: (p, p).
+        ensemble: (e, p) draws of the posterior, the optimum first.
         band: Of the prediction.
         held_out: Trials left out, (k, 3) for x, y, yaw.
         linear: (3,) axes that the compliance predicts better.

@@ -31,7 +31,7 @@ from calibration.stages.stick_slip.forcing import PlanarForcing
 from calibration.stages.stick_slip.likelihood import DIFFERENCE, Trials, joined
 from calibration.stages.stick_slip.measured import PlanarMotion
 from calibration.stages.stick_slip.model import Direction
-from calibration.stages.stick_slip.wheels import NAMES
+from calibration.stages.stick_slip.wheels import FORCE, HELD, NAMES
 
 _LONGEST = 0.7  # step of a logarithm, at most
 _DAMPING = 1e-2, 6.0, 1e-5, 1e5  # at the start, factor, least, most
@@ -53,6 +53,8 @@ _PAIRS = np.array([
     for a, b in product(np.log([0.5, 0.7, 1.3, 1.6]), repeat=2)
 ])  # fmt: skip
 _AS_FAST = 3  # of them side by side: as fast as one
+_HOLDS = np.array([-3.0, -2.0, -1.2, -0.6, 0.6, 1.2, 2.0, 3.0])  # [N] of a drive
+_HINT, _WORTH = 5.0, 12.0  # gain of the cost that is worth a search, and held forces; 7 where there are none
 _SCANNED = (*FRICTIONS, *(i for i, name in enumerate(NAMES) if "_k" in name))
 
 
@@ -147,7 +149,8 @@ def shaken(trials: Trials, best: Point) -> Point:
     while True:
         H_k, _ = trials.normal(best.logarithms, best.errors)
         root = np.linalg.cholesky(np.linalg.inv(H_k.sum(axis=0) + prior.information))
-        draws = _WIDER[:, None] * (rng.standard_normal((len(_WIDER), len(NAMES))) @ root.T)
+        far = np.pad(rng.standard_normal((len(_WIDER), HELD.start)), ((0, 0), (0, len(NAMES) - HELD.start)))
+        draws = _WIDER[:, None] * (far @ root.T)
         new = min(tried(trials, prior.bounded(best.logarithms + np.concatenate([draws, _PAIRS]))), key=lambda p: p.cost)
         for _ in range(_FIRST):
             new = stepped(trials, new)
@@ -190,6 +193,17 @@ def stepped(trials: Trials, at: Point) -> Point:
                 return replace(p, damping=max(d / factor, least), ended=at.cost - p.cost < _GAIN)
         damping = dampings[-1] * factor
     return replace(at, damping=damping, ended=True)
+
+
+def holding(trials: Trials, best: Point) -> tuple[Trials, Point]:
+    """What wheels hold where trials begin as parameters, too, where they are much likelier with it; else as it was."""
+    free = replace(trials, prior=trials.prior.holding)
+    at = np.repeat(best.logarithms[None], len(_HOLDS), axis=0)
+    at[:, HELD] = _HOLDS[:, None] * [1.0, 0.0] / FORCE
+    found = min(tried(free, at), key=lambda p: p.cost)
+    if found.cost < best.cost - _HINT:
+        found = descended(free, found)
+    return (free, found) if found.cost < best.cost - _WORTH else (trials, best)
 
 
 def displaced(trials: Trials, best: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

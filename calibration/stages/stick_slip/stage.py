@@ -31,9 +31,9 @@ from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_motion, pooled_noise, slid
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.poses import Arm, moving_links
-from calibration.stages.stick_slip.search import elsewhere, searched, shifts_of_wheels, warmed
+from calibration.stages.stick_slip.search import elsewhere, holding, searched, shifts_of_wheels, warmed
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
-from calibration.stages.stick_slip.wheels import WheelSet, wheel_set
+from calibration.stages.stick_slip.wheels import FORCE, NAMES, WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import rest_of
@@ -45,6 +45,7 @@ _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _LESS, _BY_CHANCE = 0.1, 0.3  # by which R2 of the plate may be less; where it explains yaw
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
+_HELD, _MUCH = NAMES.index("drive_held"), 1.0  # [N] that move the base by tenths of a millimetre where wheels slip
 _log = logging.getLogger(__name__)
 
 
@@ -74,7 +75,7 @@ def fit_stick_slip(
 ) -> tuple[StickSlip | None, list[Read], tuple[Verdict, ...]]:
     """The base by calibration trials in which it is not driven, None where it is not identified, and the findings.
 
-    By inverse dynamics of link angles, where drive trains are known; from rough parameters (15,), where they are. Those
+    By inverse dynamics of link angles, where drive trains are known; from rough parameters (17,), where they are. Those
     that show the base are returned as they were read.
     """
     try:
@@ -82,9 +83,11 @@ def fit_stick_slip(
     except NotEnoughData as error:
         return None, [], (Verdict(STAGE, "missing", str(error)),)
     wheels, read, usable = campaign.wheels, campaign.read, campaign.by_source
-    (source, _, first), *others = usable
-    fits = [fit_direction(source, first, searched(first, rough))]
-    fits += [fit_direction(source, own, warmed(own, fits[0].logarithms)) for source, _, own in others]
+    (source, rows, first), *others = usable
+    first, best = holding(first, searched(first, rough))
+    usable = [(source, rows, first), *((s, r, replace(own, prior=first.prior)) for s, r, own in others)]
+    fits = [fit_direction(source, first, best)]
+    fits += [fit_direction(source, own, warmed(own, fits[0].logarithms)) for source, _, own in usable[1:]]
     shift, chi2 = shifts_of_wheels(usable[0][2], usable[0][1], fits[0])
     if _behind(fits):
         rows = _rows(sources.lab.description, read, campaign.tilting, "plate", balanced=False)
@@ -121,13 +124,14 @@ def campaign_of(
     wheels = wheel_set(sources.lab.urdf, description.wheels, float(np.linalg.norm(description.gravity)))
     read = _read(sources, trials, suspension, arm)
     tilting, prior = tilting_of(sources, read, wheels, suspension)
-    wheels = replace(wheels, shift=tilting.off)
     by_source = ((source, _rows(description, read, tilting, source)) for source in SOURCES)
     shown = ((source, rows) for source, rows in by_source if len(rows) >= _LEAST_TRIALS)
-    usable = [(source, rows, joined(wheels, rows, prior)) for source, rows in islice(shown, most)]
+    usable = list(islice(shown, most))
     if not usable:
         raise NotEnoughData("no stick-slip base: it takes two trials that show the base and its wrench")
-    return Campaign(wheels, read, tilting, usable)
+    usual = np.median([forcing.drive[0, 4:6] for forcing, _ in usable[0][1]], axis=0)
+    wheels = replace(wheels, shift=tilting.off, usual=usual)
+    return Campaign(wheels, read, tilting, [(source, rows, joined(wheels, rows, prior)) for source, rows in usable])
 
 
 def _read(sources: WrenchSources, trials: Sequence[Trial], suspension: Suspension, arm: Arm | None) -> list[Read]:
@@ -258,6 +262,14 @@ def _moved(direction: Direction, names: Sequence[str]) -> Iterator[Verdict]:
             yield Verdict(STAGE, "warning", message)
 
 
+def _stands(direction: Direction) -> str:
+    """What drives hold where trials begin, where that is much."""
+    held, sigma = direction.parameters.drive_held, FORCE * float(np.sqrt(direction.covariance[_HELD, _HELD]))
+    if not direction.slips.any() or abs(held) < max(_MUCH, 3.0 * sigma):
+        return ""
+    return f"; where trials begin each drive pushes the floor by {held:+.1f} N along x, which front casters hold"
+
+
 def _judged(direction: Direction, names: Sequence[str]) -> Verdict:
     """What the axes are worth on trials that were left out.
 
@@ -272,6 +284,7 @@ def _judged(direction: Direction, names: Sequence[str]) -> Verdict:
         message += f"; linear, as the 6x6 compliance has them: {', '.join(linear)}"
     if direction.source == "plate" and not direction.corrected:
         message += "; the plate's force does not correct it: wheels yield otherwise than by friction"
+    message += _stands(direction)
     still = [a for a, moves in zip(_AXES, direction.moved | direction.linear, strict=True) if not moves]
     if still:
         message += f"; not moved: {', '.join(still)}"

@@ -32,7 +32,7 @@ from calibration.stages.stick_slip.kernel.lifted import on_wheels
 from calibration.stages.stick_slip.wheels import (
     LENGTH,
     LOADS,
-    LOGARITHMS,
+    PLACES,
     PRIOR,
     PRIOR_SIGMA,
     WIDE,
@@ -141,7 +141,7 @@ def _sharing(log_k: np.ndarray, covariance: np.ndarray, place: np.ndarray) -> Pr
     """
     mean, sigma = PRIOR.copy(), PRIOR_SIGMA.copy()
     mean[LOADS], sigma[LOADS] = _RATIOS @ log_k, np.sqrt(np.diag(_RATIOS @ covariance @ _RATIOS.T) + _MODEL**2)
-    sigma[LOGARITHMS:] = place / LENGTH * _BY_SLIPS
+    sigma[PLACES] = place / LENGTH * _BY_SLIPS
     return Prior(mean, sigma)
 
 

@@ -7,6 +7,9 @@ The base's weight is shared as by vertical springs under a rigid base. A wheel c
 the nominal robot: it stands on a tyre in series with its spring, n_i = m_i g (1 - k / k_tyre), k of both; the rest goes
 to all wheels. A wheel that would pull is off the floor. Casters are front or back of the axle of the drives. Priors
 are log-normal and wide, but for the shares of the load where the tilt shows them: nothing here is of one robot.
+
+Where a robot stands, its wheels may hold each other along x: drives and back casters push, front casters against them.
+The first slips let go of that, and leave the base elsewhere. It is fitted where trials show it, see `search.holding`.
 """
 
 from dataclasses import dataclass, field, replace
@@ -22,14 +25,17 @@ from calibration.recording.schema import Wheel
 NAMES = (
     "drive_kx", "drive_ky", "front_k", "back_k", "drive_mu", "front_mu", "back_mu",
     "drive_c", "caster_c", "body_c", "body_cr", "drive_load",
-    "back_load", "load_x", "load_y",
+    "back_load", "load_x", "load_y", "drive_held", "back_held",
 )  # fmt: skip
-LOGARITHMS = NAMES.index("load_x")  # of the coordinates; the others are places
-LENGTH = 0.01  # [m] that counts as 1 beside logarithms
-PRIOR = np.append(np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0]), [0.0, 0.0])
-PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5, 0.2, 0.2])
+LOGARITHMS = NAMES.index("load_x")  # of the coordinates; the others are places and forces
+PLACES, HELD = slice(LOGARITHMS, LOGARITHMS + 2), slice(LOGARITHMS + 2, None)
+LENGTH, FORCE = 0.01, 3.0  # [m, N] that count as 1 beside logarithms
+_SIZES = np.array([LENGTH, LENGTH, FORCE, FORCE])
+PRIOR = np.append(np.log([8e3, 8e3, 16e3, 16e3, 0.6, 0.2, 0.1, 100.0, 100.0, 5.0, 0.5, 1.0, 1.0]), [0.0, 0.0, 0.0, 0.0])
+PRIOR_SIGMA = np.array([1.0, 1.0, 1.0, 1.0, 0.35, 0.7, 0.7, 1.0, 1.0, 1.5, 1.5, 0.5, 0.5, 0.2, 0.2, 1e-3, 1e-3])
 DRIVES = 0.1  # of the logarithm of the drives' friction: a drive slides for hundredths of a second, seldom
 _OWN = 0.8  # 1 - k / k_tyre
+_HOLDING = np.array([0.3, 0.2])  # sigmas of what drives and back casters hold, where that is fitted [FORCE]
 PRELOADS = 16  # ways in which a base may stand before a trial
 PRELOAD = 2.0  # [N] that a wheel may bear at rest; less where it would slip
 LOADS = [NAMES.index("drive_load"), NAMES.index("back_load")]
@@ -39,7 +45,7 @@ _NEAR = 0.01  # [m] between a wheel's declared hub and the joint of the nominal 
 
 @dataclass(frozen=True)
 class Prior:
-    """Normal one of the coordinates: mean and sigma (15,)."""
+    """Normal one of the coordinates: mean and sigma (17,)."""
 
     mean: np.ndarray
     sigma: np.ndarray
@@ -49,8 +55,13 @@ class Prior:
         return float((((at - self.mean) / self.sigma) ** 2).sum())
 
     def bounded(self, at: np.ndarray) -> np.ndarray:
-        """Coordinates (..., 15) within three sigmas."""
+        """Coordinates (..., 17) within three sigmas."""
         return np.clip(at, self.mean - 3.0 * self.sigma, self.mean + 3.0 * self.sigma)
+
+    @property
+    def holding(self) -> "Prior":
+        """The same of wheels that may hold each other where trials begin; else they are taken not to."""
+        return replace(self, sigma=np.append(self.sigma[: HELD.start], _HOLDING))
 
     @property
     def shares(self) -> np.ndarray:
@@ -59,7 +70,7 @@ class Prior:
 
     @cached_property
     def information(self) -> np.ndarray:
-        """(15, 15)."""
+        """(17, 17)."""
         return np.diag(self.sigma**-2.0)
 
 
@@ -86,6 +97,8 @@ class SlipParameters:
         back_load: The same of a back caster [-].
         load_x: How far ahead of where it is counted the load is, and the wheels, on which it is counted, behind [m].
         load_y: How far to the left, and the wheels to the right.
+        drive_held: With which a drive pushes the floor ahead where most trials begin [N], front casters hold it.
+        back_held: The same of a back caster.
     """
 
     drive_kx: float
@@ -103,29 +116,36 @@ class SlipParameters:
     back_load: float
     load_x: float = 0.0
     load_y: float = 0.0
+    drive_held: float = 0.0
+    back_held: float = 0.0
 
     @classmethod
     def of(cls, logarithms: np.ndarray) -> "SlipParameters":
-        """From coordinates (15,), see `values_of`."""
+        """From coordinates (17,), see `values_of`."""
         return cls(*(float(v) for v in values_of(logarithms)))
 
     @property
     def values(self) -> np.ndarray:
-        """(15,) in the order of NAMES."""
+        """(17,) in the order of NAMES."""
         return np.array([getattr(self, name) for name in NAMES])
 
     @property
     def logarithms(self) -> np.ndarray:
-        """(15,) the coordinates of the values."""
+        """(17,) the coordinates of the values."""
         values = self.values
-        return np.append(np.log(values[:LOGARITHMS]), values[LOGARITHMS:] / LENGTH)
+        return np.append(np.log(values[:LOGARITHMS]), values[LOGARITHMS:] / _SIZES)
 
 
 def values_of(logarithms: np.ndarray) -> np.ndarray:
-    """Values (..., 15) in the order of NAMES by coordinates: logarithms, and places of the load in LENGTH."""
-    values = np.exp(logarithms)
-    values[..., LOGARITHMS:] = LENGTH * logarithms[..., LOGARITHMS:]
-    return np.asarray(values)
+    """Values (..., 17) in the order of NAMES by coordinates: logarithms, places in LENGTH, forces in FORCE.
+
+    Estimates of before know no preloads: they have 15.
+    """
+    known = logarithms.shape[-1] - LOGARITHMS
+    values = np.zeros((*logarithms.shape[:-1], len(NAMES)))
+    values[..., :LOGARITHMS] = np.exp(logarithms[..., :LOGARITHMS])
+    values[..., LOGARITHMS : LOGARITHMS + known] = _SIZES[:known] * logarithms[..., LOGARITHMS:]
+    return values
 
 
 @dataclass(frozen=True)
@@ -139,6 +159,7 @@ class WheelSet:
         weight: (m,) their own [N].
         shift: (2,) how far they are from there in the base frame as its markers show it [m].
         radius: (m,) on which they roll as the base tilts [m]; (1,) 0 of estimates that do not have it.
+        usual: (2,) My, -Mx under which most trials of the calibration begin [N.m].
     """
 
     names: tuple[str, ...]
@@ -147,6 +168,7 @@ class WheelSet:
     weight: np.ndarray
     shift: np.ndarray = field(default_factory=lambda: np.zeros(2))
     radius: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    usual: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def __post_init__(self) -> None:
         if not len(self.names) == len(self.types) == len(self.weight):
@@ -160,11 +182,11 @@ class WheelSet:
         return self.weight / STANDARD_GRAVITY
 
     def rows(self, p: SlipParameters) -> np.ndarray:
-        """(m, 12) x, y, kx, ky, c, mu, n, G, mass, r as the kernel takes them."""
+        """(m, 15) x, y, kx, ky, c, mu, n, G, mass, r, held, usual as the kernel takes them."""
         return self.each(p.values[None])[0]
 
     def each(self, values: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
-        """Rows (k, m, 12) by parameters (k, 15) in the order of NAMES; the wheels at places (k, m, 2) if given."""
+        """Rows (k, m, 15) by parameters (k, 17) in the order of NAMES; the wheels at places (k, m, 2) if given."""
         of = dict(zip(NAMES, values.T, strict=True))
         kx, ky = (self._typed(of[drive], of["front_k"], of["back_k"]) for drive in ("drive_kx", "drive_ky"))
         c = self._typed(of["drive_c"], of["caster_c"], of["caster_c"])
@@ -172,10 +194,21 @@ class WheelSet:
         position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
-        own = np.stack([self.mass, np.broadcast_to(self.radius, self.mass.shape)], axis=1)
-        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, np.broadcast_to(own, (*n.shape, 2)))
+        own = [
+            *np.broadcast_arrays(self.mass, self.radius, n)[:2],
+            self._pushing(of["drive_held"], of["back_held"]) / kx,
+        ]
+        own += [np.broadcast_to(m, n.shape) for m in self.usual]
+        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, np.stack(own, axis=2))
         ahead = np.stack([of["load_x"], of["load_y"]], axis=1)[:, None]
         return np.concatenate([position + self.shift - ahead, *parts], axis=2)
+
+    def _pushing(self, drive: np.ndarray, back: np.ndarray) -> np.ndarray:
+        """Forces (k, m) along x [N] in balance, of what drives and back casters hold (k,); 0 without front casters."""
+        drives, fronts, backs = (self.types.count(kind) for kind in ("drive", "front", "back"))
+        if not fronts:
+            return np.zeros((len(drive), len(self.types)))
+        return self._typed(drive, -(drives * drive + backs * back) / fronts, back)
 
     def _typed(self, drive: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
         """(k, m) of each wheel, by numbers (k,) of its type."""

@@ -12,8 +12,9 @@ COLUMNS = 13  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3), acce
 TILTS = 11  # first of the last two
 LANES = 16  # bases side by side
 VECTOR = 8  # lanes that one instruction takes, two of an older processor
-WHEEL, E, U = 18, 10, 12  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), mass, r, see `yielding` (2)
-MASS, RADIUS, YIELDS = 14, 15, 16
+WHEEL, E, U = 21, 10, 12  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), and the next ones
+MASS, RADIUS, HELD, USUAL, YIELDS = 14, 15, 16, 17, 19  # m, r, see `deflect_at_rest` (3), `yielding` (2)
+FAR = 25.0  # [N.m] from the usual load of wheels, at which half of what they hold there is left
 VELOCITY, ACCELERATION = 3, 9  # three rows each of a state
 X, V, DX, STICKS, P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels that stuck plus one, P
 D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, force, wheels that slide, which stick
@@ -54,7 +55,7 @@ def at_rest(
     """Bases at rest.
 
     Args:
-        wheels: (k, m, 12) x, y, kx, ky, c, mu, n, G, mass, r.
+        wheels: (k, m, 15) x, y, kx, ky, c, mu, n, G, mass, r, held, usual.
         bodies: (k, 4), see BODY.
         preload: (k, m, 2) deflections [m]; None: none.
         noise: sigma (3,) of the plate's force, by which bases are judged; None: they are not.

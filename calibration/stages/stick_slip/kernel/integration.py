@@ -8,12 +8,13 @@
 
 Velocities, forces and deflections are in the axes of the base, which turn with yaw, x is in frame 0. f_i is wheel i's
 action on the floor and g_i the base's on the wheel [N]; M is of the robot without wheels. The bushings lean with the
-base, by (rx, ry) from the vertical, which brings a share of what they carry into the floor's plane: N_i less the weight
-m_i G of the wheel; braked, it rolls on its radius r_i, its hub by r_i (ry, -rx). At rest no wheel pushes the floor
-sideways. A wheel whose force would exceed mu_i N_i slides: the force is cut to that length, and u_i is what that
-leaves, implicit in time; how far it slides follows by the trapezoidal rule. The rest is explicit, velocity first
-(symplectic Euler): a step's position is that of the time of its load, its velocity half a step older. Dampers feel
-v + h/2 dv/dt, that of the time of the load: without it they take a hundredth of the inertia away.
+base, by (rx, ry) from the vertical, which brings a share of what they carry into the floor's plane: N_i less the
+weight m_i G of the wheel; braked, it rolls on its radius r_i, its hub by r_i (ry, -rx). At rest wheels push the floor
+sideways by what they hold, see `deflect_at_rest`. A wheel whose force would exceed mu_i N_i slides: the force is cut
+to that length, and u_i is what that leaves, implicit in time; how far it slides follows by the trapezoidal rule. The
+rest is explicit, velocity first (symplectic Euler): a step's position is that of the time of its load, its velocity
+half a step older. Dampers feel v + h/2 dv/dt, that of the time of the load: without it they take a hundredth of the
+inertia away.
 
 A wheel bears where it touches the floor, e_i behind its place under the base and rolled on, by the step before:
 

@@ -14,6 +14,8 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.stages.stick_slip.kernel.bases import (
     BITS,
+    FAR,
+    HELD,
     LANES,
     LEANS,
     LOAD,
@@ -24,6 +26,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     SLID,
     STUCK,
     TILTS,
+    USUAL,
     WHEEL,
     YIELDS,
     D,
@@ -103,13 +106,18 @@ def _sliding(w: np.ndarray, o: int, s: np.ndarray, bit: float, h: float, n: int)
 
 @njit(cache=True, error_model="numpy")
 def deflect_at_rest(wheels: np.ndarray, u: np.ndarray, n: int) -> None:
-    """Deflect flat wheels of n lanes so that none pushes the floor sideways under the drive u (13,) at rest."""
+    """Deflect flat wheels of n lanes so that they push the floor sideways by what they hold under the drive u (13,).
+
+    That is `HELD` [m, along x] under the load that is usual, (My, -Mx) [N.m], and the less the farther u is from it.
+    """
     for i in range(len(wheels) // (WHEEL * LANES)):
         w = wheels[i * WHEEL * LANES : (i + 1) * WHEEL * LANES]
         for l in range(n):
             load = w[6 * LANES + l] + w[7 * LANES + l] * u[3] + w[8 * LANES + l] * u[4] + w[9 * LANES + l] * u[5]
             hangs = max(load, 0.0) - _G * w[MASS * LANES + l]
-            w[E * LANES + l] += hangs * u[7] / w[2 * LANES + l]
+            by_my, by_mx = u[4] - w[USUAL * LANES + l], u[5] - w[(USUAL + 1) * LANES + l]
+            held = w[HELD * LANES + l] * FAR**2 / (FAR**2 + by_my * by_my + by_mx * by_mx)
+            w[E * LANES + l] += hangs * u[7] / w[2 * LANES + l] + held
             w[(E + 1) * LANES + l] -= hangs * u[6] / w[3 * LANES + l]
 
 

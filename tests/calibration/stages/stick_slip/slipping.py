@@ -6,8 +6,9 @@ import numpy as np
 
 from calibration.numerics.signals import RATE
 from calibration.stages.stick_slip.forcing import STEP, STEPS, PlanarForcing
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, F
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, FAR, F
 from calibration.stages.stick_slip.kernel.integration import advance
+from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import Trials, bases_of, joined
 from calibration.stages.stick_slip.measured import PlanarMotion, blocks
 from calibration.stages.stick_slip.wheels import SlipParameters, WheelSet
@@ -61,13 +62,14 @@ def literal(
     M = MASS - sum(m * across(q).T @ across(q) for m, q in zip(WHEELS.mass, WHEELS.position, strict=True))
     x, v, a, more, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
     e, out = -(rows[:, 6] + rows[:, 7:10] @ WEIGHT - WHEELS.weight)[:, None] * leaning(*tilt[0]) / rows[:, 2:4], []
+    e[:, 0] += rows[:, 12] * FAR**2 / (FAR**2 + ((WEIGHT[1:] - WHEELS.usual) ** 2).sum())
     for k, force in enumerate(w):
         load, more = (about(x, WEIGHT) if plate else WEIGHT) + more, np.zeros(3)
         assert np.all(rows[:, 6] + rows[:, 7:10] @ load > 0.0)
         now = v + 0.5 * h * a
         floor, on_base = np.array([p.body_c, p.body_c, p.body_cr]) * now, np.zeros(3)
         slides = np.zeros(len(rows), dtype=bool)
-        for i, (kx, ky, c, mu, n, *G, m, r) in enumerate(rows[:, 2:]):
+        for i, (kx, ky, c, mu, n, *G, m, r) in enumerate(rows[:, 2:12]):
             N, K, A, faster = n + np.dot(G, load), np.array([kx, ky]), across(rows[i, :2] - e[i]), np.zeros(2)
             stuck = e[i] + A @ v * h - 0.5 * h * u[i]
             f = K * stuck + c * A @ now + (N - WHEELS.weight[i]) * leaning(*tilt[k]) + m / h * u[i]
@@ -100,6 +102,7 @@ def slid(  # noqa: PLR0913
     (state,), (wheels,), (lanes,), _ = bases_of(of, p.logarithms[None], False, preload)
     drive, inertia = np.zeros((len(w), COLUMNS)), np.zeros(15)
     drive[:, :3], drive[:, 3:6], inertia[:6] = w, load, mass[np.triu_indices(3)]
+    deflect_at_rest(wheels.reshape(-1), drive[0], lanes)
     x, force = np.empty((len(w), 3)), np.empty((len(w), 3))
     for k in range(len(w)):
         advance(state, wheels, drive[k : k + 1], inertia, STEP, lanes)
@@ -143,7 +146,7 @@ def recorded(
     return one, PlanarMotion(x + sigma * rng.normal(size=x.shape), np.ones(len(x), dtype=bool), sigma)
 
 
-def campaign(n: int, seed: int, plate: bool = True) -> Trials:
+def campaign(n: int, seed: int, plate: bool = True, truth: SlipParameters = TRUTH) -> Trials:
     """n trials."""
     rng = np.random.default_rng(seed)
-    return joined(WHEELS, [recorded(rng, plate=plate) for _ in range(n)])
+    return joined(WHEELS, [recorded(rng, plate=plate, truth=truth) for _ in range(n)])

@@ -6,8 +6,17 @@ import pytest
 
 from calibration.stages.stick_slip.fit import fit_direction, fitted, left_out
 from calibration.stages.stick_slip.likelihood import joined
-from calibration.stages.stick_slip.search import displaced, searched, settled, sketched, tried, warmed
-from calibration.stages.stick_slip.wheels import LOGARITHMS, NAMES, PRIOR, PRIOR_SIGMA, WIDE, SlipParameters
+from calibration.stages.stick_slip.search import displaced, holding, searched, settled, sketched, tried, warmed
+from calibration.stages.stick_slip.wheels import (
+    FORCE,
+    HELD,
+    LOGARITHMS,
+    NAMES,
+    PRIOR,
+    PRIOR_SIGMA,
+    WIDE,
+    SlipParameters,
+)
 from tests.calibration.stages.stick_slip import slipping
 from tests.calibration.stages.stick_slip.slipping import TRUTH
 
@@ -170,3 +179,22 @@ def test_a_base_that_no_step_can_follow_is_far_off(trials):
     last = trials.windows[0] == 3
     for value in (np.nan, np.inf, 1e9):
         assert trials.variances(trials.error(np.full(trials.measured.shape, value)))[last].min() > 0.1**2
+
+
+def test_what_wheels_hold_at_the_start_is_seen_by_where_slips_leave_the_base():
+    """1.5 N a drive move the base by a third of a millimetre as soon as wheels slip; found to half of it or better."""
+    held = replace(TRUTH, drive_held=1.5, back_held=-0.3)
+    trials = slipping.campaign(4, seed=5, truth=held)
+    free, best = holding(trials, warmed(trials, TRUTH.logarithms))
+    found = fitted(free, best)
+    assert abs(found.parameters.drive_held - 1.5) < 0.75 and abs(found.parameters.back_held + 0.3) < 0.75
+    assert 0.02 < FORCE * np.sqrt(found.covariance[HELD, HELD][0, 0]) < 0.3
+    (x, without), _ = trials.simulated(np.array([found.logarithms, np.append(found.logarithms[:-2], [0.0, 0.0])]))
+    (true,), _ = trials.simulated(held.logarithms[None])
+    assert np.abs(x - true)[:, 0].mean() < 0.7 * np.abs(without - true)[:, 0].mean()
+
+
+def test_wheels_that_hold_nothing_are_taken_to_hold_nothing(trials):
+    best = warmed(trials, TRUTH.logarithms)
+    assert holding(trials, best) == (trials, best)
+    np.testing.assert_allclose(fitted(trials, best).logarithms[HELD], 0.0, atol=1e-4)

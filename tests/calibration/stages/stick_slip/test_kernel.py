@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibration.stages.stick_slip.forcing import STEP, STEPS
-from calibration.stages.stick_slip.kernel.bases import COLUMNS, LANES, LEANS, LOAD, TILTS, E, F, at_rest
+from calibration.stages.stick_slip.kernel.bases import COLUMNS, FAR, LANES, LEANS, LOAD, TILTS, E, F, at_rest
 from calibration.stages.stick_slip.kernel.integration import advance, simulated
 from calibration.stages.stick_slip.kernel.wheel_forces import deflect_at_rest
 from calibration.stages.stick_slip.likelihood import bases_of
@@ -23,12 +23,13 @@ def run(one, p=TRUTH, corrected=False, start=None, wheels=WHEELS):
     return x, share
 
 
-def test_the_kernel_is_the_equations_of_its_docstring():
-    w = slipping.push(np.random.default_rng(0), seconds=3.0)
+@pytest.mark.parametrize("held", [(0.0, 0.0), (1.5, -0.4)])
+def test_the_kernel_is_the_equations_of_its_docstring(held):
+    w, p = slipping.push(np.random.default_rng(0), seconds=3.0), replace(TRUTH, drive_held=held[0], back_held=held[1])
     tilt = 2e-3 * np.sin(np.arange(len(w)) * STEP)[:, None] * [1.0, -2.0]
-    true, one = slipping.literal(w, tilt=tilt), slipping.forcing(w)
+    true, one = slipping.literal(w, p, tilt=tilt), slipping.forcing(w)
     one.drive[:, 6:8] = tilt
-    x, share = run(one)
+    x, share = run(one, p)
     np.testing.assert_allclose(x, true.x[STEPS - 1 :: STEPS], atol=2e-9)  # sine and cosine are series
     np.testing.assert_allclose(share, true.slides.reshape(-1, STEPS * 6).mean(axis=1))
     assert 0.01 < share.mean() < 0.9
@@ -161,9 +162,23 @@ def test_a_sprung_base_keeps_its_energy_without_dampers():
     assert abs(np.mean(energy[-100:]) / np.mean(energy[:100]) - 1.0) < 0.005
 
 
+@pytest.mark.parametrize(("off", "share"), [(0.0, 1.0), (FAR, 0.5)])
+def test_wheels_hold_each_other_where_trials_begin_and_half_of_it_far_from_there(off, share):
+    of, load = replace(WHEELS, usual=WEIGHT[1:]), WEIGHT + np.array([0.0, 0.6 * off, -0.8 * off])
+    p = replace(TRUTH, drive_held=1.5, back_held=-0.4)
+    (_, (wheels,), (lanes,), _), drive = bases_of(of, p.logarithms[None], False), np.zeros(COLUMNS)
+    drive[3:6] = load
+    deflect_at_rest(wheels.reshape(-1), drive, lanes)
+    f = wheels[:, E : E + 2, 0] * of.rows(p)[:, 2:4]
+    np.testing.assert_allclose(f[:, 0], share * np.array([1.5, 1.5, -1.1, -1.1, -0.4, -0.4]))
+    np.testing.assert_array_equal(f[:, 1], 0.0)
+    A = np.array([slipping.across(q) for q in POSITION])
+    np.testing.assert_allclose(np.einsum("iab,ia->b", A, f), 0.0, atol=1e-12)
+
+
 def test_a_wheel_carried_back_and_forth_dissipates_what_jenkins_element_does():
     k, mu, N, amplitude, h = 14e3, 0.25, 190.0, 8e-3, 1e-3
-    row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, 0.0, 0.0, 0.0, 0.0, 0.0]]])
+    row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, *np.zeros(8)]]])
     u = amplitude * np.sin(np.linspace(0.0, 4.0 * np.pi, 40001))
     (state,), (wheels,), (lanes,), _ = at_rest(row, np.zeros((1, 4)))
     inertia, force = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0, *np.zeros(9)]), np.zeros(len(u))

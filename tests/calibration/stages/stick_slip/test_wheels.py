@@ -26,9 +26,11 @@ from twin.simulation.setpoints import prepare
 def test_parameters_are_their_logarithms():
     assert SlipParameters.of(TRUTH.logarithms) == SlipParameters.of(SlipParameters.of(TRUTH.logarithms).logarithms)
     np.testing.assert_allclose(SlipParameters.of(PRIOR).logarithms, PRIOR)
-    assert len(NAMES) == len(PRIOR) == 15
-    ahead = replace(TRUTH, load_x=-2e-3, load_y=1e-3)
-    assert SlipParameters.of(ahead.logarithms).load_x == pytest.approx(-2e-3)
+    assert len(NAMES) == len(PRIOR) == 17
+    ahead = replace(TRUTH, load_x=-2e-3, load_y=1e-3, drive_held=0.9, back_held=-0.3)
+    found = SlipParameters.of(ahead.logarithms)
+    np.testing.assert_allclose(found.values[-4:], [-2e-3, 1e-3, 0.9, -0.3])
+    assert SlipParameters.of(ahead.logarithms[:15]) == replace(found, drive_held=0.0, back_held=0.0)
 
 
 def test_the_wheels_bear_the_weight_where_it_is():
@@ -138,6 +140,6 @@ def test_the_wheels_of_a_tilted_twin_bear_its_load_where_they_have_rolled():
 def test_wheels_of_an_estimate_without_their_radius_do_not_roll():
     bare = WheelSet(WHEELS.names, WHEELS.types, POSITION, WHEELS.weight).rows(TRUTH)
     np.testing.assert_array_equal(bare[:, :11], WHEELS.rows(TRUTH)[:, :11])
-    np.testing.assert_array_equal(bare[:, 11], 0.0)
+    np.testing.assert_array_equal(bare[:, 11:], 0.0)
     with pytest.raises(ShapeError, match="radius"):
         replace(WHEELS, radius=np.zeros(2))
