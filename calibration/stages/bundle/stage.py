@@ -162,7 +162,7 @@ def _moved_by(
         return None
 
     found = side_by_side(moved, read)
-    return {one.trial.id: base for one, base in zip(read, found, strict=True) if base is not None}
+    return {one.trial.id: was for one, was in zip(read, found, strict=True) if was is not None}
 
 
 def _completed(  # noqa: PLR0913

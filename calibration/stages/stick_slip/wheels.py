@@ -194,12 +194,9 @@ class WheelSet:
         position = np.broadcast_to(self.position, (len(values), *self.position.shape)) if places is None else places
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
-        own = [
-            *np.broadcast_arrays(self.mass, self.radius, n)[:2],
-            self._pushing(of["drive_held"], of["back_held"]) / kx,
-        ]
-        own += [np.broadcast_to(m, n.shape) for m in self.usual]
-        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, np.stack(own, axis=2))
+        held = self._pushing(of["drive_held"], of["back_held"]) / kx
+        own = np.stack(np.broadcast_arrays(self.mass, self.radius, held, *self.usual), axis=2)
+        parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, own)
         ahead = np.stack([of["load_x"], of["load_y"]], axis=1)[:, None]
         return np.concatenate([position + self.shift - ahead, *parts], axis=2)
 

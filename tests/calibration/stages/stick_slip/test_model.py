@@ -181,3 +181,12 @@ def test_a_model_is_the_same_after_it_was_written(model, new):
     again = restored(StickSlip, json.loads(json.dumps(plain(model))))
     for a, b in zip(model.displacement(new[0]), again.displacement(new[0]), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_an_estimate_of_before_knows_nothing_that_wheels_hold(model, new):
+    content = json.loads(json.dumps(plain(model)))
+    (of,) = content["directions"]
+    of["logarithms"], of["ensemble"] = of["logarithms"][:15], [row[:15] for row in of["ensemble"]]
+    of["covariance"] = [row[:15] for row in of["covariance"][:15]]
+    del content["wheels"]["usual"]
+    np.testing.assert_allclose(restored(StickSlip, content).predict(new[0]).x, model.predict(new[0]).x, atol=2e-6)
