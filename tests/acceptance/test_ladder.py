@@ -38,15 +38,8 @@ INSIDE = {
 }
 OPEN = {  # lines that do not hold, with their sizes in docs/limits.md
     "sampled, pitch",
-    "fixed, ladder of registration plate motor dynamic",
     "fixed, ladder of model_2 plate motor dynamic",
     "fixed, ladder of model_2 measured motor dynamic",
-    "fixed, ladder of model_3 measured motor dynamic",
-    "fixed, band of registration plate dynamic",
-    "sampled, band of full plate dynamic",
-    "sampled, band of full plate static",
-    "sampled, band of model_3 plate dynamic",
-    "sampled, band of model_2 plate dynamic",
 }
 SKILL = {"fixed": (0.95, 0.90), "sampled": (0.88, 0.78)}  # median, worst
 
