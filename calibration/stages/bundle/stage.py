@@ -138,8 +138,9 @@ def _in_use(  # noqa: PLR0913
         return trains, np.zeros(0), np.zeros(0)
 
     def corrected(by: Source | None, trials: Sequence[Trial]) -> list[CorrectedTrial]:
-        shown = [one for one in read if one.trial.id in {trial.id for trial in trials}]
-        bases = moved if base is None or by is None else {**moved, **_moved_by(base, sources, shown, trains, by)}
+        ids = {trial.id for trial in trials}
+        own = [one for one in read if one.trial.id in ids]
+        bases = moved if base is None or by is None else {**moved, **_moved_by(base, sources, own, trains, by)}
         return side_by_side(lambda t: corrected_trial(trains, t, robot, hand, bases.get(t.id)), trials)
 
     shown = corrected(known[0] if known else None, trials)

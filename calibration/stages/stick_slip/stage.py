@@ -33,7 +33,7 @@ from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.poses import Arm, moving_links
 from calibration.stages.stick_slip.search import elsewhere, holding, searched, shifts_of_wheels, warmed
 from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
-from calibration.stages.stick_slip.wheels import FORCE, NAMES, WheelSet, wheel_set
+from calibration.stages.stick_slip.wheels import FORCE, HELD, WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
 from calibration.stages.suspension.rest_frame import rest_of
@@ -45,7 +45,7 @@ _LEAST_TRIALS, _LEAST_WHEELS = 2, 3
 _LESS, _BY_CHANCE = 0.1, 0.3  # by which R2 of the plate may be less; where it explains yaw
 _ALIKE = 0.5  # chi-square over that of the likeliest wheel: either may be it
 _FAR, _TURNED = 5e-3, 0.05  # rms [m, rad] beyond which slip does not leave a base
-_HELD, _MUCH = NAMES.index("drive_held"), 1.0  # [N] that move the base by tenths of a millimetre where wheels slip
+_MUCH = 1.0  # [N] that move the base by tenths of a millimetre where wheels slip
 _log = logging.getLogger(__name__)
 
 
@@ -264,7 +264,7 @@ def _moved(direction: Direction, names: Sequence[str]) -> Iterator[Verdict]:
 
 def _stands(direction: Direction) -> str:
     """What drives hold where trials begin, where that is much."""
-    held, sigma = direction.parameters.drive_held, FORCE * float(np.sqrt(direction.covariance[_HELD, _HELD]))
+    held, sigma = direction.parameters.drive_held, FORCE * float(np.sqrt(direction.covariance[HELD.start, HELD.start]))
     if not direction.slips.any() or abs(held) < max(_MUCH, 3.0 * sigma):
         return ""
     return f"; where trials begin each drive pushes the floor by {held:+.1f} N along x, which front casters hold"

@@ -97,7 +97,7 @@ class SlipParameters:
         back_load: The same of a back caster [-].
         load_x: How far ahead of where it is counted the load is, and the wheels, on which it is counted, behind [m].
         load_y: How far to the left, and the wheels to the right.
-        drive_held: With which a drive pushes the floor ahead where most trials begin [N], front casters hold it.
+        drive_held: Force by which a drive pushes the floor ahead where most trials begin, held by front casters [N].
         back_held: The same of a back caster.
     """
 
