@@ -52,18 +52,31 @@ def by_loads(trains: DriveTrains, trial: Trial, loads: LinkLoads) -> CorrectedTr
 
 
 def by_link_encoders(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:
-    """The trial with link angles read by the link encoders where they have one and were identified.
+    """The trial with link angles read by the link encoders where they have one and were identified."""
+    q = read_at_links(trains, corrected.trial.q_link, corrected.trial.q_motor)
+    return replace(corrected, trial=replace(corrected.trial, q_motor=q))
+
+
+def read_at_links(trains: DriveTrains, q_link: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Link angles (n, k) by readings q_link (n, k) of link encoders that were identified; q (n, k) where none reads.
 
     q = q_link + offset - offset_l - e_l(theta)            offset the zero of the motor's readings
     """
-    rows, q = np.isfinite(corrected.trial.q_link), corrected.trial.q_motor.copy()
-    known = np.isfinite(q).all(axis=1)
+    found, known = q.copy(), np.isfinite(q).all(axis=1)
     for train in (train for train in trains.trains if np.isfinite(train.link).all()):
         j = trains.joints.index(train.joint)
-        read = known & rows[:, j]
-        angle = corrected.trial.q_link[read, j] - train.link[0]
-        q[read, j] = angle + trains.dynamics.offset[j] - harmonic_terms(angle) @ train.link[1:]
-    return replace(corrected, trial=replace(corrected.trial, q_motor=q))
+        read = known & np.isfinite(q_link[:, j])
+        angle = q_link[read, j] - train.link[0]
+        found[read, j] = angle + trains.dynamics.offset[j] - harmonic_terms(angle) @ train.link[1:]
+    return found
+
+
+def shown_by_links(trains: DriveTrains, q_link: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """The same by encoders of which no reading is missing: a link's angle that jumps from one to the other accelerates.
+
+    In a jolt a link accelerates by a third otherwise than its drive train predicts, arm_1's above all.
+    """
+    return read_at_links(trains, np.where(np.isfinite(q_link).all(axis=0), q_link, np.nan), q)
 
 
 def seen_by_links(trains: DriveTrains, corrected: CorrectedTrial) -> CorrectedTrial:

@@ -17,6 +17,7 @@ from calibration.numerics.signals import RATE, Signal, even, interpolate_columns
 from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
+from calibration.stages.drive_trains.corrected_trial import shown_by_links
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.link_streams import Q, V
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved
@@ -169,10 +170,12 @@ class Arm(NamedTuple):
 
 
 def moving_links(lab: Laboratory, arm: Arm, robot: Clock, trial: MeasuredTrial, rest: Rest) -> Load:
-    """Inverse dynamics of links that move with the base as it is predicted, or else as its markers show it."""
+    """Inverse dynamics of links as their encoders show them; else on the base as it is predicted, or by its markers."""
     links, moved = links_of(lab, arm.trains, robot, trial, rest.T_lab_0), arm.moved.get(trial.id)
-    T_lab_B = trial.base.T if moved is None else moved.T_lab_B
-    return links.load(trial.t_mocap, T_lab_B @ inverse(rest.T_0_B))
+    T_lab_base = (trial.base.T if moved is None else moved.T_lab_B) @ inverse(rest.T_0_B)
+    angles = links.trains.likely(links.loads(trial.t_mocap, T_lab_base))
+    read = trial.q_link[np.isfinite(trial.q_motor).all(axis=1)]
+    return links.load(trial.t_mocap, T_lab_base, shown_by_links(links.trains, read, angles))
 
 
 def upright(T_lab_base: np.ndarray, T_lab_0: np.ndarray) -> np.ndarray:
@@ -287,8 +290,9 @@ def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:
     for k, drive in enumerate(forcing.drive.reshape(len(e), STEPS, -1)):
         advance(base.state[0], base.wheels[0], drive, forcing.inertia[k], STEP, base.lanes[0])
         e[k], load[k] = base.deflection(0), base.state[0, LOAD : LOAD + 3, 0]
-    drive, N = forcing.drive[STEPS - 1 :: STEPS], np.maximum(rows[:, 6] + load @ rows[:, 7:10].T, 0.0)
+    drive = forcing.drive[STEPS - 1 :: STEPS]
     leans = np.stack([-drive[:, 7], drive[:, 6]], axis=1)[:, None]
+    N = np.maximum(rows[:, 6] + load @ rows[:, 7:10].T + rows[:, 15] * (leans * e).sum(axis=2), 0.0)
     force = rows[:, 2:4] * e + (N - model.wheels.weight)[..., None] * leans
     used, limit = np.linalg.norm(force, axis=2), rows[:, 5] * N
     return np.minimum(np.divide(used, limit, out=np.ones_like(used), where=limit > 0.0), 1.0)

@@ -32,7 +32,7 @@ from calibration.stages.stick_slip.measured import PlanarMotion, blocks, planar_
 from calibration.stages.stick_slip.model import EXPLAINED, Direction, StickSlip
 from calibration.stages.stick_slip.poses import Arm, moving_links
 from calibration.stages.stick_slip.search import elsewhere, holding, searched, shifts_of_wheels, warmed
-from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of
+from calibration.stages.stick_slip.standing import SOURCES, Read, tilting_of, vertical_stiffness
 from calibration.stages.stick_slip.wheels import FORCE, HELD, WheelSet, wheel_set
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.model import Source, Suspension
@@ -130,7 +130,8 @@ def campaign_of(
     if not usable:
         raise NotEnoughData("no stick-slip base: it takes two trials that show the base and its wrench")
     usual = np.median([forcing.drive[0, 4:6] for forcing, _ in usable[0][1]], axis=0)
-    wheels = replace(wheels, shift=tilting.off, usual=usual)
+    stiffness = vertical_stiffness(wheels, tilting, prior)
+    wheels = replace(wheels, shift=tilting.off, usual=usual, vertical=stiffness)
     return Campaign(wheels, read, tilting, [(source, rows, joined(wheels, rows, prior)) for source, rows in usable])
 
 

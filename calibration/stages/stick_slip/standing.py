@@ -99,6 +99,12 @@ def _prior(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
     return prior_by_tilt(wheels, K[np.ix_(HEAVE, HEAVE)], place)
 
 
+def vertical_stiffness(wheels: WheelSet, tilting: Tilting, prior: Prior) -> float:
+    """Of a front caster [N/m], by the stiffness of roll about wheels that share the load; 0 where no tilt shows it."""
+    drives, backs = tilting.shares
+    return 0.0 if prior is WIDE else float(tilting.K[3, 3] / wheels.tilting(np.array([drives, 1.0, backs]))[1, 1])
+
+
 def prior_by_tilt(wheels: WheelSet, K: np.ndarray, place: np.ndarray) -> Prior:
     """The wide prior, its shares of the load by the stiffness K (3, 3) of z, rx, ry [N/m, N, N.m/rad].
 

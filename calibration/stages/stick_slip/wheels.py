@@ -160,6 +160,7 @@ class WheelSet:
         shift: (2,) how far they are from there in the base frame as its markers show it [m].
         radius: (m,) on which they roll as the base tilts [m]; (1,) 0 of estimates that do not have it.
         usual: (2,) My, -Mx under which most trials of the calibration begin [N.m].
+        vertical: Stiffness of a front caster, its tyre's included [N/m]; 0 where no tilt shows it.
     """
 
     names: tuple[str, ...]
@@ -169,6 +170,7 @@ class WheelSet:
     shift: np.ndarray = field(default_factory=lambda: np.zeros(2))
     radius: np.ndarray = field(default_factory=lambda: np.zeros(1))
     usual: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    vertical: float = field(default_factory=lambda: 0.0)
 
     def __post_init__(self) -> None:
         if not len(self.names) == len(self.types) == len(self.weight):
@@ -182,11 +184,11 @@ class WheelSet:
         return self.weight / STANDARD_GRAVITY
 
     def rows(self, p: SlipParameters) -> np.ndarray:
-        """(m, 15) x, y, kx, ky, c, mu, n, G, mass, r, held, usual as the kernel takes them."""
+        """(m, 16) x, y, kx, ky, c, mu, n, G, mass, r, held, usual, kz as the kernel takes them."""
         return self.each(p.values[None])[0]
 
     def each(self, values: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
-        """Rows (k, m, 15) by parameters (k, 17) in the order of NAMES; the wheels at places (k, m, 2) if given."""
+        """Rows (k, m, 16) by parameters (k, 17) in the order of NAMES; the wheels at places (k, m, 2) if given."""
         of = dict(zip(NAMES, values.T, strict=True))
         kx, ky = (self._typed(of[drive], of["front_k"], of["back_k"]) for drive in ("drive_kx", "drive_ky"))
         c = self._typed(of["drive_c"], of["caster_c"], of["caster_c"])
@@ -195,7 +197,8 @@ class WheelSet:
         n, G = self._loads(position, of["drive_load"], of["back_load"])
         G[..., 0] += G[..., 1] * of["load_x"][:, None] + G[..., 2] * of["load_y"][:, None]
         held = self._pushing(of["drive_held"], of["back_held"]) / kx
-        own = np.stack(np.broadcast_arrays(self.mass, self.radius, held, *self.usual), axis=2)
+        kz = self.vertical * self._typed(of["drive_load"], np.ones(len(values)), of["back_load"])
+        own = np.stack(np.broadcast_arrays(self.mass, self.radius, held, *self.usual, kz), axis=2)
         parts = (*(x[..., None] for x in (kx, ky, c, mu, n)), G, own)
         ahead = np.stack([of["load_x"], of["load_y"]], axis=1)[:, None]
         return np.concatenate([position + self.shift - ahead, *parts], axis=2)

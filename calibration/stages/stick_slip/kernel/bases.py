@@ -12,8 +12,8 @@ COLUMNS = 13  # of `drive`: w (3), -Fz, My, -Mx, rx, ry, plate's force (3), acce
 TILTS = 11  # first of the last two
 LANES = 16  # bases side by side
 VECTOR = 8  # lanes that one instruction takes, two of an older processor
-WHEEL, E, U = 21, 10, 12  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), and the next ones
-MASS, RADIUS, HELD, USUAL, YIELDS = 14, 15, 16, 17, 19  # m, r, see `deflect_at_rest` (3), `yielding` (2)
+WHEEL, E, U = 22, 10, 12  # rows of a wheel: x, y, kx, ky, c, mu, n, G (3), e (2), u (2), and the next ones
+MASS, RADIUS, HELD, USUAL, VERTICAL, YIELDS = 14, 15, 16, 17, 19, 20  # m, r, see `deflect_at_rest` (3), kz, `yielding`
 FAR = 25.0  # [N.m] from the usual load of wheels, at which half of what they hold there is left
 VELOCITY, ACCELERATION = 3, 9  # three rows each of a state
 X, V, DX, STICKS, P = 0, VELOCITY, 6, 12, 13  # x, v, correction to come, wheels that stuck plus one, P
@@ -21,7 +21,8 @@ D, LOAD, F, SLID, BITS = 19, 22, 25, 28, 29  # of the step: d, -Fz, My, -Mx, for
 BODY = 30  # dampers of the base [N.s/m, N.m.s/rad], g [1/s] (0: no plate) and l [-]
 LEANS, PULL, W = 34, 36, 37  # sum N e (2), sum of N < 0, what wheels that accelerate add to the force (3)
 STUCK, NOW = 40, 43  # force of a wheel that sticks (2), its load; v at the time of the load
-UNLIKELY, MISSED, NOISE, ROWS = 46, 47, 50, 53  # see `preloaded`, `informed`; 1 / (2 sigma), 0: not judged
+UNLIKELY, MISSED, NOISE = 46, 47, 50  # see `preloaded`, `informed`; 1 / (2 sigma), 0: not judged
+LESS, ROWS = 53, 54  # what wheels bear less as they deflect on a base that leans [N]
 
 
 class Bases(NamedTuple):
@@ -46,7 +47,7 @@ class Bases(NamedTuple):
 
 def judge(state: np.ndarray, noise: np.ndarray) -> None:
     """Let states (groups, ROWS, LANES) be judged by a plate's force, sigma (3,) [N, N, N.m]."""
-    state[:, NOISE:ROWS] = 0.5 / noise[:, None]
+    state[:, NOISE:LESS] = 0.5 / noise[:, None]
 
 
 def at_rest(
@@ -55,7 +56,7 @@ def at_rest(
     """Bases at rest.
 
     Args:
-        wheels: (k, m, 15) x, y, kx, ky, c, mu, n, G, mass, r, held, usual.
+        wheels: (k, m, 16) x, y, kx, ky, c, mu, n, G, mass, r, held, usual, kz.
         bodies: (k, 4), see BODY.
         preload: (k, m, 2) deflections [m]; None: none.
         noise: sigma (3,) of the plate's force, by which bases are judged; None: they are not.

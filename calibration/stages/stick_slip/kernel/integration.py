@@ -20,7 +20,12 @@ A wheel bears where it touches the floor, e_i behind its place under the base an
 
     (My, -Mx) <- (My, -Mx) + sum_i N_i (e_i - r_i (ry, -rx))
 
-and does not pull, see `lifted`. A force plate stands still: (My, -Mx) about the base is
+and does not pull, see `lifted`. On a base that leans its vertical spring, of stiffness k, is let out as its hub goes
+where the base is higher, and all wheels bear what it bears less, p_i = k_i (ry e_ix - rx e_iy):
+
+    N_i <- N_i - p_i,    (-Fz, My, -Mx) <- (-Fz, My, -Mx) + sum_i p_i (1, x_i, y_i)
+
+4 N of a drive that is 8 mm behind, in a jolt. A force plate stands still: (My, -Mx) about the base is
 R(yaw)' ((My, -Mx)_0 + Fz (x, y)). Seven millimetres move 10 N from one drive to the other.
 
 With a force plate the position is corrected, see `corrector`, and bases may be judged by what it measures, F, beside
@@ -40,6 +45,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     DX,
     LANES,
     LEANS,
+    LESS,
     LOAD,
     MISSED,
     NOISE,
@@ -78,7 +84,7 @@ def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         pitching = my + my0 * a0 + my1 * a1 + my2 * a2 - moved * z * s[X * LANES + l]
         rolling = mx + mx0 * a0 + mx1 * a1 + mx2 * a2 - moved * z * s[(X + 1) * LANES + l]
         yaw = moved * s[(X + 2) * LANES + l]
-        s[LOAD * LANES + l] = z + z0 * a0 + z1 * a1 + z2 * a2
+        s[LOAD * LANES + l] = z + z0 * a0 + z1 * a1 + z2 * a2 + s[LESS * LANES + l]
         s[(LOAD + 1) * LANES + l] = pitching + yaw * rolling + s[LEANS * LANES + l]
         s[(LOAD + 2) * LANES + l] = rolling - yaw * pitching + s[(LEANS + 1) * LANES + l]
         v0, v1 = s[V * LANES + l] + 0.5 * h * a0, s[(V + 1) * LANES + l] + 0.5 * h * a1
@@ -88,7 +94,7 @@ def _begun(s: np.ndarray, u: np.ndarray, inertia: np.ndarray, h: float, n: int) 
         s[(F + 1) * LANES + l] = s[BODY * LANES + l] * v1
         s[(F + 2) * LANES + l] = s[(BODY + 1) * LANES + l] * v2
         s[BITS * LANES + l] = 1.0
-        s[LEANS * LANES + l] = s[(LEANS + 1) * LANES + l] = 0.0
+        s[LEANS * LANES + l] = s[(LEANS + 1) * LANES + l] = s[LESS * LANES + l] = 0.0
         s[W * LANES + l] = s[(W + 1) * LANES + l] = s[(W + 2) * LANES + l] = 0.0
         pull += 1 if s[PULL * LANES + l] < 0.0 else 0
     return pull
@@ -180,7 +186,7 @@ def _advance(  # noqa: PLR0913
         if _begun(s, u, inertia, h, n) > 0:
             for l in range(n):
                 if s[PULL * LANES + l] < 0.0:
-                    lifted(wheels, s, l)
+                    lifted(wheels, s, u, l)
                     s[PULL * LANES + l] = 0.0
         on_wheels(wheels, s, u, h, n)
         if s[(BODY + 2) * LANES] > 0.0:

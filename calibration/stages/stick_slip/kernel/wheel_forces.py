@@ -18,6 +18,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     HELD,
     LANES,
     LEANS,
+    LESS,
     LOAD,
     MASS,
     NOW,
@@ -27,6 +28,7 @@ from calibration.stages.stick_slip.kernel.bases import (
     STUCK,
     TILTS,
     USUAL,
+    VERTICAL,
     WHEEL,
     YIELDS,
     D,
@@ -49,30 +51,32 @@ def on_wheels(w: np.ndarray, s: np.ndarray, u: np.ndarray, h: float, n: int) -> 
         o, bit, slide = i * WHEEL * LANES, float(1 << i), 0
         for l in range(n):
             k = o + l
-            px, py, c = w[k], w[k + LANES], w[k + 4 * LANES]
+            px, py, ux, uy = w[k], w[k + LANES], w[k + U * LANES], w[k + (U + 1) * LANES]
+            c, kz, turn, spin = (
+                w[k + 4 * LANES], w[k + VERTICAL * LANES], s[(D + 2) * LANES + l], s[(NOW + 2) * LANES + l]
+            )  # fmt: skip
             d3, d4, d5 = s[LOAD * LANES + l], s[(LOAD + 1) * LANES + l], s[(LOAD + 2) * LANES + l]
-            load = w[k + 6 * LANES] + w[k + 7 * LANES] * d3 + w[k + 8 * LANES] * d4 + w[k + 9 * LANES] * d5
+            less = kz * (ry * w[k + E * LANES] - rx * w[k + (E + 1) * LANES])
+            load = w[k + 6 * LANES] + w[k + 7 * LANES] * d3 + w[k + 8 * LANES] * d4 + w[k + 9 * LANES] * d5 - less
             N = max(load, 0.0)
-            turn, spin = s[(D + 2) * LANES + l], s[(NOW + 2) * LANES + l]
-            mass, ux, uy = w[k + MASS * LANES] * rate, w[k + U * LANES], w[k + (U + 1) * LANES]
-            qx, qy, hangs = px - w[k + E * LANES], py - w[k + (E + 1) * LANES], N - _G * w[k + MASS * LANES]
+            r, m = w[k + RADIUS * LANES], w[k + MASS * LANES]
+            qx, qy, hangs = px - w[k + E * LANES], py - w[k + (E + 1) * LANES], N - _G * m
             ex = w[k + E * LANES] + s[D * LANES + l] - turn * qy - half * ux
             ey = w[k + (E + 1) * LANES] + s[(D + 1) * LANES + l] + turn * qx - half * uy
-            r, rolls = w[k + RADIUS * LANES], w[k + MASS * LANES] * w[k + RADIUS * LANES]
-            by_ry, by_rx = hangs * ry + rolls * ay, hangs * rx + rolls * ax
-            fx = w[k + 2 * LANES] * ex + c * (s[NOW * LANES + l] - spin * qy) - by_ry + mass * ux
-            fy = w[k + 3 * LANES] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + by_rx + mass * uy
+            by_ry, by_rx = hangs * ry + m * r * ay, hangs * rx + m * r * ax
+            fx = w[k + 2 * LANES] * ex + c * (s[NOW * LANES + l] - spin * qy) - by_ry + rate * m * ux
+            fy = w[k + 3 * LANES] * ey + c * (s[(NOW + 1) * LANES + l] + spin * qx) + by_rx + rate * m * uy
             w[k + E * LANES], w[k + (E + 1) * LANES] = ex, ey
             s[STUCK * LANES + l], s[(STUCK + 1) * LANES + l], s[(STUCK + 2) * LANES + l] = fx, fy, N
-            s[LEANS * LANES + l] += N * (ex - r * ry)
-            s[(LEANS + 1) * LANES + l] += N * (ey + r * rx)
+            s[LESS * LANES + l] += less
+            s[LEANS * LANES + l] += N * (ex - r * ry) + less * px
+            s[(LEANS + 1) * LANES + l] += N * (ey + r * rx) + less * py
             s[PULL * LANES + l] += min(load, 0.0)
             s[F * LANES + l] += fx
             s[(F + 1) * LANES + l] += fy
             s[(F + 2) * LANES + l] += (px - ex) * fy - (py - ey) * fx
             s[BITS * LANES + l] += bit
-            limit = w[k + 5 * LANES] * N
-            slide += 1 if (fx * fx + fy * fy > limit * limit) | (ux != 0.0) | (uy != 0.0) else 0
+            slide += 1 if (fx * fx + fy * fy > (w[k + 5 * LANES] * N) ** 2) | (ux != 0.0) | (uy != 0.0) else 0
         if slide > 0:
             _sliding(w, o, s, bit, h, n)
 

@@ -5,7 +5,12 @@ import numpy as np
 import mjcf
 from calibration.inference.parameters import Model, Parameter
 from calibration.stages.drive_trains.column_bending import ColumnBending
-from calibration.stages.drive_trains.corrected_trial import CorrectedTrial, by_link_encoders, seen_by_links
+from calibration.stages.drive_trains.corrected_trial import (
+    CorrectedTrial,
+    by_link_encoders,
+    seen_by_links,
+    shown_by_links,
+)
 from calibration.stages.drive_trains.drive_train import HARMONICS, DriveTrain, Quantity, harmonic_terms
 from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.geometry_refit import referred
@@ -30,6 +35,8 @@ def test_offset_and_eccentricity_are_removed_where_a_link_encoder_reads():
     np.testing.assert_allclose(found[10:, COLUMN], (theta + zero)[10:, COLUMN], atol=1e-5)  # phase off by the offset
     np.testing.assert_array_equal(found[:10], behind[:10])
     np.testing.assert_array_equal(np.delete(found, COLUMN, axis=1), np.delete(behind, COLUMN, axis=1))
+    np.testing.assert_array_equal(shown_by_links(trains, read, behind), behind)  # a link does not jump
+    np.testing.assert_array_equal(shown_by_links(trains, read[10:], behind[10:]), found[10:])
 
 
 def test_the_geometry_is_of_angles_that_link_encoders_read_where_they_do():

@@ -55,22 +55,23 @@ def leaning(rx: float, ry: float) -> np.ndarray:
 
 
 def literal(
-    w: np.ndarray, p: SlipParameters = TRUTH, h: float = STEP, tilt: np.ndarray | None = None, plate: bool = False
+    w: np.ndarray, p: SlipParameters = TRUTH, tilt: np.ndarray | None = None, plate: bool = False, of: WheelSet = WHEELS
 ) -> Motion:
     """The equations of `integration` by its docstring, under w (n, 3); a plate reads the load, corrects nothing."""
-    rows, tilt = WHEELS.rows(p), np.zeros((len(w), 2)) if tilt is None else tilt
+    rows, tilt, h = of.rows(p), np.zeros((len(w), 2)) if tilt is None else tilt, STEP
     M = MASS - sum(m * across(q).T @ across(q) for m, q in zip(WHEELS.mass, WHEELS.position, strict=True))
     x, v, a, more, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((len(rows), 2))
     e, out = -(rows[:, 6] + rows[:, 7:10] @ WEIGHT - WHEELS.weight)[:, None] * leaning(*tilt[0]) / rows[:, 2:4], []
     e[:, 0] += rows[:, 12] * FAR**2 / (FAR**2 + ((WEIGHT[1:] - WHEELS.usual) ** 2).sum())
     for k, force in enumerate(w):
         load, more = (about(x, WEIGHT) if plate else WEIGHT) + more, np.zeros(3)
-        assert np.all(rows[:, 6] + rows[:, 7:10] @ load > 0.0)
+        less = rows[:, 15] * (e @ -leaning(*tilt[k]))
+        assert np.all(rows[:, 6] + rows[:, 7:10] @ load > less)
         now = v + 0.5 * h * a
         floor, on_base = np.array([p.body_c, p.body_c, p.body_cr]) * now, np.zeros(3)
         slides = np.zeros(len(rows), dtype=bool)
         for i, (kx, ky, c, mu, n, *G, m, r) in enumerate(rows[:, 2:12]):
-            N, K, A, faster = n + np.dot(G, load), np.array([kx, ky]), across(rows[i, :2] - e[i]), np.zeros(2)
+            N, K, A, faster = n + np.dot(G, load) - less[i], np.array([kx, ky]), across(rows[i, :2] - e[i]), np.zeros(2)
             stuck = e[i] + A @ v * h - 0.5 * h * u[i]
             f = K * stuck + c * A @ now + (N - WHEELS.weight[i]) * leaning(*tilt[k]) + m / h * u[i]
             at = across(rows[i, :2] - stuck)
@@ -81,6 +82,7 @@ def literal(
             e[i] = stuck - 0.5 * h * faster
             u[i] = faster
             more[1:] += N * (e[i] + r * leaning(*tilt[k]))
+            more += less[i] * np.array([1.0, *rows[i, :2]])
             floor, on_base = floor + at.T @ f, on_base + at.T @ (g - f)
         yaw = x[2] + 0.5 * h * v[2]
         x = x + h * np.array([np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1], v[2]])

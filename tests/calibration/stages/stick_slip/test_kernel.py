@@ -23,13 +23,14 @@ def run(one, p=TRUTH, corrected=False, start=None, wheels=WHEELS):
     return x, share
 
 
-@pytest.mark.parametrize("held", [(0.0, 0.0), (1.5, -0.4)])
-def test_the_kernel_is_the_equations_of_its_docstring(held):
+@pytest.mark.parametrize(("held", "vertical"), [((0.0, 0.0), 0.0), ((1.5, -0.4), 0.0), ((0.0, 0.0), 1.4e5)])
+def test_the_kernel_is_the_equations_of_its_docstring(held, vertical):
+    of = replace(WHEELS, vertical=vertical)
     w, p = slipping.push(np.random.default_rng(0), seconds=3.0), replace(TRUTH, drive_held=held[0], back_held=held[1])
     tilt = 2e-3 * np.sin(np.arange(len(w)) * STEP)[:, None] * [1.0, -2.0]
-    true, one = slipping.literal(w, p, tilt=tilt), slipping.forcing(w)
+    true, one = slipping.literal(w, p, tilt=tilt, of=of), slipping.forcing(w)
     one.drive[:, 6:8] = tilt
-    x, share = run(one, p)
+    x, share = run(one, p, wheels=of)
     np.testing.assert_allclose(x, true.x[STEPS - 1 :: STEPS], atol=2e-9)  # sine and cosine are series
     np.testing.assert_allclose(share, true.slides.reshape(-1, STEPS * 6).mean(axis=1))
     assert 0.01 < share.mean() < 0.9
@@ -91,6 +92,22 @@ def test_where_wheels_are_off_the_floor_the_others_bear_the_load(load):
     np.testing.assert_allclose([N.sum(), N @ POSITION[:, 0], N @ POSITION[:, 1]], load, rtol=1e-9, atol=1e-9)
     springs = np.linalg.lstsq(np.column_stack([np.ones(6), POSITION])[N > 0], (N - rows[:, 6])[N > 0] / SHARES[N > 0])
     np.testing.assert_allclose(springs[1], 0.0, atol=1e-9)  # as springs under a rigid base have it
+
+
+@pytest.mark.parametrize("load", [(730.0, 20.0, 3.0), (730.0, 95.0, 0.0)])
+def test_wheels_left_behind_by_a_base_that_leans_bear_as_springs_that_stand_elsewhere_under_it(load):
+    of, (rx, ry) = replace(WHEELS, vertical=1.4e5, radius=np.zeros(6)), (-2e-3, 4e-3)
+    e = 5e-3 * np.random.default_rng(2).normal(size=(6, 2))
+    ((state,), (wheels,), (lanes,), _), rows = bases_of(of, STUCK.logarithms[None], False, e[None]), of.rows(STUCK)
+    drive, inertia = np.zeros((9, COLUMNS)), np.concatenate([1e9 * np.eye(3)[np.triu_indices(3)], np.zeros(9)])
+    drive[:, 3:6], drive[:, 6:8] = load, (rx, ry)
+    advance(state, wheels, drive, inertia, STEP, lanes)
+    N = np.maximum(rows[:, 6] + rows[:, 7:10] @ state[LOAD : LOAD + 3, 0] - rows[:, 15] * (e @ [ry, -rx]), 0.0)
+    assert (N == 0.0).any() == (load[1] > 50.0)
+    np.testing.assert_allclose([N.sum(), *(N @ (POSITION - e))], load, rtol=1e-5, atol=1e-3)
+    springs, on = np.column_stack([np.ones(6), POSITION]), N > 0.0
+    pressed = (N - rows[:, 6]) / (of.vertical * SHARES) + e @ [ry, -rx]  # by the base, where the wheel was
+    np.testing.assert_allclose(np.linalg.lstsq(springs[on], pressed[on])[1], 0.0, atol=1e-15)
 
 
 def test_a_wheel_bears_where_it_touches_the_floor():
@@ -178,7 +195,7 @@ def test_wheels_hold_each_other_where_trials_begin_and_half_of_it_far_from_there
 
 def test_a_wheel_carried_back_and_forth_dissipates_what_jenkins_element_does():
     k, mu, N, amplitude, h = 14e3, 0.25, 190.0, 8e-3, 1e-3
-    row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, *np.zeros(8)]]])
+    row = np.array([[[0.0, 0.0, k, k, 0.0, mu, N, *np.zeros(9)]]])
     u = amplitude * np.sin(np.linspace(0.0, 4.0 * np.pi, 40001))
     (state,), (wheels,), (lanes,), _ = at_rest(row, np.zeros((1, 4)))
     inertia, force = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0, *np.zeros(9)]), np.zeros(len(u))

@@ -8,8 +8,16 @@ import mjcf
 from calibration.numerics.signals import CUTOFF, Signal
 from calibration.recording.clock import Clock
 from calibration.stages.stick_slip.forcing import Tilting, Wrenches
+from calibration.stages.stick_slip.kernel.bases import HEAVE
 from calibration.stages.stick_slip.measured import slid
-from calibration.stages.stick_slip.standing import Read, _rocked, plate_place, prior_by_tilt, tilting_of
+from calibration.stages.stick_slip.standing import (
+    Read,
+    _rocked,
+    plate_place,
+    prior_by_tilt,
+    tilting_of,
+    vertical_stiffness,
+)
 from calibration.stages.stick_slip.wheels import WIDE, WheelSet, wheel_set
 from calibration.stages.suspension.base_response import base_response_of, laboratory
 from calibration.stages.suspension.compliance_fit import fit_compliance
@@ -285,6 +293,14 @@ def test_heave_that_is_off_by_a_third_moves_shares_by_less_than_their_sigma(off)
     right = np.log([200 / 110, 160 / 110])
     found = prior_by_tilt(SLIPPING, K, PLACE)
     assert np.all(np.abs(found.mean[11:13] - right) < 1.5 * found.sigma[11:13])
+
+
+def test_vertical_springs_are_as_stiff_as_the_tilt_shows():
+    K, prior = np.zeros((6, 6)), prior_by_tilt(SLIPPING, tilt_stiffness(), PLACE)
+    K[np.ix_(HEAVE, HEAVE)] = tilt_stiffness()
+    tilting = Tilting(K, np.zeros((6, 6)), shares=np.array([200 / 110, 160 / 110]))
+    assert vertical_stiffness(SLIPPING, tilting, prior) == pytest.approx(BY_TYPE["front"])
+    assert vertical_stiffness(SLIPPING, tilting, WIDE) == 0.0
 
 
 def test_where_there_are_no_back_casters_their_share_keeps_the_wide_prior():
