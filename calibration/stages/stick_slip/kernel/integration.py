@@ -186,7 +186,7 @@ def _advance(  # noqa: PLR0913
         if _begun(s, u, inertia, h, n) > 0:
             for l in range(n):
                 if s[PULL * LANES + l] < 0.0:
-                    lifted(wheels, s, u, l)
+                    lifted(wheels, s, l)
                     s[PULL * LANES + l] = 0.0
         on_wheels(wheels, s, u, h, n)
         if s[(BODY + 2) * LANES] > 0.0:

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibration.numerics.compiled import njit
 from calibration.numerics.signals import Signal, interpolate_columns
-from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, VERTICAL, WHEEL, E
+from calibration.stages.stick_slip.kernel.bases import LANES, LOAD, WHEEL, E
 from calibration.stages.suspension.floor_wrench import Load
 
 _LEGS = 3
@@ -69,14 +69,12 @@ def pulled(rows: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def lifted(wheels: np.ndarray, s: np.ndarray, u: np.ndarray, lane: int) -> None:
-    """Add c to the load of a lane of a flat state, by its flat wheels under the drive u (13,)."""
+def lifted(wheels: np.ndarray, s: np.ndarray, lane: int) -> None:
+    """Add c to the load of a lane of a flat state, by its flat wheels."""
     at, rows, p = LOAD * LANES + lane, np.empty((len(wheels) // (WHEEL * LANES), E)), np.empty(3)
     for i in range(len(rows)):
         for k in range(E):
             rows[i, k] = wheels[(i * WHEEL + k) * LANES + lane]
-        ex, ey = wheels[(i * WHEEL + E) * LANES + lane], wheels[(i * WHEEL + E + 1) * LANES + lane]
-        rows[i, 6] -= wheels[(i * WHEEL + VERTICAL) * LANES + lane] * (u[7] * ex - u[6] * ey)
     for k in range(3):
         p[k] = s[at + k * LANES]
     c = pulled(rows, p)
