@@ -189,4 +189,6 @@ def test_an_estimate_of_before_knows_nothing_that_wheels_hold(model, new):
     of["logarithms"], of["ensemble"] = of["logarithms"][:15], [row[:15] for row in of["ensemble"]]
     of["covariance"] = [row[:15] for row in of["covariance"][:15]]
     del content["wheels"]["usual"], content["wheels"]["vertical"]
-    np.testing.assert_allclose(restored(StickSlip, content).predict(new[0]).x, model.predict(new[0]).x, atol=2e-6)
+    before = restored(StickSlip, content)
+    np.testing.assert_allclose(before.predict(new[0]).x, model.predict(new[0]).x, atol=2e-6)
+    assert before.wheels.vertical == 0.0
