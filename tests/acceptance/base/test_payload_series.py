@@ -18,6 +18,9 @@ SEEDS = 4474, 4475, 4476, 4477
 WITHIN = 1.3  # of the error with the usual load
 FAR = "half of the wheels slide, and how far is decided by a few newtons of their load: docs/limits.md"
 BACK = "as a push ends arm_1's link swings back into its gap, on some robots through it: docs/limits.md"
+OPEN = {("xyz_2kg", "plate"): FAR, ("push", "plate"): BACK}
+if "CLAIM_RUNS" in os.environ:  # SEEDS hold this line, barely; the robots of the last series do not
+    OPEN["push", "measured"] = BACK
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +41,8 @@ def _of(evaluation):
 @pytest.mark.parametrize("base", ["plate", "measured"])
 @pytest.mark.parametrize("trial", ["xyz_0kg", "xyz_2kg", "push"])
 def test_another_load_is_taken_into_account(errors, trial, base, claim, request):
-    if (trial, base) == ("xyz_2kg", "plate"):
-        request.applymarker(pytest.mark.xfail(reason=FAR, strict=True))
-    if trial == "push":  # held by the median of each series before the last
-        request.applymarker(pytest.mark.xfail(reason=BACK, strict=False))
+    if (trial, base) in OPEN:
+        request.applymarker(pytest.mark.xfail(reason=OPEN[trial, base], strict=True))
     found = np.array([of[trial, base] / of["xyz", base] for of in errors])
     claim(f"payload/{trial}/{base}", found)
     assert np.median(found) <= WITHIN
