@@ -6,7 +6,7 @@
     nominal.urdf             what the placement twists are relative to
     calibrated.urdf          joint placements of the exported model    } only if the result
     zeros.yaml               zeros of its readings                     } may be used: see `tables`
-    master_calibration.yaml  the same geometry as PAL's robots read it } see `calibrated_urdf`
+    master_calibration.yaml  the same geometry as PAL's robots read it } see `pal_calibration`
     parameters.csv           every parameter of every model            }
 
 The same estimate gives the same bytes. `load_estimate` also reads another program's estimate.json or URDF.
@@ -21,14 +21,15 @@ import numpy as np
 from pydantic import ValidationError
 
 from calibration.errors import InputError
-from calibration.estimate.calibrated_urdf import calibrated_urdf, pal_calibration
 from calibration.estimate.estimate import Estimate
 from calibration.estimate.json_schema import EstimateFile, to_estimate, to_file
+from calibration.estimate.pal_calibration import pal_calibration
 from calibration.estimate.tables import parameters_text, read_zeros, zero_parameters, zeros_text
 from calibration.inference.parameters import Model
 from calibration.recording import netcdf
 from calibration.recording.experiment import plans_text, read_plans
 from calibration.robot.chain import chain_of_frames
+from calibration.robot.urdf import calibrated_urdf
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.untrusted import checked_urdf, findings, json_of, read_text
 

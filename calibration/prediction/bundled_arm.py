@@ -25,8 +25,9 @@ from calibration.numerics.lie import adjoint, inverse
 from calibration.robot.hand import HandModel
 from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.column_bending import ColumnBending, moved
-from calibration.stages.drive_trains.drive_trains import DriveTrains, Stream, StreamState, stream_of
+from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.link_streams import RESTS
+from calibration.stages.drive_trains.streams import Stream, StreamState, stream_of
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.suspension.floor_wrench import root_in_base
 

@@ -15,7 +15,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
-from calibration.robot.link_masses import LinkMasses
+from calibration.robot.urdf import LinkMasses, calibrated_urdf
 from calibration.stages.drive_trains.column_bending import ColumnBending
 from calibration.stages.drive_trains.corrected_trial import (
     CorrectedTrial,
@@ -27,7 +27,7 @@ from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.hung_load import HungLoad
 from calibration.stages.drive_trains.stage import MovedBase
-from calibration.stages.drive_trains.torques import dynamics
+from calibration.stages.drive_trains.torques import STIFF, dynamics
 from calibration.stages.stick_slip.model import StickSlip
 from calibration.stages.stick_slip.poses import BasePrediction, slipping_base_poses
 from calibration.stages.suspension.base_response import WrenchSources
@@ -49,6 +49,8 @@ class BundleParts:
         at_rest_by_dynamics: The same where inverse dynamics move the base that else a plate moves; empty without.
         hung: What the wrist's sensor weighed beside links and payload; None where nothing was.
         links: What a plate weighed; None where none did, and the links are nominal.
+        placed: Whether drive trains and base are loaded by links where the geometry and the column have them; in
+            estimates of before, by links where they nominally are.
     """
 
     trains: tuple[DriveTrain, ...]
@@ -59,6 +61,7 @@ class BundleParts:
     at_rest_by_dynamics: np.ndarray = field(default_factory=lambda: np.zeros(0))
     hung: HungLoad | None = None
     links: LinkMasses | None = None
+    placed: bool = False
 
     @property
     def by_dynamics(self) -> "BundleParts":
@@ -87,8 +90,10 @@ class BundledRobot:
     @classmethod
     def of(cls, hand: HandModel, parts: BundleParts, urdf: str, description: Description) -> "BundledRobot":
         """The robot from what was saved of it, and the nominal one."""
-        urdf = urdf if parts.links is None else parts.links.on(urdf)
-        robot = dynamics(urdf, description, parts.offset, parts.hung)
+        urdf, column = urdf if parts.links is None else parts.links.on(urdf), STIFF
+        if parts.placed:
+            urdf, column = calibrated_urdf(urdf, hand.chain), parts.bending.column
+        robot = dynamics(urdf, description, parts.offset, parts.hung, column)
         trains = DriveTrains(robot, parts.trains, urdf, description, parts.hung)
         at_rest = trains.by_joint(parts.at_rest) if len(parts.at_rest) else np.zeros(len(parts.offset))
         return cls(hand, trains, parts.bending, parts.stick_slip, at_rest)

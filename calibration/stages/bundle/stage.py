@@ -22,6 +22,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
 from calibration.robot.laboratory import Laboratory
+from calibration.robot.urdf import calibrated_urdf
 from calibration.stages.bundle.moved_base import RoughBase, moved_as_predicted
 from calibration.stages.bundle.robot import BundleParts
 from calibration.stages.drive_trains.column_bending import rigid
@@ -32,7 +33,7 @@ from calibration.stages.drive_trains.errors_in_use import rest_errors, with_doub
 from calibration.stages.drive_trains.from_markers import completed
 from calibration.stages.drive_trains.geometry_refit import RefittedGeometry
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved, MovedBase, fit_drive_trains, motor_zeros
-from calibration.stages.drive_trains.torques import LinkLoads
+from calibration.stages.drive_trains.torques import UNWEIGHED, LinkLoads
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.stages.stage import Stage, StageInput, StageResult, has_postures
 from calibration.stages.stick_slip.model import StickSlip
@@ -96,33 +97,39 @@ def fit_bundle(
     """
     (robot, plate), chain, description = clocks, lab.chain, lab.description
     hand = hand_of(geometry, chain, lab.nominal_frames)
-    sources = WrenchSources(lab, robot, plate, from_vector(hand.base))
-    links, unlikely = weighed_links(sources, trials, None if suspension is None else suspension.K, motor_zeros(hand))
+    sources = WrenchSources(_placed(lab, hand), robot, plate, from_vector(hand.base))
+    weighed, unlikely = weighed_links(sources, trials, None if suspension is None else suspension.K, motor_zeros(hand))
+    links, masses = (None, UNWEIGHED) if weighed is None else (weighed.links, weighed.covariance)
     if links is not None:
         lab = replace(lab, urdf=links.on(lab.urdf))
-        sources = replace(sources, lab=lab)
+        sources = replace(sources, lab=_placed(lab, hand))
     rough = RoughBase(AS_SEEN) if suspension is None else moved_as_predicted(sources, trials, suspension)
-    trains, findings, loads = fit_drive_trains(lab.urdf, description, trials, robot, hand, rough.moved)
-    bending, quantities, found = rigid(chain.joints[0]), trains.parameters, [*unlikely, *findings]
-    geometry = replace(geometry, name="full")
+    trains, findings, loads = fit_drive_trains(sources.lab.urdf, description, trials, robot, hand, rough.moved, masses)
+    bending, quantities, geometry = rigid(chain.joints[0]), trains.parameters, replace(geometry, name="full")
     refitted, more = _completed(lab, trials, robot, geometry, trains, loads, findings, rough.moved)
-    found += more
+    found = [*unlikely, *findings, *more]
     if refitted is not None:
         geometry, bending, trains = refitted.model, refitted.bending, refitted.trains
         hand = refitted.hand(chain)
+        trains = trains.built(_placed(lab, hand).urdf, bending.column)
         found += [Verdict(STAGE, "warning", message) for message in refitted.shown]
         link = next(body.link for body in description.bodies if body.name == description.base_body.name)
         quantities = (*trains.parameters, *bending.parameters(_carried_link(lab, link), _moment_sigma(lab)))
     base, read = None, list[Read]()
     if suspension is not None:
-        sources = replace(sources, T_base_B=from_vector(hand.base))
+        sources = replace(sources, lab=_placed(lab, hand), T_base_B=from_vector(hand.base))
         base, read, more = fit_stick_slip(sources, trials, suspension, Arm(trains, rough.moved), rough.logarithms)
         found += more
     at_rest = other = np.zeros(0)
     if refitted is not None:
         trains, at_rest, other = _in_use(base, sources, trials, read, trains, hand, rough.moved)
-    parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, other, trains.hung, links)
+    parts = BundleParts(trains.trains, motor_zeros(hand), bending, base, at_rest, other, trains.hung, links, True)
     return Bundle(geometry, quantities, parts), tuple(replace(v, stage=STAGE) for v in found)
+
+
+def _placed(lab: Laboratory, hand: HandModel) -> Laboratory:
+    """The robot with its joints where the geometry has them."""
+    return replace(lab, urdf=calibrated_urdf(lab.urdf, hand.chain))
 
 
 def _in_use(  # noqa: PLR0913

@@ -11,10 +11,11 @@ stream_of             the same sample by sample
 from calibration.stages.drive_trains.column_bending import ColumnBending, bent
 from calibration.stages.drive_trains.corrected_trial import corrected_trial, hand_poses
 from calibration.stages.drive_trains.drive_train import DriveTrain, Quantity
-from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles, stream_of
+from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles
 from calibration.stages.drive_trains.from_markers import completed
 from calibration.stages.drive_trains.geometry_refit import refit_geometry
 from calibration.stages.drive_trains.stage import fit_drive_trains
+from calibration.stages.drive_trains.streams import stream_of
 
 __all__ = [
     "ColumnBending",

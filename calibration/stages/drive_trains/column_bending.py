@@ -22,7 +22,7 @@ from calibration.recording.trial import Trial
 from calibration.robot.chain import Chain
 from calibration.robot.hand import HandModel
 from calibration.stages.drive_trains.drive_train import Quantity
-from calibration.stages.drive_trains.torques import LinkLoads
+from calibration.stages.drive_trains.torques import Column, LinkLoads
 
 _FEWEST = 8  # postures
 _SPREAD = 3.0  # [N.m] least range of the moments
@@ -43,6 +43,11 @@ class ColumnBending:
     compliance: np.ndarray
     sigma: np.ndarray
     mean: np.ndarray = field(default_factory=lambda: np.zeros(2))
+
+    @property
+    def column(self) -> Column:
+        """How it leans under a moment, where the geometry is without that of its postures."""
+        return Column(self.compliance, np.zeros(2))
 
     def turns(self, moment: np.ndarray) -> np.ndarray:
         """Rotation vectors (n, 3) [rad] of what the column carries, in its frame, under moments (n, 2) [N.m]."""

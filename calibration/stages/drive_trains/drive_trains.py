@@ -4,15 +4,9 @@
     tau_j <- tau_j - sum_i (M_ji d2 delta_i / dt2 + G_ji delta_i)     links load each other, see `link_streams`
 
 The geometry keeps the zeros of the readings; it is the one fitted to corrected readings (`geometry_refit`).
-
-Drive trains sample by sample: the state is passed from one to the next, nothing after a sample is read.
-
-    state, angles = stream.step(state, t, [q_motor, velocity, acceleration])
-
-With the velocities and accelerations that `torques.derivatives` has of a recording, the angles are those in one go.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -20,15 +14,23 @@ import numpy as np
 
 from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
-from calibration.robot.rigid_tree import scratch
-from calibration.robot.tree_dynamics import TreeDynamics, room
 from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains import link_streams
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_on_floor, hand_on_joints
 from calibration.stages.drive_trains.link_motion import COMPLIANCE
 from calibration.stages.drive_trains.link_streams import RESTS, TORQUE, Drives
-from calibration.stages.drive_trains.torques import Dynamics, LinkLoads, LoadsUnder, base_motion, dynamics, inertials
+from calibration.stages.drive_trains.torques import (
+    UNWEIGHED,
+    Column,
+    Dynamics,
+    LinkLoads,
+    LoadsUnder,
+    base_motion,
+    dynamics,
+    inertial_tolerances,
+    inertials,
+)
 from calibration.stages.suspension.floor_wrench import root_in_base
 
 RUNS = 5  # likely; torque off by -2 and by 2 standard deviations, from either end of what friction holds
@@ -61,6 +63,7 @@ class DriveTrains:
         urdf: Text the dynamics were built from.
         description: Of the dataset.
         hung: What else hangs on the wrist's sensor; None where nothing was weighed.
+        mass_covariance: (4 b, 4 b) of what a plate weighed of b bodies, see `inertial_tolerances`; empty: nothing.
     """
 
     dynamics: Dynamics
@@ -68,6 +71,7 @@ class DriveTrains:
     urdf: str
     description: Description
     hung: HungLoad | None = None
+    mass_covariance: np.ndarray = field(default_factory=lambda: UNWEIGHED)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -78,6 +82,12 @@ class DriveTrains:
     def parameters(self) -> tuple[Quantity, ...]:
         """Of all joints."""
         return tuple(q for train in self.trains for q in train.parameters)
+
+    @property
+    def inertial_tolerances(self) -> np.ndarray:
+        """Covariance (p, p) of the masses and first moments that load joints, see `torques`."""
+        known = self.description.tolerances
+        return inertial_tolerances(self.dynamics, known.link_mass, known.link_com, self.hung, self.mass_covariance)
 
     @property
     def inwards(self) -> tuple[DriveTrain, ...]:
@@ -112,7 +122,12 @@ class DriveTrains:
         loaded = self.description.carrying(mass)
         if loaded is self.description:
             return self
-        return replace(self, dynamics=dynamics(self.urdf, loaded, self.dynamics.offset, self.hung), description=loaded)
+        return replace(self, description=loaded).built(self.urdf, self.dynamics.column)
+
+    def built(self, urdf: str, column: Column) -> "DriveTrains":
+        """The same with dynamics of that URDF, on a column that leans so."""
+        built = dynamics(urdf, self.description, self.dynamics.offset, self.hung, column)
+        return replace(self, urdf=urdf, dynamics=built)
 
     def with_offset(self, offset: np.ndarray) -> "DriveTrains":
         """The same with other zeros (k,) of the motor readings."""
@@ -186,87 +201,6 @@ class DriveTrains:
         return drives, begun(self, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs].copy(), samples
 
 
-class StreamState(NamedTuple):
-    """Where m drive trains are.
-
-    Attributes:
-        t: [s].
-        moving: (3, k) readings, velocities and accelerations of all motors [rad, m, s].
-        samples: (4, m) motor readings [rad], velocities [rad/s], torques [N.m] and inertias [kg.m2].
-        states: (m, 5, 3) delta, its rate and the slider of each run.
-        torque: (1, k) nominal, on all joints [N.m, N].
-        moment: (1, 2) on the column [N.m].
-    """
-
-    t: float
-    moving: np.ndarray
-    samples: np.ndarray
-    states: np.ndarray
-    torque: np.ndarray
-    moment: np.ndarray
-
-
-@dataclass(frozen=True)
-class Stream:
-    """Drive trains made ready for single samples, see `stream_of`.
-
-    Attributes:
-        trains: The drive trains, m of them.
-        prepared: Their parameters.
-        at_rest: (1, 12) twist and proper acceleration of a base that is level and at rest.
-        work: Scratch of the dynamics.
-        found: Room for the dynamics.
-    """
-
-    trains: DriveTrains
-    prepared: Drives
-    at_rest: np.ndarray
-    work: np.ndarray
-    found: TreeDynamics
-
-    def begin(self, t: float, moving: np.ndarray, base: np.ndarray | None = None) -> tuple[StreamState, LinkAngles]:
-        """The state at a first sample q, v, a (3, k) of an unknown history, and its link angles (1, k)."""
-        state, found, angles = self._room(t, moving)
-        robot, drives, states = self.trains.dynamics, self.prepared, state.states
-        root = self.at_rest if base is None else base
-        link_streams.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
-        states[:] = begun(self.trains, drives, state.samples[TORQUE], found.stiffness[0])
-        link_streams.link_angles(states, state.moving, drives, angles)
-        return state, LinkAngles(*angles)
-
-    def step(
-        self, before: StreamState, t: float, moving: np.ndarray, base: np.ndarray | None = None
-    ) -> tuple[StreamState, LinkAngles]:
-        """The state one sample q, v, a (3, k) later, link angles (1, k); `base` (1, 12) as `Dynamics.root` has it."""
-        state, found, angles = self._room(t, moving)
-        robot, drives = self.trains.dynamics, self.prepared
-        state.states[:] = before.states
-        root = self.at_rest if base is None else base
-        link_streams.advanced_drives(
-            robot.tree, drives, root, self.work, found, state.moving, before.samples, state.states, t - before.t,
-            LONGEST, state.samples, angles,
-        )  # fmt: skip
-        return state, LinkAngles(*angles)
-
-    def _room(self, t: float, moving: np.ndarray) -> tuple[StreamState, TreeDynamics, np.ndarray]:
-        """A state, dynamics and link angles (4, 1, k) to be filled."""
-        m, k, scratch = len(self.prepared.columns), moving.shape[1], self.found
-        torque, moment, angles = np.empty((1, k)), np.empty((1, 2)), np.empty((4, 1, k))
-        found = TreeDynamics(
-            torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.stiffness,
-            scratch.regressor,
-        )  # fmt: skip
-        return StreamState(t, moving, np.empty((4, m)), np.zeros((m, RUNS, 3)), torque, moment), found, angles
-
-
-def stream_of(trains: DriveTrains) -> Stream:
-    """Drive trains made ready for single samples."""
-    robot = trains.dynamics
-    return Stream(
-        trains, prepared(trains), robot.root(None), scratch(robot.tree), room(1, len(trains.joints), regressors=True)
-    )
-
-
 def begun(trains: DriveTrains, drives: Drives, torques: np.ndarray, G: np.ndarray) -> np.ndarray:
     """States (m, RUNS, 3) of an unknown history under torques (m,) [N.m] at the motors; G (k, k) stiffness."""
     states, G = np.zeros((len(torques), RUNS, 3)), G[np.ix_(drives.columns, drives.columns)]
@@ -297,4 +231,5 @@ def prepared(trains: DriveTrains) -> Drives:
         np.array([not t.dynamic and t.form == "dead_zone" for t in of], dtype=bool),
         np.array([[t.doubt**2 / 12.0, t.doubt_at_rest**2 / 12.0, t.residual**2] for t in of]).reshape(-1, 3),
         np.array(robot.offset, dtype=float),
+        np.array(robot.column, dtype=float),
     )

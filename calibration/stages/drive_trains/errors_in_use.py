@@ -27,7 +27,7 @@ from calibration.stages.drive_trains.corrected_trial import CorrectedTrial, by_l
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.fit.identification import OTHER_SIDE, SURE
-from calibration.stages.drive_trains.joint_data import window_means, windows
+from calibration.stages.drive_trains.fit.joint_data import window_means, windows
 from calibration.stages.drive_trains.link_motion import HALF_GAP
 from calibration.stages.drive_trains.link_streams import RESTS
 

@@ -28,8 +28,8 @@ from calibration.stages.drive_trains.column_bending import ColumnBending, bent
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.fit.identification import identify
+from calibration.stages.drive_trains.fit.joint_data import COARSE, WINDOW, JointData, joint_data
 from calibration.stages.drive_trains.geometry_refit import NOTHING, RefittedGeometry, refit_geometry
-from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, JointData, joint_data
 from calibration.stages.drive_trains.stage import (
     AS_SEEN,
     DEFLECTION,
@@ -39,7 +39,7 @@ from calibration.stages.drive_trains.stage import (
     loads_of_trial,
     unidentified,
 )
-from calibration.stages.drive_trains.torques import LinkLoads, inertial_tolerances, load_modes
+from calibration.stages.drive_trains.torques import LinkLoads, load_modes
 from calibration.stages.geometry.parameters import reading_sigma
 from calibration.verdict import Verdict
 
@@ -153,7 +153,7 @@ def identified_by_markers(
     if not own:
         raise NotEnoughData(f"no calibration trial shows base and hand: {joint} has neither link encoder nor markers")
     tolerances = trains.description.tolerances
-    C = inertial_tolerances(trains.dynamics, tolerances.link_mass, tolerances.link_com, trains.hung)
+    C = trains.inertial_tolerances
     modes = load_modes(own, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
     data, coarse = (_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
     found, _ = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))

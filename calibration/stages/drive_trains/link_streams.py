@@ -38,6 +38,7 @@ class Drives(NamedTuple):
         plays: (m,) which are play operators.
         doubt: (m, 3) variance over the square of the interval in motion and at rest [-], and beside it [rad2].
         offset: (k,) zeros of all readings [rad, m].
+        column: (2, 2) compliance [rad/(N.m)] and mean moment [N.m] of what carries the arm, see `torques.Column`.
     """
 
     columns: np.ndarray
@@ -52,6 +53,7 @@ class Drives(NamedTuple):
     plays: np.ndarray
     doubt: np.ndarray
     offset: np.ndarray
+    column: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,14 +70,15 @@ def loaded(
         angle[0, j] = moving[0, j] - drives.offset[j]
     sample(tree, angle, v, a, root, work, found)
     x, y, z, p = root[0, 6], root[0, 7], root[0, 8], found.regressor.shape[2]
+    M, (soft, mean) = found.moment[0], drives.column
+    lean_x, lean_y = soft[0] * (mean[0] - M[0]), soft[1] * (mean[1] - M[1])
     for i in range(len(drives.columns)):
         c, phi, pull = drives.columns[i], drives.inertials[i], found.coupling[0, drives.columns[i]]
         torque, inertia = found.torque[0, c] + drives.link_inertia[i] * a[0, c], found.inertia[0, c, c]
         for k in range(p):
             torque += found.regressor[0, c, k] * phi[k]
         tilt_x, tilt_y = pull[1] * z - pull[2] * y, pull[2] * x - pull[0] * z
-        torque += tilt_x * (phi[p] - found.moment[0, 0] * phi[p + 2])
-        torque += tilt_y * (phi[p + 1] - found.moment[0, 1] * phi[p + 2])
+        torque += tilt_x * (lean_x + phi[p] - M[0] * phi[p + 2]) + tilt_y * (lean_y + phi[p + 1] - M[1] * phi[p + 2])
         samples[Q, i], samples[V, i], samples[TORQUE, i] = moving[0, c], v[0, c], torque
         samples[INERTIA, i] = max(inertia + drives.link_inertia[i], LIGHT) if drives.dynamic[i] else LIGHT
 

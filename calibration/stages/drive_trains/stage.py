@@ -20,16 +20,18 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import Trial
 from calibration.robot.hand import HandModel
+from calibration.stages.drive_trains.column_bending import column_bending
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.fit.identification import identify
+from calibration.stages.drive_trains.fit.joint_data import COARSE, WINDOW, joint_data
 from calibration.stages.drive_trains.fit.steady_contact import Slip, slipped_encoder
 from calibration.stages.drive_trains.hung_load import DEPARTS, HungLoad, hung_load
-from calibration.stages.drive_trains.joint_data import COARSE, WINDOW, joint_data
 from calibration.stages.drive_trains.torques import (
+    UNWEIGHED,
+    Column,
     LinkLoads,
     dynamics,
-    inertial_tolerances,
     load_modes,
 )
 from calibration.stages.joints.samples import link_zeros
@@ -64,22 +66,25 @@ def fit_drive_trains(  # noqa: PLR0913
     robot: Clock,
     hand: HandModel,
     moved: Moved = AS_SEEN,
+    mass_covariance: np.ndarray = UNWEIGHED,
 ) -> tuple[DriveTrains, tuple[Verdict, ...], dict[str, LinkLoads]]:
     """The drive trains, the verdicts on them and the loads in the trials used; of joints without link encoders, none.
 
     Args:
-        urdf: Nominal robot.
+        urdf: The robot with the joint placements of that geometry.
         description: Of the dataset.
         trials: Calibration trials.
         robot: The robot's clock.
         hand: The calibrated geometry: zeros of the readings, and where the base's markers are.
         moved: How the base moved in trials in which that is not taken from its markers.
+        mass_covariance: As of `DriveTrains`.
     """
     offset = motor_zeros(hand)
     ends = _ends(trials, len(offset))
     weighed = hung_load(urdf, description, offset, [_by_links(trial, ends.mean(axis=0)) for trial in trials])
     hung, unlikely = (None, (_unlikely(weighed),)) if weighed and weighed.departs > DEPARTS else (weighed, ())
-    bare = DriveTrains(dynamics(urdf, description, offset, hung), (), urdf, description, hung)
+    bare = DriveTrains(dynamics(urdf, description, offset, hung), (), urdf, description, hung, mass_covariance)
+    bare = _on_column(bare, trials, robot, hand, moved)
     try:
         zero = link_zeros(trials, robot)
     except NotEnoughData as error:
@@ -96,6 +101,16 @@ def fit_drive_trains(  # noqa: PLR0913
     slips = tuple(_slipped(joint, slip) for joint, slip in tried.items() if isinstance(slip, Slip))
     found = replace(bare, trains=trains)
     return found, (*unlikely, *slips, *_verdicts(found, hand)), {one.trial_id: one for one in loads}
+
+
+def _on_column(
+    trains: DriveTrains, trials: Sequence[Trial], robot: Clock, hand: HandModel, moved: Moved
+) -> DriveTrains:
+    """The same on the column that postures show to bend; the geometry has it as it stands in their middle."""
+    still = [trial for trial in trials if len(trial.dwell_start) and is_long(trial)]
+    loads = side_by_side(lambda trial: loads_of_trial(trains, trial, robot, hand, moved.get(trial.id)), still)
+    bending = column_bending(trains.description, still, loads, robot, hand)
+    return trains.built(trains.urdf, Column(bending.compliance, bending.mean))
 
 
 def loads_of_trial(
@@ -167,7 +182,7 @@ def _identified(
     bare: DriveTrains, loads: Sequence[LinkLoads], differences: Sequence[np.ndarray], hand: HandModel
 ) -> dict[str, DriveTrain | Slip]:
     tolerances = bare.description.tolerances
-    C = inertial_tolerances(bare.dynamics, tolerances.link_mass, tolerances.link_com, bare.hung)
+    C = bare.inertial_tolerances
     root = np.linalg.cholesky(C + 1e-12 * np.eye(len(C)))
 
     def found(joint: str) -> DriveTrain | Slip | None:

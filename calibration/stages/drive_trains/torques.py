@@ -6,15 +6,16 @@
     tau + R(q, v, a) dphi                  of other masses and first moments (m, m c) by body [kg, kg.m], a tilt of the
                                            base about x and y [rad], and bending of the first joint's column [rad/(N.m)]
 
-at angles q_m - offset. The base is level and at rest, or moves as its markers or a prediction show: how it turns and
-its proper acceleration a_0 (gravity included) are those of the tree's root. A tilt u turns a_0 by -u x a_0; a column
-that bends turns all it carries by its compliance times the moment of what it carries. 5 mrad are a fifth of a newton
-metre at the shoulder.
+at angles q_m - offset and the joint placements found. The base is level and at rest, or moves as its markers or a
+prediction show: how it turns and its proper acceleration a_0 (gravity included) are those of the tree's root. A tilt u
+turns a_0 by -u x a_0; a column that bends turns all it carries by -c (M - M_0), M the moment of what it carries. 5 mrad
+are a fifth of a newton metre at the shoulder.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -37,7 +38,7 @@ _BY_PLATE = 10.0, 20.0  # the same of a base that a plate's wrench moves
 _JOLT = 0.15  # [s] over which the energy of a jolt is compared with the noise
 _MOST, _LEAST = 6, 0.005  # modes, and the least torque [N.m rms] one is worth: fewer make a load too large or small
 _THINNED = 10  # samples between those the modes are of
-_TILT, _BENDING = 5e-3, 1e-4  # [rad], [rad/(N.m)] their prior standard deviations
+_TILT, _BENDING, _BENT = 2e-4, 1e-4, 0.05  # [rad], [rad/(N.m)], and of a known column [-]: their standard deviations
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,26 @@ class LinkLoads:
         return replace(self, torque=self.torque - (self.stiffness @ delta[..., None])[..., 0] - moved)
 
 
+class Column(NamedTuple):
+    """How the column that carries the arm leans under a moment M (n, 2) [N.m] about x and y: by -c (M - M_0) [rad].
+
+    Attributes:
+        compliance: (2,) c [rad/(N.m)].
+        mean: (2,) M_0, at which joint placements have the column as it stands [N.m].
+    """
+
+    compliance: np.ndarray
+    mean: np.ndarray
+
+    def leans(self, moment: np.ndarray) -> np.ndarray:
+        """(n, 2) [rad] under moments (n, 2) [N.m]."""
+        return np.asarray(self.compliance * (self.mean - moment))
+
+
+STIFF = Column(np.zeros(2), np.zeros(2))
+UNWEIGHED = np.zeros((0, 0))
+
+
 LoadsUnder = Callable[[Push | None, np.ndarray | None], LinkLoads]
 """Loads by what pushes the hand, and by about how far (n, k) links are behind their motors."""
 
@@ -95,12 +116,14 @@ class Dynamics:
         joints: Names of the k measured joints.
         offset: (k,) zeros of the motor readings [rad, m].
         gravity: (3,) in the base [m/s2].
+        column: That carries the arm.
     """
 
     model: pin.Model
     joints: tuple[str, ...]
     offset: np.ndarray
     gravity: np.ndarray
+    column: Column = STIFF
 
     @cached_property
     def tree(self) -> RigidTree:
@@ -148,6 +171,7 @@ class Dynamics:
             axis=2,
         )
         bending = -(tilt @ found.moment[..., None])
+        torque += (tilt @ self.column.leans(found.moment)[..., None])[..., 0]
         R = np.concatenate([found.regressor, tilt, bending], axis=2)
         return torque, found.inertia, R, found.moment, found.stiffness, found.coupling
 
@@ -156,13 +180,15 @@ class Dynamics:
         return np.concatenate([np.zeros(6), -self.gravity, np.zeros(3)])[None] if base is None else base
 
 
-def dynamics(urdf: str, description: Description, offset: np.ndarray, hung: HungLoad | None = None) -> Dynamics:
+def dynamics(
+    urdf: str, description: Description, offset: np.ndarray, hung: HungLoad | None = None, column: Column = STIFF
+) -> Dynamics:
     """The robot of a dataset with its declared payload, what else hangs there, and the zeros (k,) of its readings."""
     model = floating_model(urdf, description)
     model.gravity = pin.Motion.Zero()
     if hung is not None:
         hung.on(model, description.payload_of())
-    return Dynamics(model, description.joint_names, offset, np.array(description.gravity))
+    return Dynamics(model, description.joint_names, offset, np.array(description.gravity), column)
 
 
 def inertials(robot: Dynamics) -> tuple[tuple[str, str], ...]:
@@ -171,15 +197,30 @@ def inertials(robot: Dynamics) -> tuple[tuple[str, str], ...]:
     return (*bodies, ("base", "tilt_x"), ("base", "tilt_y"), (robot.model.names[2], "bending"))
 
 
-def inertial_tolerances(robot: Dynamics, mass: float, centre: float, hung: HungLoad | None = None) -> np.ndarray:
-    """Covariance (p, p) of dphi: masses to a share `mass`, centres of mass to `centre` [m], but what was weighed."""
+def inertial_tolerances(
+    robot: Dynamics, mass: float, centre: float, hung: HungLoad | None = None, weighed: np.ndarray = UNWEIGHED
+) -> np.ndarray:
+    """Covariance (p, p) of dphi.
+
+    Args:
+        robot: With the masses that are likely.
+        mass: Share to which the datasheet has them [-].
+        centre: To which it has centres of mass [m].
+        hung: On the wrist's sensor.
+        weighed: (4 b, 4 b) of the masses' shares and the centres' shifts of b bodies, the root's first, by a plate; the
+            last one's is as far as the sensor knows it.
+    """
     bodies = [np.append(body.mass, body.mass * body.lever) for body in robot.model.inertias[2:]]
+    last = bodies[-1] if hung is None else bodies[-1] - hung.nominal - hung.added(hung.payload)
+    tolerances = [inertial_tolerance(body, mass, centre) for body in (*bodies[:-1], last)]
     if hung is not None:
-        bodies[-1] = bodies[-1] - hung.nominal - hung.added(hung.payload)
-    blocks = [inertial_tolerance(body, mass, centre) for body in bodies]
-    if hung is not None:
-        blocks[-1] = blocks[-1] + hung.uncertain
-    return np.asarray(block_diag(*blocks, np.diag([_TILT**2, _TILT**2, _BENDING**2])))
+        tolerances[-1] = tolerances[-1] + hung.uncertain
+    C, others = block_diag(*tolerances), slice(0, 4 * len(bodies) - 4)
+    if len(weighed):
+        J = block_diag(*(np.column_stack([body, body[0] * np.eye(4)[:, 1:]]) for body in bodies[:-1]))
+        C[others, others] = J @ weighed[4:-4, 4:-4] @ J.T
+    bends = _BENT * float(robot.column.compliance.max()) or _BENDING
+    return np.asarray(block_diag(C, np.diag([_TILT**2, _TILT**2, bends**2])))
 
 
 def derivatives(t: np.ndarray, q: np.ndarray, cutoff: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

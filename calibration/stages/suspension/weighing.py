@@ -31,7 +31,7 @@ from calibration.recording.clock import Clock
 from calibration.recording.schema import Description
 from calibration.recording.trial import REST, Trial
 from calibration.robot.laboratory import Laboratory
-from calibration.robot.link_masses import LinkMasses
+from calibration.robot.urdf import LinkMasses
 from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.floor_wrench import root_in_base, vertical
 from calibration.stages.suspension.rest_frame import Rest, rest_of
@@ -76,6 +76,7 @@ class Weighed:
         sigma: (2,) of it.
         seems: (2,) o of an upright robot, were its links what they are taken for.
         likely: Whether tolerances let expect such links.
+        covariance: (4 b, 4 b) of the shares and shifts of b bodies.
     """
 
     links: LinkMasses
@@ -83,6 +84,7 @@ class Weighed:
     sigma: np.ndarray
     seems: np.ndarray
     likely: bool
+    covariance: np.ndarray
 
 
 def leans(K: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -108,11 +110,12 @@ def weighed(seconds: Sequence[tuple[Laboratory, Second]], K: np.ndarray | None) 
     covariance = np.linalg.inv(A.T @ A + np.eye(len(sigma)))
     found = covariance @ A.T @ ((upright - moved) / noise)
     likely = (found[:-2] ** 2).sum() < chdtri((1.0 - np.diag(covariance)[:-2]).sum(), _UNLIKELY)
-    found, left = sigma * found, sigma * np.sqrt(np.diag(covariance))
+    found, covariance = sigma * found, sigma[:, None] * covariance * sigma
     bodies = found[:-2].reshape(-1, 4)
     links = LinkMasses(tuple(lab.floating.names)[1:], bodies[:, 0].copy(), bodies[:, 1:].copy())
     seems = upright.reshape(-1, 3).mean(axis=0)[1:] / weight
-    return Weighed(links, found[-2:], left[-2:], seems, bool(likely))
+    place = np.sqrt(np.diag(covariance)[-2:])
+    return Weighed(links, found[-2:], place, seems, bool(likely), covariance[:-2, :-2])
 
 
 def _row(lab: Laboratory, second: Second, K: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -196,7 +199,7 @@ def seconds_at_rest(
 
 def weighed_links(
     sources: WrenchSources, trials: Sequence[Trial], K: np.ndarray | None, zeros: np.ndarray
-) -> tuple[LinkMasses | None, tuple[Verdict, ...]]:
+) -> tuple[Weighed | None, tuple[Verdict, ...]]:
     """What the robot weighs by calibration trials, None where no plate shows it, and the finding where it is unlikely.
 
     Args:
@@ -218,4 +221,4 @@ def weighed_links(
     if not found:
         return None, ()
     of = weighed(found, K)
-    return (of.links, ()) if of.likely else (None, (Verdict("weighing", "warning", _OTHERS),))
+    return (of, ()) if of.likely else (None, (Verdict("weighing", "warning", _OTHERS),))

@@ -10,8 +10,8 @@ import calibration
 from calibration.prediction.predict import predictor
 from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion, harmonic_terms
 from calibration.stages.drive_trains.fit.identification import identify
+from calibration.stages.drive_trains.fit.joint_data import COARSE, CORRELATED, WINDOW, joint_data
 from calibration.stages.drive_trains.fit.quantities import MOTOR
-from calibration.stages.drive_trains.joint_data import COARSE, CORRELATED, WINDOW, joint_data
 from calibration.stages.drive_trains.stage import DEFLECTION, is_long, loads_of_trial
 from calibration.stages.drive_trains.torques import inertial_tolerances, load_modes
 from scenarios import load

@@ -21,6 +21,7 @@ from calibration.prediction.hand_pose import at_readings
 from calibration.prediction.predict import predictor
 from calibration.prediction.slipping_base import SlippingBase
 from calibration.recording.clock import Clock
+from calibration.robot.urdf import calibrated_urdf
 from calibration.stages.joints.correction import velocities
 from twin.truth import read_trial
 
@@ -68,12 +69,24 @@ def test_an_estimate_with_a_joint_less_than_the_others_is_refused(result, tmp_pa
         load_estimate(folder)
 
 
-def test_base_and_drive_trains_are_of_the_robot_as_weighed(result):
+def test_base_and_drive_trains_are_of_the_robot_as_weighed_and_placed(result):
     estimate, found = load_estimate(result.folder / "estimate"), Compensator.load(result.folder / "estimate")
     weighed = estimate.bundle.links.on(estimate.urdf)
-    assert found.arm.trains.urdf == found.slipping.lab.urdf == weighed != estimate.urdf
+    placed = calibrated_urdf(weighed, found.hand.chain)
+    assert found.arm.trains.urdf == found.slipping.lab.urdf == placed != weighed != estimate.urdf
     prepared = predictor(estimate, calibration.load(result.folder / "dataset"))
-    assert prepared.bundled.trains.urdf == weighed
+    assert prepared.bundled.trains.urdf == placed
+    assert (prepared.bundled.trains.dynamics.column.compliance == estimate.bundle.bending.compliance).all()
+
+
+def test_an_estimate_of_before_is_loaded_by_links_where_they_nominally_are(result, tmp_path):
+    folder = shutil.copytree(result.folder / "estimate", tmp_path / "estimate")
+    content = json.loads((folder / "estimate.json").read_text("utf-8"))
+    assert content["bundle"].pop("placed")
+    (folder / "estimate.json").write_text(json.dumps(content), "utf-8")
+    estimate, found = load_estimate(folder), Compensator.load(folder)
+    assert found.arm.trains.urdf == estimate.bundle.links.on(estimate.urdf)
+    assert not found.arm.trains.dynamics.column.compliance.any()
 
 
 def at_pictures(trial, t, q, w=None):
@@ -212,16 +225,19 @@ def test_a_step_is_the_prediction_of_its_sample(estimate, compensator, swing):
         np.testing.assert_allclose(one.covariance[0], whole.covariance[k], atol=1e-15)
 
 
-def test_steps_under_a_wrench_follow_the_prediction_but_for_its_filter(compensator, swing):
+def test_steps_under_a_wrench_follow_the_prediction_but_for_its_filter(estimate, compensator, swing):
+    """A joint with backlash that stops elsewhere in its gap is most of it, in a sixth of the samples."""
     t, q, w, start, *_ = swing
     v, whole, before, found = velocities(t, q), compensator.predict(t, q, w, start), None, []
     for k in range(500):
         pose = compensator.step(t[k], q[k], w[k], start, v[k], before)
         before = pose.state
         found.append(pose.T[0])
-    e = (np.array(found) - whole.T[:500])[:, :3, 3]
+    e = np.sqrt(((np.array(found) - whole.T[:500])[:, :3, 3] ** 2).mean(axis=1))
     moved = (whole.T - compensator.predict(t, q, T_lab_base_start=start).T)[:500, :3, 3]
-    assert np.sqrt((e**2).mean()) < 0.1 * np.sqrt((moved**2).mean())
+    size = np.sqrt((moved**2).mean())
+    assert np.quantile(e, 0.8) < 0.1 * size
+    assert np.sqrt((e**2).mean()) < (0.15 if estimate.main == "full" else 0.1) * size
 
 
 def test_the_covariance_contains_the_truth_and_counts_what_the_model_leaves_out(compensator, swing):

@@ -12,10 +12,10 @@ import yaml
 import mjcf
 from calibration import Compensator, load_estimate, save_estimate
 from calibration.errors import InputError, NotCalibrated, ShapeError
-from calibration.estimate.calibrated_urdf import calibrated_urdf, roll_pitch_yaw
 from calibration.estimate.tables import read_parameters, read_zeros, zeros_text
 from calibration.robot.chain import chain_of
 from calibration.robot.hand import nominal_hand
+from calibration.robot.urdf import calibrated_urdf, roll_pitch_yaw
 from calibration.stages.geometry.model_of_fit import hand_of
 from calibration.verdict import Verdict
 from tests.doubles import rigid_robot

@@ -19,6 +19,7 @@ from itertools import product
 import numpy as np
 
 from calibration.stages.drive_trains.drive_train import DriveTrain
+from calibration.stages.drive_trains.fit.joint_data import JointData
 from calibration.stages.drive_trains.fit.mesh_friction import continued, hinted
 from calibration.stages.drive_trains.fit.quantities import covariance_of, reported
 from calibration.stages.drive_trains.fit.steady_contact import SteadyContact, steady_contact
@@ -34,7 +35,6 @@ from calibration.stages.drive_trains.fit.train_fit import (
     sizes,
     weights,
 )
-from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB, HALF_GAP
 
 _FRICTION, _TORQUE = 0.15, 0.045  # share of the friction, and [N.m], to which a load is not known

@@ -10,8 +10,8 @@ from itertools import product
 
 import numpy as np
 
+from calibration.stages.drive_trains.fit.joint_data import JointData
 from calibration.stages.drive_trains.fit.train_fit import FLOORS, Problem, TrainFit, fit_train
-from calibration.stages.drive_trains.joint_data import JointData
 
 _HINT = 6.0  # cost that friction in the mesh must save in one trial
 _SLIPS = (0.1, 0.3, 2.0)  # [N.m]

@@ -17,7 +17,7 @@ import numpy as np
 
 from calibration.numerics.compiled import njit
 from calibration.stages.drive_trains.drive_train import DriveTrain, Form
-from calibration.stages.drive_trains.joint_data import JointData
+from calibration.stages.drive_trains.fit.joint_data import JointData
 
 FLOORS = (4e-4, 1e-4, 5e-5, 2e-5)  # [rad] least size of residuals, round by round
 NU = 4.0

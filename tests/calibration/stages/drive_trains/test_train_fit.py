@@ -15,6 +15,7 @@ from calibration.stages.drive_trains.fit.identification import (
     rubbing,
     torque_sigma,
 )
+from calibration.stages.drive_trains.fit.joint_data import JointData
 from calibration.stages.drive_trains.fit.quantities import FORM, MOTOR, covariance_of, reported, reverses
 from calibration.stages.drive_trains.fit.steady_contact import slipped_encoder, steady_contact
 from calibration.stages.drive_trains.fit.train_fit import (
@@ -26,7 +27,6 @@ from calibration.stages.drive_trains.fit.train_fit import (
     fit_train,
     prior_of,
 )
-from calibration.stages.drive_trains.joint_data import JointData
 from calibration.stages.drive_trains.link_motion import COULOMB
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)

@@ -11,7 +11,7 @@ from calibration.mocap.measured_trial import MeasuredTrial
 from calibration.numerics.signals import Signal
 from calibration.recording.clock import Clock
 from calibration.recording.schema import Payload
-from calibration.robot.link_masses import LinkMasses
+from calibration.robot.urdf import LinkMasses
 from calibration.stages.suspension.base_response import laboratory
 from calibration.stages.suspension.rest_frame import Rest, rest_of
 from calibration.stages.suspension.weighing import Second, columns_of, leans, seconds_at_rest, weighed, weighed_links
@@ -168,6 +168,6 @@ def test_readings_count_from_their_zeros_and_the_base_from_where_a_trial_begins(
     trial = moved(replace(trial, q_motor=trial.q_motor + zeros), x, trial.t_mocap)
     on_plate = w @ pin.SE3(rest_of(DESCRIPTION, trial, sources.T_base_B).T_lab_0).dualAction.T
     trial = replace(trial, t_plate=trial.t_robot, plate_wrench=on_plate[:, None], plate_centre=np.zeros((1, 3)))
-    right, wrong = (weighed_links(sources, [trial], None, own)[0].share for own in (zeros, np.zeros(8)))
+    right, wrong = (weighed_links(sources, [trial], None, own)[0].links.share for own in (zeros, np.zeros(8)))
     np.testing.assert_allclose(right, 0.0, atol=2e-3)
     assert np.abs(wrong).max() > 2e-2

@@ -5,7 +5,7 @@ import pinocchio as pin
 
 import mjcf
 from calibration.robot.chain import reduced_model
-from calibration.robot.link_masses import LinkMasses
+from calibration.robot.urdf import LinkMasses
 from tests.doubles import rigid_robot
 
 
