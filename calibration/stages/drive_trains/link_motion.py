@@ -1,15 +1,16 @@
 """Motion of a link behind its drive's dead zone, compiled: how far the motor is ahead of the link.
 
     delta = q_m - q_l                        I (ddq_m - d2 delta / dt2) = m(delta) - (tau - I ddq_m) - f
-    m(delta) = (dz(delta; g) + T dz') / c + j     dz = delta - g beyond g, delta + g below -g, 0 between
+    m(delta) = [(dz(delta; g) + T dz') / c] + j   dz = delta - g beyond g, delta + g below -g, 0 between
+    [.]                                      0 where it would pull the link back to the flank that it leaves
     j = k (delta - s), |j| <= t              a spring in series with a slider, s moves while |j| = t  (Jenkins element)
     f = f_c Sgn(dq_l) + f_v dq_l             Sgn(0) anything from -1 to 1
 
 g half of the backlash [rad], c compliance [rad/(N.m)], T relaxation time of the contact [s], tau the torque of the
 link's motion if it followed the motor, I the inertia the mesh moves. t = 0 is a plain dead zone, whose side the load
 decides; with friction in the mesh and more of it at the link, motion decides. Implicit Euler steps: the link's
-velocity u after a step is the root of a piecewise linear monotone equation, so that stiction is exact and no step is
-too long to be stable.
+velocity u after a step is the root of a piecewise linear monotone equation, which jumps where a flank is struck, so
+that stiction is exact and no step is too long to be stable.
 
 Without inertia and with t = 0, delta is a play operator whose limits move with the torque,
 
@@ -26,7 +27,7 @@ from calibration.numerics.compiled import njit
 
 HALF_GAP, COMPLIANCE, COULOMB, VISCOUS, RELAXATION, SPRING, SLIP = range(7)  # order of `values`
 LIGHT = 1e-5  # [kg.m2] least inertia
-_NEWTON = 12
+_STEPS = 40  # Newton's, halves of what is left where he would leave it: a flank is struck at once
 STILL = 3e-5  # [rad] between two samples: one step will do
 
 
@@ -84,10 +85,11 @@ def contact(values: np.ndarray) -> Contact:
 def mesh(x: float, rate: float, slider: float, h: float, c: Contact) -> tuple[float, float]:
     """m [N.m] at delta x and its rate, and how it falls with the link's velocity over a step h [N.m.s/rad]."""
     force, slope = 0.0, 0.0
-    if x > c.half_gap:
-        force, slope = c.stiffness * (x - c.half_gap) + c.damping * rate, c.stiffness * h + c.damping
-    elif x < -c.half_gap:
-        force, slope = c.stiffness * (x + c.half_gap) + c.damping * rate, c.stiffness * h + c.damping
+    if abs(x) > c.half_gap:
+        flank = c.half_gap if x > 0.0 else -c.half_gap
+        force, slope = c.stiffness * (x - flank) + c.damping * rate, c.stiffness * h + c.damping
+        if force * x < 0.0:
+            force, slope = 0.0, 0.0
     if c.slip > 0.0:
         j = c.spring * (x - slider)
         force += min(max(j, -c.slip), c.slip)
@@ -104,17 +106,24 @@ def stepped(
     push, v = inertia / h, dq / h
     load, at = torque - push * (v - rate), x + dq
     damping = push + c.viscous
-    u, before = 0.0, -1.0
+    u = 0.0
     force, slope = mesh(at, v, s, h, c)
     if abs(force - load) > c.coulomb:
         load += c.coulomb if force > load else -c.coulomb
-        for _ in range(_NEWTON):
-            change = (force - load - damping * u) / (slope + damping)
-            u += change
-            if slope == before and abs(change) <= 1e-12 + 1e-9 * abs(u):
+        left = force - load
+        low, high = min(0.0, 1.01 * left / damping), max(0.0, 1.01 * left / damping)
+        for _ in range(_STEPS):
+            if left > 0.0:
+                low = u
+            else:
+                high = u
+            before, u = u, u + left / (slope + damping)
+            if not low < u < high:
+                u = 0.5 * (low + high)
+            if abs(u - before) <= 1e-12 + 1e-9 * abs(u):
                 break
-            before = slope
             force, slope = mesh(at - h * u, v - u, s, h, c)
+            left = force - load - damping * u
     x = at - h * u
     if c.slip > 0.0:
         s = min(max(s, x - c.reach), x + c.reach)

@@ -1,7 +1,8 @@
 """Row `full` with other loads in the hand than the calibration had, and while it is pushed, on several robots: slow.
 
-The robots are those in the folder `payload` of the one that the environment variable CLAIM_RUNS names, runs
-`payload_SEED` of scenario `payload`; where there are none, SEEDS are run, two minutes each.
+Errors of the hand, and of the link angles by themselves, less the zeros of dwells. The robots are those in the folder
+`payload` of the one that the environment variable CLAIM_RUNS names, runs `payload_SEED` of scenario `payload`; where
+there are none, SEEDS are run, two minutes each.
 """
 
 import json
@@ -10,12 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import trim_mean
 
+import calibration
+from calibration.numerics.signals import interpolate_columns
+from calibration.prediction import link_angles
 from scenarios import load, run
+from twin.truth import read_trial
 
 pytestmark = pytest.mark.slow
 SEEDS = 4474, 4475, 4476, 4477
 WITHIN = 1.3  # of the error with the usual load
+TRIALS = "xyz_0kg", "xyz_2kg", "push"
 FAR = "half of the wheels slide, and how far is decided by a few newtons of their load: docs/limits.md"
 BACK = "as a push ends arm_1's link swings back into its gap, on some robots through it: docs/limits.md"
 OPEN = {("xyz_2kg", "plate"): FAR, ("push", "plate"): BACK}
@@ -24,13 +31,45 @@ if "CLAIM_RUNS" in os.environ:  # SEEDS hold this line, barely; the robots of th
 
 
 @pytest.fixture(scope="module")
-def errors(tmp_path_factory):
-    """Of each robot: error [mm] by trial and base."""
+def runs(tmp_path_factory):
+    """Run folders, one of each robot."""
     folder = Path(os.environ.get("CLAIM_RUNS") or tmp_path_factory.mktemp("runs")) / "payload"
     if not list(folder.glob("payload_*/evaluation.json")):
         for seed in SEEDS:
             run(load("payload", (f"seed={seed}",)), out=folder / f"payload_{seed}")
-    return [_of(json.loads(path.read_text())) for path in sorted(folder.glob("payload_*/evaluation.json"))]
+    return [path.parent for path in sorted(folder.glob("payload_*/evaluation.json"))]
+
+
+@pytest.fixture(scope="module")
+def errors(runs):
+    """Of each robot: error [mm] by trial and base."""
+    return [_of(json.loads((folder / "evaluation.json").read_text())) for folder in runs]
+
+
+@pytest.fixture(scope="module")
+def links(runs):
+    """Of each robot: rms error [rad] by trial and joint, the base measured."""
+    return [_links(folder) for folder in runs]
+
+
+def _links(folder):
+    dataset, estimate = calibration.load(folder / "dataset"), calibration.load_estimate(folder / "estimate")
+    corrected, to_mocap = link_angles(estimate, dataset), estimate.clock("robot").to_mocap
+
+    def off(entry):
+        trial, true = dataset.read(entry), read_trial(folder / "truth" / entry.file)
+        q, t = corrected(entry, trial), to_mocap(trial.t_robot)
+        return trial, t, q - interpolate_columns(t, true.t_mocap, true.q_link_true)
+
+    trial, t, e = off(next(entry for entry in dataset.description.trials if entry.kind == "static"))
+    middle = zip(trial.dwell_start, trial.dwell_stop, strict=True)
+    dwells = [e[(t > 0.75 * a + 0.25 * b) & (t < 0.25 * a + 0.75 * b)].mean(axis=0) for a, b in middle]
+    zero, found = trim_mean(np.array(dwells), 0.1), {}
+    for entry in dataset.description.trials:
+        if entry.id in TRIALS or entry.id == "xyz":
+            size = np.sqrt(np.nanmean((off(entry)[2] - zero) ** 2, axis=0))
+            found |= {(entry.id, joint): of for joint, of in zip(trial.joint, size, strict=True)}
+    return found
 
 
 def _of(evaluation):
@@ -39,7 +78,7 @@ def _of(evaluation):
 
 
 @pytest.mark.parametrize("base", ["plate", "measured"])
-@pytest.mark.parametrize("trial", ["xyz_0kg", "xyz_2kg", "push"])
+@pytest.mark.parametrize("trial", TRIALS)
 def test_another_load_is_taken_into_account(errors, trial, base, claim, request):
     if (trial, base) in OPEN:
         request.applymarker(pytest.mark.xfail(reason=OPEN[trial, base], strict=True))
@@ -52,3 +91,13 @@ def test_inverse_dynamics_know_a_declared_load(errors, claim):
     found = np.array([of["xyz_0kg", "dynamics"] / of["xyz", "dynamics"] for of in errors])
     claim("payload/xyz_0kg/dynamics", found)
     assert np.median(found) <= WITHIN
+
+
+@pytest.mark.parametrize("joint", [f"arm_{i}_joint" for i in range(1, 8)])
+@pytest.mark.parametrize("trial", TRIALS)
+def test_links_are_where_another_load_has_them(links, trial, joint, claim, request):
+    if (trial, joint) in OPEN:
+        request.applymarker(pytest.mark.xfail(reason=OPEN[trial, joint], strict=True))
+    usual, found = (np.median([of[name, joint] for of in links]) for name in ("xyz", trial))
+    claim(f"payload links/{trial}/{joint}", [found / usual])
+    assert found <= WITHIN * usual

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain
-from calibration.stages.drive_trains.link_motion import deflection
+from calibration.stages.drive_trains.link_motion import RELAXATION, contact, deflection, mesh, stepped
 
 T = np.arange(0.0, 8.0, 0.01)
 
@@ -82,6 +82,21 @@ def test_a_free_link_falls_through_its_gap() -> None:
     assert delta[100] == pytest.approx(0.5, rel=0.01)
 
 
+@pytest.mark.parametrize("relaxation", [1e-6, 5e-3, 12e-3])
+def test_a_flank_pushes_a_link_and_does_not_pull_it_back(relaxation: float) -> None:
+    """Let go, wound up by w: a damped oscillation until spring and damper balance, as fast as it gets, and free then.
+
+    w omega exp(-zeta / sqrt(1 - zeta^2) arccos zeta),     zeta = T omega / 2,     omega = 1 / sqrt(c I)
+    """
+    drive, of, wound = motion(np.zeros(len(T)), 0.0, inertia=0.1), train(2.0, 1e-3, 0.0, True), 1e-3
+    drive = replace(drive, t=5e-3 * T)  # 50 us
+    of = replace(of, values=np.where(np.arange(7) == RELAXATION, relaxation, of.values))
+    delta = of.deltas(drive, drive.torque, np.array([1.0 + wound]))
+    zeta = 0.5 * relaxation * 100.0
+    speed = wound * 100.0 * np.exp(-zeta / np.sqrt(1.0 - zeta**2) * np.arccos(zeta))
+    assert (delta[-100] - delta[-1]) / (drive.t[-1] - drive.t[-100]) == pytest.approx(speed, rel=5e-3)
+
+
 def test_the_longest_step_hardly_matters() -> None:
     drive = motion(0.5 * np.sin(T), 1.5 * np.cos(0.7 * T), 0.05)
     of = train(0.01, 1e-3, 0.2, True)
@@ -139,3 +154,22 @@ def test_trials_that_began_so_before_tell_where_a_link_begins(torque: float) -> 
 
 def test_without_friction_the_load_alone_decides_where_a_link_begins() -> None:
     np.testing.assert_allclose(train(0.02, 1e-3, 0.0).begun(np.array([-3.0, 3.0])), [-0.013, 0.013])
+
+
+@pytest.mark.parametrize("relaxation", [2e-3, 12e-3])
+def test_a_step_ends_where_forces_balance(relaxation: float) -> None:
+    """Near either flank, as it is struck and left: by halves of an interval, where Newton's steps may go in circles."""
+    rng, h = np.random.default_rng(0), 3.3e-3
+    for _ in range(500):
+        c = contact(np.array([5e-3, 10.0 ** rng.uniform(-4.0, -2.7), 0.2, 0.05, relaxation, 0.0, 0.0]))
+        x, rate = rng.choice([-1, 1]) * (5e-3 + 3e-4 * rng.normal()), 0.1 * rng.normal()
+        dq, torque, inertia = 1e-3 * rng.normal(), 2.0 * rng.normal(), 10.0 ** rng.uniform(-3.0, 0.3)
+        found, v = stepped(x, rate, 0.0, dq, torque, inertia, h, c)[0], dq / h
+        load = torque - inertia / h * (v - rate)
+        pull = mesh(x + dq, v, 0.0, h, c)[0] - load
+        sign, low, high = np.sign(pull), -1e4, 1e4
+        for _ in range(80):
+            u = 0.5 * (low + high)
+            left = mesh(x + dq - h * u, v - u, 0.0, h, c)[0] - load - sign * c.coulomb - (inertia / h + c.viscous) * u
+            low, high = (u, high) if left > 0.0 else (low, u)
+        assert found == pytest.approx(x + dq - h * (high if abs(pull) > c.coulomb else 0.0), abs=1e-9)
