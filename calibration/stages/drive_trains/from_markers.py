@@ -37,6 +37,7 @@ from calibration.stages.drive_trains.stage import (
     Moved,
     is_long,
     loads_of_trial,
+    relaxation,
     unidentified,
 )
 from calibration.stages.drive_trains.torques import LinkLoads, load_modes
@@ -155,7 +156,8 @@ def identified_by_markers(
     tolerances = trains.description.tolerances
     C = trains.inertial_tolerances
     modes = load_modes(own, j, np.linalg.cholesky(C + 1e-12 * np.eye(len(C))))
-    data, coarse = (_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
+    relaxes = relaxation(hand, joint)
+    data, coarse = (replace(_data(own, seen, j, modes, window), relaxation=relaxes) for window in (WINDOW, COARSE))
     found, _ = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, float(trains.dynamics.offset[j]))
     names = [q for q in found.parameters if ".link." not in q.name]
     return replace(found, link=np.full(5, np.nan), parameters=tuple(names))

@@ -24,7 +24,7 @@ from calibration.stages.drive_trains.column_bending import column_bending
 from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.fit.identification import identify
-from calibration.stages.drive_trains.fit.joint_data import COARSE, WINDOW, joint_data
+from calibration.stages.drive_trains.fit.joint_data import COARSE, ON_BASE, RELAXATION, WINDOW, joint_data
 from calibration.stages.drive_trains.fit.steady_contact import Slip, slipped_encoder
 from calibration.stages.drive_trains.hung_load import DEPARTS, HungLoad, hung_load
 from calibration.stages.drive_trains.torques import (
@@ -132,6 +132,12 @@ def loads_of_trial(
     return own.loads(trial.id, t, q, base, trial.wrist_wrench[rows])
 
 
+def relaxation(hand: HandModel, joint: str) -> float:
+    """Of a joint's contact [s]: the first one to turn the arm turns the base as its link strikes."""
+    first = next(name for name in hand.chain.joints if not hand.chain.is_prismatic(name))
+    return ON_BASE if joint == first else RELAXATION
+
+
 def motor_zeros(hand: HandModel) -> np.ndarray:
     """(k,) of the measured joints' readings [rad, m]; 0 of joints that are not on the way to the hand."""
     offset = np.zeros(len(hand.chain.measured))
@@ -192,7 +198,8 @@ def _identified(
             return None
         own, seen = [loads[k] for k in has], [differences[k] for k in has]
         modes = load_modes(own, j, root)
-        data, coarse = (joint_data(own, seen, j, modes, window) for window in (WINDOW, COARSE))
+        relaxes = relaxation(hand, joint)
+        data, coarse = (joint_data(own, seen, j, modes, window, relaxes) for window in (WINDOW, COARSE))
         offset = float(bare.dynamics.offset[j])
         train, fit = identify(joint, data, coarse, modes, tolerances.joint_play, DEFLECTION, offset)
         return slipped_encoder(fit) or train

@@ -19,6 +19,8 @@ from calibration.stages.drive_trains.torques import LinkLoads
 
 WINDOW, COARSE = 0.1, 0.5  # [s]
 CORRELATED = 1.5  # [s] readings' errors hang together
+RELAXATION = 6e-3  # [s] a link that strikes rings little, as what carries it yields
+ON_BASE = 12e-3  # [s] of a link that turns the base as it strikes: a base whose motion is given does not yield
 _START = 0.3  # [s] of a trial's rest that show where delta starts
 REGIMES, REST = 3, 2
 _FEW = 20  # windows
@@ -43,6 +45,7 @@ class JointData:
         weight: (k,) of each window, 1 where all are alike, 0 of one that does not count.
         window: Its length [s].
         correlated: How long errors hang together [s].
+        relaxation: Time of the contact, which readings at 100 Hz hardly show [s].
     """
 
     trial_ids: tuple[str, ...]
@@ -56,6 +59,7 @@ class JointData:
     weight: np.ndarray
     window: float = WINDOW
     correlated: float = CORRELATED
+    relaxation: float = RELAXATION
 
     @cached_property
     def group(self) -> np.ndarray:
@@ -153,7 +157,7 @@ class JointData:
         return JointData(
             self.trial_ids[trial : trial + 1], motion, self.modes[own],
             self.first[rows] - start, np.zeros(len(rows), dtype=int), self.regime[rows], self.y[rows],
-            self.terms[rows], self.weight[rows], self.window, self.correlated,
+            self.terms[rows], self.weight[rows], self.window, self.correlated, self.relaxation,
         )  # fmt: skip
 
 
@@ -163,6 +167,7 @@ def joint_data(
     column: int,
     modes: np.ndarray,
     window: float = WINDOW,
+    relaxation: float = RELAXATION,
 ) -> JointData:
     """A joint's trials; differences (n, k) of each trial are motor minus link readings, `modes` (p, z) of dphi."""
     motion = drive_motion(loads, column)
@@ -176,7 +181,7 @@ def joint_data(
         tuple(of_trial.trial_id for of_trial in loads), motion,
         np.concatenate([of_trial.regressor[:, column] for of_trial in loads]) @ modes,
         np.concatenate(first), np.concatenate(trial), _regimes(motion, np.concatenate(first)), np.zeros(0),
-        np.zeros((0, 5)), np.ones(n), window,
+        np.zeros((0, 5)), np.ones(n), window, relaxation=relaxation,
     )  # fmt: skip
     angle = bare.means(np.concatenate([of_trial.angle[:, column] for of_trial in loads]))
     terms = np.column_stack([np.ones(len(angle)), harmonic_terms(angle)])

@@ -24,7 +24,6 @@ NU = 4.0
 _ECCENTRIC = np.array([3e-3, 3e-3, 1e-3, 1e-3])  # [rad] prior of once and twice per turn
 GAMMA_INFORMATION = np.append(0.0, _ECCENTRIC**-2.0)  # [1/rad2]
 _PARAMETERS = ("half_gap", "compliance", "coulomb", "viscous", "link_inertia")
-_RELAXATION = 12e-3  # [s] a base that is given does not yield to a link that strikes; readings at 100 Hz hardly show it
 _MESH = ("spring", "slip")
 _STEPS = 6
 _OPEN = 0.5  # of the prior's standard deviation: more, and a parameter is not known
@@ -91,9 +90,8 @@ class Problem:
         """The drive train with parameters theta (p,)."""
         n = len(_PARAMETERS)
         mesh = theta[n : n + 2] if self.form == "friction_held" else np.zeros(2)
-        return DriveTrain(
-            self.joint, self.form, np.concatenate([theta[:4], [_RELAXATION], mesh]), float(theta[4]), self.dynamic
-        )
+        values = np.concatenate([theta[:4], [self.data.relaxation], mesh])
+        return DriveTrain(self.joint, self.form, values, float(theta[4]), self.dynamic)
 
     def modes(self, theta: np.ndarray) -> np.ndarray:
         """z (z,) of theta."""
