@@ -19,6 +19,7 @@ from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.corrected_trial import shown_by_links
 from calibration.stages.drive_trains.drive_trains import DriveTrains
+from calibration.stages.drive_trains.link_motion import RELAXATION
 from calibration.stages.drive_trains.link_streams import Q, V
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -44,6 +45,8 @@ from calibration.stages.suspension.base_response import WrenchSources
 from calibration.stages.suspension.floor_wrench import Load, elsewhere, motion_load, root_in_base
 from calibration.stages.suspension.model import Source
 from calibration.stages.suspension.rest_frame import Rest, rest_of
+
+_YIELDS = 6e-3  # [s] the most that contacts take to relax on a base that yields as links strike
 
 
 @dataclass(frozen=True)
@@ -260,6 +263,7 @@ def moved_together(
         NotEnoughData: They throw each other apart, as if links were heavier than the robot.
     """
     drives, states, samples = trains.prepared_for(loads)
+    drives.values[:, RELAXATION] = np.minimum(drives.values[:, RELAXATION], _YIELDS)
     t = forcing.t[0] + (np.arange(len(forcing.drive)) - (STEPS - 1)) * STEP
     row = np.minimum(np.searchsorted(loads.t, t), len(loads.t) - 1)
     at_steps = interpolate_columns(t, loads.t, samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
@@ -272,9 +276,7 @@ def moved_together(
     links = Carried(states, np.ascontiguousarray(at_steps), row, loads.inertia, loads.stiffness, P, R, drives)
     x, delta = walked(bases, forcing.drive, forcing.inertia, links, STEP)
     if not np.isfinite(x).all():
-        raise NotEnoughData(
-            f"{forcing.trial_id}: the base and the arm throw each other apart: check the masses of links"
-        )
+        raise NotEnoughData(f"{forcing.trial_id}: base and arm throw each other apart: check the masses of links")
     behind = interpolate_columns(loads.t, t, delta - drives.shifts[:, 0])
     return x - x[forcing.rest].mean(axis=0), trains.behind(loads, behind.T)
 
