@@ -194,6 +194,9 @@ def test_a_base_and_links_that_are_moved_together_agree_with_each_other(trial):
     loads = behind.loads(forcing.t, behind.T_lab_0 @ from_vector(x))
     x[:, PLANE], angles = moved_together(bases, forcing, shared, behind.trains, loads)
     first = of.displacement(forcing)[0]
+    slower = replace(softer, values=np.array([1e-3, 1e-4, 0.5, 0.5, 12e-3, 0.0, 0.0]))  # of a base that does not yield
+    again = moved_together(bases, forcing, shared, replace(behind.trains, trains=(slower,)), loads)
+    np.testing.assert_array_equal(again[1], angles)
     with pytest.raises(NotEnoughData, match="masses of links"):
         moved_together(bases, forcing, replace(shared, x=10.0 * shared.x), behind.trains, loads)
     (yaw, link), (other, _) = next_of(x, angles), next_of(first, None)
