@@ -56,6 +56,14 @@ def links(runs):
     return [_links(folder) for folder in runs]
 
 
+def expect(reason, request):
+    """That a line which the robots of the last series break is broken by them; SEEDS are too few to tell."""
+    if reason and "CLAIM_RUNS" not in os.environ:
+        pytest.skip(reason)
+    if reason:
+        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
+
+
 def _links(folder):
     dataset, estimate = calibration.load(folder / "dataset"), calibration.load_estimate(folder / "estimate")
     corrected, to_mocap = link_angles(estimate, dataset), estimate.clock("robot").to_mocap
@@ -84,8 +92,7 @@ def _of(evaluation):
 @pytest.mark.parametrize("base", ["plate", "measured"])
 @pytest.mark.parametrize("trial", TRIALS)
 def test_another_load_is_taken_into_account(errors, trial, base, claim, request):
-    if (trial, base) in OPEN:
-        request.applymarker(pytest.mark.xfail(reason=OPEN[trial, base], strict=True))
+    expect(OPEN.get((trial, base)), request)
     found = np.array([of[trial, base] / of["xyz", base] for of in errors])
     claim(f"payload/{trial}/{base}", found)
     assert np.median(found) <= WITHIN
@@ -100,8 +107,7 @@ def test_inverse_dynamics_know_a_declared_load(errors, claim):
 @pytest.mark.parametrize("joint", [f"arm_{i}_joint" for i in range(1, 8)])
 @pytest.mark.parametrize("trial", TRIALS)
 def test_links_are_where_another_load_has_them(links, trial, joint, claim, request):
-    if (trial, joint) in OPEN:
-        request.applymarker(pytest.mark.xfail(reason=OPEN[trial, joint], strict=True))
+    expect(OPEN.get((trial, joint)), request)
     usual, found = (np.median([of[name, joint] for of in links]) for name in ("xyz", trial))
     claim(f"payload links/{trial}/{joint}", [found / usual])
     assert found <= WITHIN * usual
