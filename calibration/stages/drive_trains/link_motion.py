@@ -27,7 +27,7 @@ from calibration.numerics.compiled import njit
 
 HALF_GAP, COMPLIANCE, COULOMB, VISCOUS, RELAXATION, SPRING, SLIP = range(7)  # order of `values`
 LIGHT = 1e-5  # [kg.m2] least inertia
-_STEPS = 40  # Newton's, halves of what is left where he would leave it: a flank is struck at once
+_STEPS = 60  # Newton's, halves of what is left where he would leave it: a flank is struck at once
 STILL = 3e-5  # [rad] between two samples: one step will do
 
 
@@ -120,7 +120,7 @@ def stepped(
             before, u = u, u + left / (slope + damping)
             if not low < u < high:
                 u = 0.5 * (low + high)
-            if abs(u - before) <= 1e-12 + 1e-9 * abs(u):
+            if abs(u - before) <= 1e-13 + 1e-12 * abs(u):
                 break
             force, slope = mesh(at - h * u, v - u, s, h, c)
             left = force - load - damping * u

@@ -106,7 +106,7 @@ def test_samples_one_by_one_are_the_recording_in_one_go() -> None:
     assert (batch.high - batch.low)[np.abs(v) < RESTS].max() > 1e-5  # a link at rest whose side is not known
     for name in ("q", "low", "high", "variance"):
         one_by_one = np.concatenate([getattr(x, name) for x in found])
-        assert np.abs(one_by_one - getattr(batch, name)).max() < 1e-9  # where a flank is struck, to steps of halves
+        assert np.abs(one_by_one - getattr(batch, name)).max() < 1e-12
 
 
 def test_a_step_leaves_the_state_before_it_as_it_was() -> None:
