@@ -27,7 +27,7 @@ from calibration.numerics.compiled import njit
 
 HALF_GAP, COMPLIANCE, COULOMB, VISCOUS, RELAXATION, SPRING, SLIP = range(7)  # order of `values`
 LIGHT = 1e-5  # [kg.m2] least inertia
-_STEPS = 60  # Newton's, halves of what is left where he would leave it: a flank is struck at once
+_STEPS = 60  # Newton's, or halves of the interval where one leaves it: forces jump where a flank is struck
 STILL = 3e-5  # [rad] between two samples: one step will do
 
 

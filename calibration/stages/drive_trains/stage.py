@@ -106,7 +106,7 @@ def fit_drive_trains(  # noqa: PLR0913
 def _on_column(
     trains: DriveTrains, trials: Sequence[Trial], robot: Clock, hand: HandModel, moved: Moved
 ) -> DriveTrains:
-    """The same on the column that postures show to bend; the geometry has it as it stands in their middle."""
+    """The same on the column that postures show to bend; the geometry has it as it leans under their mean moment."""
     still = [trial for trial in trials if len(trial.dwell_start) and is_long(trial)]
     loads = side_by_side(lambda trial: loads_of_trial(trains, trial, robot, hand, moved.get(trial.id)), still)
     bending = column_bending(trains.description, still, loads, robot, hand)
@@ -133,7 +133,7 @@ def loads_of_trial(
 
 
 def relaxation(hand: HandModel, joint: str) -> float:
-    """Of a joint's contact [s]: the first one to turn the arm turns the base as its link strikes."""
+    """How long the contact of a joint relaxes [s]: the first revolute joint turns the base as its link strikes."""
     first = next(name for name in hand.chain.joints if not hand.chain.is_prismatic(name))
     return ON_BASE if joint == first else RELAXATION
 

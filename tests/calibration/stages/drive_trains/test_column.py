@@ -86,7 +86,7 @@ def test_a_known_column_is_not_looked_for_in_its_torques():
     assert soft == (0.05 * SOFT.max()) ** 2 < stiff
 
 
-def test_a_base_that_leans_with_its_column_upright_is_no_lean():
+def test_a_column_does_not_lean_under_the_mean_moment_of_the_postures():
     """The placement that takes up a lean in the middle of the postures, and the lean less that middle, cancel."""
     q, still = np.array([[0.0, 0.7]]), np.zeros((1, 2))
     moment = arm(Column(np.zeros(2), np.zeros(2))).evaluated(q, still, still, None)[3][0]
