@@ -26,7 +26,7 @@ from calibration.robot.hand import HandModel
 from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.column_bending import ColumnBending, moved
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.link_streams import RESTS
+from calibration.stages.drive_trains.kernel.link_streams import RESTS
 from calibration.stages.drive_trains.streams import Stream, StreamState, stream_of
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.suspension.floor_wrench import root_in_base
@@ -106,7 +106,7 @@ class BundledArm:
 
         loads = self.trains.weighed(t, q_motor, wrist, under)
         angles = self.trains.of_loads(loads)
-        return ArmPositions(angles.q, angles.variance, loads.moment, loads.torque, loads.v)
+        return ArmPositions(angles.q, angles.variance, angles.moment, loads.torque, loads.v)
 
     def at_rest(self, q_motor: np.ndarray, T_lab_base: np.ndarray | None = None) -> ArmPositions:
         """Of readings (n, k) at rest, each for itself; the base (4, 4) where it is known.

@@ -2,9 +2,10 @@
 
     f_i = F_i + sum_children f_c     tau_i = S_i' f_i     M_ij = S_i' I^c_j S_j
 
-i carries j, I^c_j what j carries; f_0 is the wrench on the root, see `rigid_tree`. What pushes the last body from
-outside is taken off its F. The regressor is how tau changes with masses and first moments of the bodies, second moments
-left alone. Reference: Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 5 and 6.
+i carries j, I^c_j what j carries; f_0 is the wrench on the root, see `rigid_tree`. Leans turn all that the first joint
+carries. What pushes the last body from outside is taken off its F. The regressor is how tau changes with masses
+and first moments of the bodies, second moments left alone. Reference: Featherstone, Rigid Body Dynamics Algorithms,
+2008, ch. 5 and 6.
 """
 
 from typing import NamedTuple
@@ -37,12 +38,14 @@ class TreeDynamics(NamedTuple):
 
     Attributes:
         torque: (n, k) [N.m, N].
-        inertia: (n, k, k) M, symmetric [kg.m2, kg.m, kg].
+        inertia: (n, k + 2, k + 2) M, symmetric, of the joints and of two leans, about x and y of the first joint's
+            frame, of all that it carries [kg.m2, kg.m, kg].
         root: (n, 6) wrench on the root [N, N.m].
         moment: (n, 2) about x and y of the first joint's frame, of the force it passes on [N.m].
         composite: (n, 6, 6) inertia of the whole about the root's origin.
-        coupling: (n, k, 6) wrench on the root by unit acceleration of each joint.
-        stiffness: (n, k, k) how tau grows with the joints' positions by what bodies weigh, symmetric [N.m, N].
+        coupling: (n, k + 2, 6) wrench on the root by unit acceleration of each joint, and of the leans.
+        stiffness: (n, k + 2, k + 2) how tau grows with the joints' positions by what bodies weigh, symmetric; 0 of
+            leans [N.m, N].
         regressor: (n, k, 4 k) by mass, then first moments, body by body; (n, k, 0) where not asked for.
     """
 
@@ -72,8 +75,8 @@ def dynamics_along(
 def room(n: int, k: int, regressors: bool = False) -> TreeDynamics:
     """What dynamics of n samples of k joints are written to."""
     return TreeDynamics(
-        np.empty((n, k)), np.zeros((n, k, k)), np.empty((n, 6)), np.empty((n, 2)), np.empty((n, 6, 6)),
-        np.empty((n, k, 6)), np.zeros((n, k, k)), np.zeros((n, k, 4 * k if regressors else 0)),
+        np.empty((n, k)), np.zeros((n, k + 2, k + 2)), np.empty((n, 6)), np.empty((n, 2)), np.empty((n, 6, 6)),
+        np.empty((n, k + 2, 6)), np.zeros((n, k + 2, k + 2)), np.zeros((n, k, 4 * k if regressors else 0)),
     )  # fmt: skip
 
 
@@ -153,6 +156,7 @@ def sample(
         for j in range(k - 1, -1, -1):
             _gather(tree, work, j, out, i)
         _borne(work, min(1, k), out, i)
+        _lean(tree, work, min(1, k), out, i)
 
 
 @njit(cache=True, error_model="numpy")
@@ -189,3 +193,33 @@ def _borne(w: np.ndarray, first: int, out: TreeDynamics, i: int) -> None:
         out.moment[i, c] = 0.0
         for r in range(3):
             out.moment[i, c] += w[first, 3 * r + c] * (w[first, X + r] + w[first, F + 3 + r])
+
+
+@njit(cache=True, error_model="numpy")
+def _lean(tree: RigidTree, w: np.ndarray, first: int, out: TreeDynamics, i: int) -> None:
+    """Inertia and coupling of what the first joint carries as it leans about x and y of that joint's frame."""
+    k = out.torque.shape[1]
+    for lean in range(k, k + 2):
+        for r in range(3):
+            w[first, S + r], w[first, S + 3 + r] = 0.0, w[first, 3 * r + lean - k]
+        cross(w, first, P, first, S + 3, first, S)
+        times(w, first, S, X)
+        for r in range(6):
+            out.coupling[i, lean, r] = w[first, X + r]
+        for j in range(k):
+            carried = j + 1
+            while carried > first:
+                carried = tree.parent[carried - 1]
+            if carried == first:
+                _share(w, first, out, i, lean, tree.column[j])
+        for other in range(k, lean + 1):
+            _share(w, first, out, i, lean, other)
+
+
+@njit(cache=True, error_model="numpy")
+def _share(w: np.ndarray, first: int, out: TreeDynamics, i: int, lean: int, other: int) -> None:
+    """Inertia of a lean, whose unit twist is that of the first joint's body, and another motion."""
+    total = 0.0
+    for r in range(6):
+        total += w[first, S + r] * out.coupling[i, other, r]
+    out.inertia[i, lean, other] = out.inertia[i, other, lean] = total

@@ -106,4 +106,4 @@ def hand_poses(hand: HandModel, bending: ColumnBending, corrected: CorrectedTria
 
 def moments(corrected: CorrectedTrial, robot: Clock, t: np.ndarray) -> np.ndarray:
     """Moments (n, 2) of the column at mocap times (n,)."""
-    return interpolate_columns(robot.from_mocap(t), corrected.loads.t, corrected.loads.moment)
+    return interpolate_columns(robot.from_mocap(t), corrected.loads.t, corrected.angles.moment)

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from calibration.stages.drive_trains.link_motion import (
+from calibration.stages.drive_trains.kernel.link_motion import (
     COMPLIANCE,
     COULOMB,
     HALF_GAP,

@@ -15,11 +15,11 @@ import numpy as np
 from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
 from calibration.robot.wrist_sensor import Push
-from calibration.stages.drive_trains import link_streams
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_on_floor, hand_on_joints
-from calibration.stages.drive_trains.link_motion import COMPLIANCE
-from calibration.stages.drive_trains.link_streams import RESTS, TORQUE, Drives
+from calibration.stages.drive_trains.kernel import link_streams
+from calibration.stages.drive_trains.kernel.link_motion import COMPLIANCE, SPRING
+from calibration.stages.drive_trains.kernel.link_streams import INERTIA, RESTS, TORQUE, Drives
 from calibration.stages.drive_trains.torques import (
     UNWEIGHED,
     Column,
@@ -45,12 +45,14 @@ class LinkAngles(NamedTuple):
         low: Least of them, where the side of the mesh is not known.
         high: Largest.
         variance: Of q [rad2].
+        moment: (n, 2) about x and y under which a column at rest would lean as it does [N.m].
     """
 
     q: np.ndarray
     low: np.ndarray
     high: np.ndarray
     variance: np.ndarray
+    moment: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ class DriveTrains:
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
-        return self.behind(loads, self._deltas(loads, 1)[..., 0])
+        return self.behind(loads, self._deltas(loads, 1)[0][..., 0])
 
     def behind(self, loads: LinkLoads, deltas: np.ndarray) -> np.ndarray:
         """The same by how far (m, n) [rad] the links are behind."""
@@ -172,33 +174,45 @@ class DriveTrains:
 
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""
-        deltas = self._deltas(loads, RUNS)
+        deltas, moment = self._deltas(loads, RUNS)
         q = self.behind(loads, deltas[..., 0])
         low, high, variance = q.copy(), q.copy(), np.zeros(q.shape)
         for train, delta in zip(self.trains, deltas, strict=True):
             j, least, most = self.joints.index(train.joint), delta.min(axis=1), delta.max(axis=1)
             low[:, j], high[:, j] = q[:, j] + delta[:, 0] - most, q[:, j] + delta[:, 0] - least
             variance[:, j] = train.variance(least, most, np.abs(loads.v[:, j]) >= RESTS)
-        return LinkAngles(q, low, high, variance)
+        return LinkAngles(q, low, high, variance, moment)
 
-    def _deltas(self, loads: LinkLoads, runs: int) -> np.ndarray:
-        """(m, n, runs) [rad] of each drive train, what its torques are off by taken off as a mesh in contact has it."""
+    def _deltas(self, loads: LinkLoads, runs: int) -> tuple[np.ndarray, np.ndarray]:
+        """(m, n, runs) [rad] of each drive train, what its torques are off by taken off as a mesh in contact has it.
+
+        And the moments of `LinkAngles`.
+        """
         if not self.trains:
-            return np.zeros((0, len(loads.t), runs))
+            return np.zeros((0, len(loads.t), runs)), loads.moment
         drives, states, samples = self.prepared_for(loads, runs)
         found = link_streams.walked(states, loads.t, samples, loads.inertia, loads.stiffness, LONGEST, drives)
-        return np.asarray(np.moveaxis(found - drives.shifts[:, :runs], 1, 0))
+        m = len(self.trains)
+        deltas = np.asarray(np.moveaxis(found[:, :m] - drives.shifts[:, :runs], 1, 0))
+        return deltas, swayed(drives, found[:, m:, 0], loads.moment)
 
     def prepared_for(self, loads: LinkLoads, runs: int = 1) -> tuple[Drives, np.ndarray, np.ndarray]:
         """What `link_streams` take of a trial: parameters, states (m, runs, 3) at its start, samples (n, 4, m)."""
-        samples = np.empty((len(loads.t), 4, len(self.trains)))
+        drives, k = prepared(self), len(self.joints)
+        samples = np.zeros((len(loads.t), 4, len(drives.columns)))
         for i, train in enumerate(self.trains):
             j, phi = self.joints.index(train.joint), train.inertials if len(train.inertials) else None
             own = drive_motion([loads], j, phi)
             torque = own.torque + train.link_inertia * own.a
             samples[:, :, i] = np.stack([own.q, own.v, torque, train.moved_inertia(own.inertia)], axis=1)
-        drives = prepared(self)
+        for i, c in enumerate(drives.columns[len(self.trains) :], len(self.trains)):
+            samples[:, TORQUE, i], samples[:, INERTIA, i] = loads.moment[:, c - k], loads.inertia[:, c, c]
         return drives, begun(self, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs].copy(), samples
+
+
+def swayed(drives: Drives, lean: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """Moments (n, 2) under which a column at rest would lean by -lean (n, 2); those on one that does not bend."""
+    return moment if not lean.shape[1] else np.asarray(lean / drives.values[-2:, COMPLIANCE])
 
 
 def begun(trains: DriveTrains, drives: Drives, torques: np.ndarray, G: np.ndarray) -> np.ndarray:
@@ -206,29 +220,35 @@ def begun(trains: DriveTrains, drives: Drives, torques: np.ndarray, G: np.ndarra
     states, G = np.zeros((len(torques), RUNS, 3)), G[np.ix_(drives.columns, drives.columns)]
     for _ in range(_PASSES):
         at_links = torques - G @ states[:, 0, 0]
-        for i, (train, torque) in enumerate(zip(trains.trains, at_links, strict=True)):
+        for i, (train, torque) in enumerate(zip(trains.trains, at_links, strict=False)):
             low, high = train.ends(torque + drives.offs[i, ::2])
             starts = [*train.begun(torque[None]), *np.column_stack([low, high])[1:].ravel()]
             states[i, :, 0] = states[i, :, 2] = starts
+        sways = slice(len(trains.trains), None)
+        states[sways, :, 0] = (drives.values[sways, COMPLIANCE] * torques[sways])[:, None]
     return states
 
 
 def prepared(trains: DriveTrains) -> Drives:
-    """Drive trains made ready for their kernels."""
+    """Drive trains made ready for their kernels, and the column that carries them where it bends."""
     of, robot = trains.trains, trains.dynamics
-    p = len(inertials(robot))
+    p, m, k = len(inertials(robot)), len(of), len(trains.joints)
+    soft = robot.column.compliance if of and robot.column.compliance.all() else np.zeros(0)
+    column = np.zeros((len(soft), 7))
+    column[:, COMPLIANCE], column[:, SPRING] = soft, 1.0
+    own, sways = (np.arange(n, n + len(soft)) for n in (k, m))
     offs = np.array([[0.0, -s, -s, s, s] for s in (2.0 * t.torque_sigma for t in of)]).reshape(-1, RUNS)
     return Drives(
-        np.array([trains.joints.index(t.joint) for t in of], dtype=np.int64),
-        np.array([[t.joint for t in of].index(t.joint) for t in trains.inwards], dtype=np.int64),
-        np.array([t.simulated_values for t in of]).reshape(-1, 7),
+        np.array([*(trains.joints.index(t.joint) for t in of), *own], dtype=np.int64),
+        np.array([*([t.joint for t in of].index(t.joint) for t in trains.inwards), *sways], dtype=np.int64),
+        np.array([*(t.simulated_values for t in of), *column]).reshape(-1, 7),
         np.array([t.inertials if len(t.inertials) else np.zeros(p) for t in of]).reshape(-1, p),
         np.array([t.link_inertia for t in of], dtype=float),
-        np.array([t.dynamic for t in of], dtype=bool),
+        np.array([*(t.dynamic for t in of), *(soft > 0.0)], dtype=bool),
         offs,
         offs * np.array([t.values[COMPLIANCE] for t in of])[:, None],
         np.array([t.motor for t in of]).reshape(-1, 4),
-        np.array([not t.dynamic and t.form == "dead_zone" for t in of], dtype=bool),
+        np.array([*(not t.dynamic and t.form == "dead_zone" for t in of), *(soft < 0.0)], dtype=bool),
         np.array([[t.doubt**2 / 12.0, t.doubt_at_rest**2 / 12.0, t.residual**2] for t in of]).reshape(-1, 3),
         np.array(robot.offset, dtype=float),
         np.array(robot.column, dtype=float),

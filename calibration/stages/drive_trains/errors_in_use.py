@@ -28,8 +28,8 @@ from calibration.stages.drive_trains.drive_train import DriveTrain
 from calibration.stages.drive_trains.drive_trains import DriveTrains
 from calibration.stages.drive_trains.fit.identification import OTHER_SIDE, SURE
 from calibration.stages.drive_trains.fit.joint_data import window_means, windows
-from calibration.stages.drive_trains.link_motion import HALF_GAP
-from calibration.stages.drive_trains.link_streams import RESTS
+from calibration.stages.drive_trains.kernel.link_motion import HALF_GAP
+from calibration.stages.drive_trains.kernel.link_streams import RESTS
 
 _EVEN = 2.0  # A
 

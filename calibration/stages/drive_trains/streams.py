@@ -12,10 +12,10 @@ import numpy as np
 
 from calibration.robot.rigid_tree import scratch
 from calibration.robot.tree_dynamics import TreeDynamics, room
-from calibration.stages.drive_trains import link_streams
 from calibration.stages.drive_trains.drive_train import LONGEST
-from calibration.stages.drive_trains.drive_trains import RUNS, DriveTrains, LinkAngles, begun, prepared
-from calibration.stages.drive_trains.link_streams import TORQUE, Drives
+from calibration.stages.drive_trains.drive_trains import RUNS, DriveTrains, LinkAngles, begun, prepared, swayed
+from calibration.stages.drive_trains.kernel import link_streams
+from calibration.stages.drive_trains.kernel.link_streams import TORQUE, Drives
 
 
 class StreamState(NamedTuple):
@@ -25,9 +25,9 @@ class StreamState(NamedTuple):
         t: [s].
         moving: (3, k) readings, velocities and accelerations of all motors [rad, m, s].
         samples: (4, m) motor readings [rad], velocities [rad/s], torques [N.m] and inertias [kg.m2].
-        states: (m, 5, 3) delta, its rate and the slider of each run.
+        states: (m, 5, 3) delta, its rate and the slider of each run; then how a column that bends leans.
         torque: (1, k) nominal, on all joints [N.m, N].
-        moment: (1, 2) on the column [N.m].
+        moment: (1, 2) on the column, as of `LinkAngles` [N.m].
     """
 
     t: float
@@ -64,7 +64,7 @@ class Stream:
         link_streams.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
         states[:] = begun(self.trains, drives, state.samples[TORQUE], found.stiffness[0])
         link_streams.link_angles(states, state.moving, drives, angles)
-        return state, LinkAngles(*angles)
+        return state, self._leaning(state, angles)
 
     def step(
         self, before: StreamState, t: float, moving: np.ndarray, base: np.ndarray | None = None
@@ -78,7 +78,14 @@ class Stream:
             robot.tree, drives, root, self.work, found, state.moving, before.samples, state.states, t - before.t,
             LONGEST, state.samples, angles,
         )  # fmt: skip
-        return state, LinkAngles(*angles)
+        return state, self._leaning(state, angles)
+
+    def _leaning(self, state: StreamState, angles: np.ndarray) -> LinkAngles:
+        """Angles (4, 1, k) with the moments of `LinkAngles`, which take the place of a rigid column's in the state."""
+        lean = state.states[len(self.trains.trains) :, 0, 0]
+        state.moment[0] = swayed(self.prepared, lean[None], state.moment)[0]
+        q, low, high, variance = angles
+        return LinkAngles(q, low, high, variance, state.moment)
 
     def _room(self, t: float, moving: np.ndarray) -> tuple[StreamState, TreeDynamics, np.ndarray]:
         """A state, dynamics and link angles (4, 1, k) to be filled."""

@@ -53,11 +53,12 @@ class LinkLoads:
         v: Motor velocities.
         a: Motor accelerations.
         torque: tau [N.m, N].
-        inertia: (n, k, k) M [kg.m2, kg.m, kg]; of a pushed hand, without what hangs on the wrist's sensor.
+        inertia: (n, k + 2, k + 2) M, of leans of the column, too, see `TreeDynamics` [kg.m2, kg.m, kg]; of a pushed
+            hand, without what hangs on the wrist's sensor.
         regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
-        stiffness: (n, k, k) G, how tau grows with the joints' positions [N.m/rad, N].
-        coupling: (n, k, 6) wrench on the tree's root by unit acceleration of each joint.
+        stiffness: (n, k + 2, k + 2) G, how tau grows with the joints' positions [N.m/rad, N].
+        coupling: (n, k + 2, 6) wrench on the tree's root by unit acceleration of each joint and lean.
     """
 
     trial_id: str
@@ -78,9 +79,10 @@ class LinkLoads:
 
         tau_i - sum_j G_ij delta_j - sum_(j != i) M_ij d2 delta_j / dt2
         """
-        a = derivatives(self.t, delta, CUTOFF)[2]
-        moved = (self.inertia @ a[..., None])[..., 0] - np.einsum("nii,ni->ni", self.inertia, a)
-        return replace(self, torque=self.torque - (self.stiffness @ delta[..., None])[..., 0] - moved)
+        a, k = derivatives(self.t, delta, CUTOFF)[2], delta.shape[1]
+        M, G = self.inertia[:, :k, :k], self.stiffness[:, :k, :k]
+        moved = (M @ a[..., None])[..., 0] - np.einsum("nii,ni->ni", M, a)
+        return replace(self, torque=self.torque - (G @ delta[..., None])[..., 0] - moved)
 
 
 class Column(NamedTuple):
@@ -161,8 +163,9 @@ class Dynamics:
         if push is not None:
             root, tree = np.concatenate([np.broadcast_to(root, (len(q), 12)), push.wrench], axis=1), push.on(tree)
         found = dynamics_along(tree, q - delta - self.offset, v, a, root, True)
-        torque = found.torque + (found.stiffness @ delta[..., None])[..., 0]
-        a_0, pull = root[:, None, 6:9], found.coupling  # a_0 x e of both axes
+        k = q.shape[1]
+        torque = found.torque + (found.stiffness[:, :k, :k] @ delta[..., None])[..., 0]
+        a_0, pull = root[:, None, 6:9], found.coupling[:, :k]  # a_0 x e of both axes
         tilt = np.stack(
             [
                 pull[..., 1] * a_0[..., 2] - pull[..., 2] * a_0[..., 1],

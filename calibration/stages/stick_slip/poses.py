@@ -19,8 +19,8 @@ from calibration.recording.trial import Trial
 from calibration.robot.laboratory import Laboratory
 from calibration.stages.drive_trains.corrected_trial import shown_by_links
 from calibration.stages.drive_trains.drive_trains import DriveTrains
-from calibration.stages.drive_trains.link_motion import RELAXATION
-from calibration.stages.drive_trains.link_streams import Q, V
+from calibration.stages.drive_trains.kernel.link_motion import RELAXATION
+from calibration.stages.drive_trains.kernel.link_streams import Q, V
 from calibration.stages.drive_trains.stage import AS_SEEN, Moved
 from calibration.stages.drive_trains.torques import LinkLoads
 from calibration.stages.stick_slip.forcing import (
@@ -277,7 +277,7 @@ def moved_together(
     x, delta = walked(bases, forcing.drive, forcing.inertia, links, STEP)
     if not np.isfinite(x).all():
         raise NotEnoughData(f"{forcing.trial_id}: base and arm throw each other apart: check the masses of links")
-    behind = interpolate_columns(loads.t, t, delta - drives.shifts[:, 0])
+    behind = interpolate_columns(loads.t, t, delta[:, : len(trains.trains)] - drives.shifts[:, 0])
     return x - x[forcing.rest].mean(axis=0), trains.behind(loads, behind.T)
 
 

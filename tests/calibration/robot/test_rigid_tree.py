@@ -49,7 +49,8 @@ def test_dynamics_are_pinocchio_s(arm):
         H += np.triu(H, 1).T
         Y = pin.computeJointTorqueRegressor(arm, data, at, rate, push)[columns][:, masses]
         expected += [H[np.ix_(columns, columns)], H[:6, :6], H[:6, columns].T, Y]
-        ours = (found.torque, found.root, found.moment, found.inertia, found.composite, found.coupling, found.regressor)
+        M, P = found.inertia[:, :K, :K], found.coupling[:, :K]
+        ours = (found.torque, found.root, found.moment, M, found.composite, P, found.regressor)
         for x, y in zip(ours, expected, strict=True):
             np.testing.assert_allclose(x[i], y, rtol=1e-12, atol=1e-12 * np.abs(y).max())
 
@@ -68,7 +69,7 @@ def test_stiffness_is_how_weight_grows_with_position(arm):
     joints, rng = tuple(f"joint_{i}" for i in range(K)), np.random.default_rng(3)
     q, still, a_0, data = rng.normal(size=K), np.zeros(K), rng.normal(size=3), arm.createData()
     root = np.concatenate([np.zeros(6), a_0, np.zeros(3)])[None]
-    found = dynamics_along(tree_of(arm, joints), q[None], still[None], still[None], root).stiffness[0]
+    found = dynamics_along(tree_of(arm, joints), q[None], still[None], still[None], root).stiffness[0, :K, :K]
     held = arm.copy()
     held.gravity = pin.Motion(-a_0, np.zeros(3))
     columns = [arm.joints[arm.getJointId(name)].idx_v for name in joints]
@@ -92,3 +93,24 @@ def test_the_wrench_that_moves_the_last_body_is_pinocchio_s(arm):
         pin.rnea(arm, data, at, rate, push)
         expected = data.oMi[1].actInv(data.oMi[arm.njoints - 1]).act(data.f[arm.njoints - 1])
         np.testing.assert_allclose(found[i], expected.vector, rtol=1e-11, atol=1e-11)
+
+
+def test_what_leans_resists_as_its_moment_shows(arm):
+    """Moments of a robot at rest by accelerations of one joint, or of the root, of which a lean is one."""
+    joints, tree = (names := tuple(f"joint_{i}" for i in range(K))), tree_of(arm, names)
+    q, still, data = np.random.default_rng(5).normal(size=K), np.zeros((1, K)), arm.createData()
+    found, nothing = dynamics_along(tree, q[None], still, still, np.zeros((1, 12))), np.zeros(6)
+
+    def moment(a: np.ndarray, root: np.ndarray) -> np.ndarray:
+        return dynamics_along(tree, q[None], still, a[None], np.concatenate([nothing, root])[None]).moment[0]
+
+    by_joints = np.array([moment(a, nothing) for a in np.eye(K)])
+    by_root = np.array([moment(still[0], a) for a in np.eye(6)])
+    np.testing.assert_allclose(found.inertia[0, K:, :K], by_joints.T, atol=1e-12)
+    np.testing.assert_allclose(found.coupling[0, K:], by_root.T, atol=1e-12)
+    step = np.zeros(arm.nv)
+    step[[arm.joints[arm.getJointId(name)].idx_v for name in joints]] = q
+    pin.forwardKinematics(arm, data, pin.integrate(arm, pin.neutral(arm), step))
+    leans = np.array([data.oMi[1].actInv(data.oMi[2]).act(pin.Motion(np.eye(6)[3 + c])).vector for c in range(2)])
+    np.testing.assert_allclose(found.inertia[0, K:, K:], leans @ by_root, atol=1e-12)
+    assert (found.inertia[0] == found.inertia[0].T).all() and (found.stiffness[0, K:] == 0.0).all()

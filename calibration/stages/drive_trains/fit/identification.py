@@ -35,7 +35,7 @@ from calibration.stages.drive_trains.fit.train_fit import (
     sizes,
     weights,
 )
-from calibration.stages.drive_trains.link_motion import COULOMB, HALF_GAP
+from calibration.stages.drive_trains.kernel.link_motion import COULOMB, HALF_GAP
 
 _FRICTION, _TORQUE = 0.15, 0.045  # share of the friction, and [N.m], to which a load is not known
 SURE, _FEW = 0.1, 20  # of the half gap that an error of the torque moves a link by; windows

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibration.numerics.compiled import njit
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveMotion, DriveTrain, drive_motion, harmonic_terms
-from calibration.stages.drive_trains.link_motion import Drive
+from calibration.stages.drive_trains.kernel.link_motion import Drive
 from calibration.stages.drive_trains.torques import LinkLoads
 
 WINDOW, COARSE = 0.1, 0.5  # [s]

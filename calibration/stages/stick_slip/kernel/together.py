@@ -17,8 +17,8 @@ import numpy as np
 
 from calibration.numerics.compiled import njit
 from calibration.stages.drive_trains.drive_train import LONGEST
-from calibration.stages.drive_trains.link_motion import LIGHT
-from calibration.stages.drive_trains.link_streams import INERTIA, TORQUE, Drives, streamed
+from calibration.stages.drive_trains.kernel.link_motion import LIGHT
+from calibration.stages.drive_trains.kernel.link_streams import INERTIA, TORQUE, Drives, streamed
 from calibration.stages.stick_slip.kernel.bases import ACCELERATION, STEPS, VELOCITY, Bases, X
 from calibration.stages.stick_slip.kernel.corrector import solved
 from calibration.stages.stick_slip.kernel.integration import advance

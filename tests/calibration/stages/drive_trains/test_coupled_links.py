@@ -72,7 +72,7 @@ def test_a_strike_of_the_outer_link_throws_the_inner_one_and_is_thrown_back(
 ) -> None:
     true, of, loads = links
     error = np.abs(of.likely(loads) - true).max(axis=0)
-    alone = np.abs(of.likely(replace(loads, inertia=loads.inertia * np.eye(2))) - true).max(axis=0)
+    alone = np.abs(of.likely(replace(loads, inertia=loads.inertia * np.eye(4))) - true).max(axis=0)
     assert np.ptp(loads.q[:, 0]) == 0.0 and np.ptp(true[:, 0]) > 1.2e-3  # it moves though its motor stands
     assert error[0] < 0.2e-3 and error[1] < 0.2e-3, error  # one sweep leaves 0.3e-3 of the outer one
     assert alone[0] > 1.2e-3, alone  # what no coupling leaves
@@ -91,4 +91,4 @@ def test_links_are_carried_one_by_one_as_all_at_once(links: tuple[np.ndarray, Dr
 
 def test_trains_may_be_listed_in_any_order(links: tuple[np.ndarray, DriveTrains, LinkLoads]) -> None:
     _, of, loads = links
-    assert (replace(of, trains=of.trains[::-1]).likely(loads) == of.likely(loads)).all()
+    assert np.abs(replace(of, trains=of.trains[::-1]).likely(loads) - of.likely(loads)).max() < 1e-12

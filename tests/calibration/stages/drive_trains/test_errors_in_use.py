@@ -42,7 +42,7 @@ def corrected(seed: int, moving: float, resting: float) -> CorrectedTrial:
     predicted, read = theta + error, np.full(shape, np.nan)
     read[:, COLUMN] = theta[:, COLUMN] + ERRORS[0] + harmonic_terms(theta[:, COLUMN]) @ ERRORS[1:]
     read[np.arange(N) // WINDOW % 10 == 0] = np.nan
-    angles = LinkAngles(predicted, predicted - 0.5 * width, predicted + 0.5 * width, np.zeros(shape))
+    angles = LinkAngles(predicted, predicted - 0.5 * width, predicted + 0.5 * width, np.zeros(shape), None)
     return CorrectedTrial(Readings(predicted, read), Loads(0.01 * np.arange(N), v), angles)  # type: ignore[arg-type]
 
 

@@ -49,7 +49,7 @@ def test_the_geometry_is_of_angles_that_link_encoders_read_where_they_do():
     read = q.copy()
     read[10:] = np.nan
     interval = np.full((n - 1, 8), 1e-6)
-    of = CorrectedTrial(Readings(predicted, read), None, LinkAngles(None, None, None, interval))
+    of = CorrectedTrial(Readings(predicted, read), None, LinkAngles(None, None, None, interval, None))
     found = seen_by_links(trains, of)
     seen = np.delete(np.arange(10), 3)
     np.testing.assert_allclose(found.trial.q_motor[seen, COLUMN], q[seen, COLUMN])

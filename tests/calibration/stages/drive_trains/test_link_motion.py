@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.stages.drive_trains.drive_train import DriveMotion, DriveTrain
-from calibration.stages.drive_trains.link_motion import RELAXATION, contact, deflection, mesh, stepped
+from calibration.stages.drive_trains.kernel.link_motion import RELAXATION, contact, deflection, mesh, stepped
 
 T = np.arange(0.0, 8.0, 0.01)
 

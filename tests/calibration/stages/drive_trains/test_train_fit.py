@@ -27,7 +27,7 @@ from calibration.stages.drive_trains.fit.train_fit import (
     fit_train,
     prior_of,
 )
-from calibration.stages.drive_trains.link_motion import COULOMB
+from calibration.stages.drive_trains.kernel.link_motion import COULOMB
 
 TRUTH = DriveTrain("joint", "dead_zone", np.array([3e-3, 8e-4, 0.15, 0.05, 1.5e-3, 0.0, 0.0]), dynamic=False)
 ECCENTRICITY = np.array([4e-3, 1e-3, -2e-3, 3e-4, -5e-4])

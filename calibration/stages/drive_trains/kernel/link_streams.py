@@ -2,10 +2,10 @@
 
     tau_i <- tau_i - sum_k M_ik d2 delta_k / dt2 - sum_j G_ij delta_j          k all other links, j all of them
 
-Within a step a link is moved by what the others do in the same step, SWEEPS times from the hand inwards (Gauss-Seidel
-on the blocks of M): first by links nearer to the hand, then by those that carry it, too. A link that strikes in its
-gap throws the link that carries it, and is thrown by it. Reference: Jean, The non-smooth contact dynamics method,
-Comput. Methods Appl. Mech. Engrg. 1999 (the same sweeps over contacts).
+Within a step a link is moved by what the others do in the same step, see `balance`: by sweeps from the hand inwards,
+then all at once. A link that strikes in its gap throws the link that carries it, and is thrown by it. The column that
+carries the arm has no motor and no gap: how it leans about x and y, -delta, sways as links move, and moves them.
+Reference: Jean, The non-smooth contact dynamics method, Comput. Methods Appl. Mech. Engrg. 1999 (sweeps over contacts).
 """
 
 from typing import NamedTuple
@@ -15,18 +15,19 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.robot.rigid_tree import RigidTree
 from calibration.robot.tree_dynamics import TreeDynamics, sample
-from calibration.stages.drive_trains.link_motion import LIGHT, STILL, Drive, advanced, along, carried, contact, stepped
+from calibration.stages.drive_trains.kernel.balance import Step, balanced, swept
+from calibration.stages.drive_trains.kernel.link_motion import LIGHT, STILL, Drive, advanced, along, carried, contact
 
 Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
-SWEEPS = 2
 RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
 
 
 class Drives(NamedTuple):
-    """Drive trains made ready for single samples, m of them in a robot of k joints.
+    """Drive trains made ready for single samples, m of them in a robot of k joints, and a column that bends or not.
 
     Attributes:
-        columns: (m,) column of each in the readings.
+        columns: (m,) column of each in the readings; where the column bends then k and k + 1, its leans: so all of
+            these have two more but inertials, link_inertia, motor and doubt.
         inwards: (m,) their numbers, those nearer to the hand first.
         values: (m, 7) as simulated.
         inertials: (m, p) of each load.
@@ -72,7 +73,11 @@ def loaded(
     x, y, z, p = root[0, 6], root[0, 7], root[0, 8], found.regressor.shape[2]
     M, (soft, mean) = found.moment[0], drives.column
     lean_x, lean_y = soft[0] * (mean[0] - M[0]), soft[1] * (mean[1] - M[1])
-    for i in range(len(drives.columns)):
+    for i in range(len(drives.motor), len(drives.columns)):
+        c = drives.columns[i]
+        samples[Q, i] = samples[V, i] = 0.0
+        samples[TORQUE, i], samples[INERTIA, i] = M[c - moving.shape[1]], found.inertia[0, c, c]
+    for i in range(len(drives.motor)):
         c, phi, pull = drives.columns[i], drives.inertials[i], found.coupling[0, drives.columns[i]]
         torque, inertia = found.torque[0, c] + drives.link_inertia[i] * a[0, c], found.inertia[0, c, c]
         for k in range(p):
@@ -90,36 +95,44 @@ def together(
 ) -> np.ndarray:  # fmt: skip
     """Move links (m, 3), that are no play operators, from samples a to b (4, m); mean accelerations of deltas (m,).
 
-    M and G (k, k) are inertia and stiffness of all joints at b. Steps are no longer than `longest` [s].
+    M and G (k + 2, k + 2) are inertia and stiffness of all joints, and of the column, at b. Steps are no longer than
+    `longest` [s].
     """
-    m, columns, still = len(links), drives.columns, True
-    new, acceleration, mean = links.copy(), np.zeros(m), np.zeros(m)
-    for i in range(m):
-        moved = abs(b[Q, i] - a[Q, i]) + abs(a[V, i] * dt) + abs(b[V, i] * dt) + abs(links[i, 1]) * dt
-        still = still and moved < STILL
-    n = 1 if still else max(1, int(np.ceil(dt / longest - 1e-6)))
-    h = dt / n
+    m, rates = len(links), links[:, 1].copy()
+    n = _steps(links, a, b, dt, longest)
+    h, new = dt / n, links.copy()
+    step = Step(np.empty(m), np.empty(m), _among(M, drives.columns), _among(G, drives.columns))
     for k in range(n):
         s, before = (k + 1) / n, k / n
-        acceleration[:] = 0.0
-        for _ in range(SWEEPS):
-            for i in drives.inwards:
-                if drives.plays[i]:
-                    continue
-                torque, c = a[TORQUE, i] + s * (b[TORQUE, i] - a[TORQUE, i]), contact(drives.values[i])
-                inertia = a[INERTIA, i] + s * (b[INERTIA, i] - a[INERTIA, i])
-                for other in range(m):
-                    torque -= G[columns[i], columns[other]] * new[other, 0]
-                    if other != i:
-                        torque -= M[columns[i], columns[other]] * acceleration[other]
-                p, r, d = a[V, i] * dt, b[V, i] * dt, b[Q, i] - a[Q, i]
-                dq = along(p, r, d, s) - along(p, r, d, before)
-                x, rate, slider = links[i]
-                new[i] = stepped(x, rate, slider, dq, torque, inertia, h, c)
-                acceleration[i] = (new[i, 1] - rate) / h
+        for i in range(m):
+            p, r, d = a[V, i] * dt, b[V, i] * dt, b[Q, i] - a[Q, i]
+            step.speed[i] = (along(p, r, d, s) - along(p, r, d, before)) / h
+            step.load[i] = a[TORQUE, i] + s * (b[TORQUE, i] - a[TORQUE, i])
+            step.M[i, i] = a[INERTIA, i] + s * (b[INERTIA, i] - a[INERTIA, i])
+        swept(new, links, step, h, drives.inwards, ~drives.plays, drives.values)
+        balanced(new, links, step, h, drives.dynamic, drives.values)
         links[:] = new
-        mean += acceleration / n
-    return mean
+    return (links[:, 1] - rates) / dt
+
+
+@njit(cache=True, error_model="numpy")
+def _steps(links: np.ndarray, a: np.ndarray, b: np.ndarray, dt: float, longest: float) -> int:
+    """Number of steps from samples a to b (4, m): one where nothing moves."""
+    for i in range(len(links)):
+        moved = abs(b[Q, i] - a[Q, i]) + abs(a[V, i] * dt) + abs(b[V, i] * dt) + abs(links[i, 1]) * dt
+        if moved >= STILL:
+            return max(1, int(np.ceil(dt / longest - 1e-6)))
+    return 1
+
+
+@njit(cache=True, error_model="numpy")
+def _among(A: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Rows and columns (m, m) of A (k + 2, k + 2)."""
+    found = np.empty((len(columns), len(columns)))
+    for i in range(len(columns)):
+        for j in range(len(columns)):
+            found[i, j] = A[columns[i], columns[j]]
+    return found
 
 
 @njit(cache=True, error_model="numpy")
@@ -129,8 +142,8 @@ def streamed(
 ) -> np.ndarray:  # fmt: skip
     """Move states (m, c, 3) of m drive trains by dt [s] from samples `before` (4, m); c runs, torques off by `offs`.
 
-    M and G (k, k) are inertia and stiffness of all joints at `samples`. The first runs, the likely ones, move together,
-    and their mean accelerations (m,) are returned; each other one moves alone, loaded by what these do.
+    M and G as of `together`. The first runs, the likely ones, move together, and their mean accelerations (m,) are
+    returned; each other one moves alone, loaded by what these do. The column has the first alone.
     """
     m, columns = samples.shape[1], drives.columns
     room = np.zeros((5, m))
@@ -138,7 +151,7 @@ def streamed(
     a = Drive(room[0], before[Q], before[V], room[2], before[INERTIA], room[4])
     b = Drive(room[1], samples[Q], samples[V], room[3], samples[INERTIA], room[4])
     acceleration = together(states[:, 0], before, samples, M, G, dt, longest, drives)
-    for i in range(m):
+    for i in range(len(drives.motor)):
         others, c = 0.0, contact(drives.values[i])
         for other in range(m):
             if other != i:
@@ -159,7 +172,7 @@ def streamed(
 def walked(
     states: np.ndarray, t: np.ndarray, samples: np.ndarray, M: np.ndarray, G: np.ndarray, longest: float, drives: Drives
 ) -> np.ndarray:
-    """delta (n, m, c) [rad] of states (m, c, 3), as of `streamed`, along samples (n, 4, m), t (n,), M, G (n, k, k)."""
+    """delta (n, m, c) [rad] of states (m, c, 3), as of `streamed`, along samples (n, 4, m), t (n,); M, G of each."""
     found = np.empty((len(t), *states.shape[:2]))
     found[0] = states[:, :, 0]
     for k in range(1, len(t)):
@@ -175,7 +188,7 @@ def link_angles(states: np.ndarray, moving: np.ndarray, drives: Drives, out: np.
     for j in range(len(q)):
         out[0, 0, j] = out[1, 0, j] = out[2, 0, j] = q[j]
         out[3, 0, j] = 0.0
-    for i in range(len(drives.columns)):
+    for i in range(len(drives.motor)):
         c, e = drives.columns[i], drives.motor[i]
         top, bottom, theta = -np.inf, np.inf, q[c] - drives.offset[c]
         for j in range(states.shape[1]):
