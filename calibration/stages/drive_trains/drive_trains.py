@@ -143,8 +143,15 @@ class DriveTrains:
         return base_motion(self.dynamics.gravity, t, T_lab_root, at, by_plate)
 
     def hand(self, t: np.ndarray, q: np.ndarray, wrist: np.ndarray, base: np.ndarray | None = None) -> Push | None:
-        """`hand_on_floor` by the wrist's sensor (n, 6), on a base (n, 12) as `base_motion` has it."""
-        return hand_on_floor(self.urdf, self.description, self.hung, t, q - self.dynamics.offset, wrist, base)
+        """`hand_on_floor` by the wrist's sensor (n, 6), on a base (n, 12) as of `base_motion`; q may be `swaying`."""
+        angles = self.angles(q)[:, : len(self.joints)]
+        return hand_on_floor(self.urdf, self.description, self.hung, t, angles, wrist, base)
+
+    def angles(self, q: np.ndarray) -> np.ndarray:
+        """Positions as of `swaying` less the zeros of the readings [rad, m]."""
+        zeros = np.zeros(q.shape[1])
+        zeros[: len(self.joints)] = self.dynamics.offset
+        return np.asarray(q - zeros)
 
     def loads(
         self, trial_id: str, t: np.ndarray, q: np.ndarray, base: np.ndarray | None, wrist: np.ndarray | None
@@ -162,39 +169,43 @@ class DriveTrains:
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
-        return self.behind(loads, self._deltas(loads, 1)[0][..., 0])
+        return self.behind(loads, self._deltas(loads, 1)[: len(self.trains), :, 0])
+
+    def swaying(self, loads: LinkLoads) -> np.ndarray:
+        """The same, and in two further columns how a column that bends leans about x and y [rad]."""
+        return self.behind(loads, self._deltas(loads, 1)[..., 0])
 
     def behind(self, loads: LinkLoads, deltas: np.ndarray) -> np.ndarray:
-        """The same by how far (m, n) [rad] the links are behind."""
-        q = loads.q.astype(float).copy()
-        for train, delta in zip(self.trains, deltas, strict=True):
+        """The same by how far (m, n) [rad] the links are behind, and the column where it follows."""
+        m = len(self.trains)
+        q = np.hstack([loads.q.astype(float), -deltas[m:].T])
+        for train, delta in zip(self.trains, deltas[:m], strict=True):
             j = self.joints.index(train.joint)
             q[:, j] -= train.harmonics(loads.angle[:, j]) + delta
         return q
 
     def of_loads(self, loads: LinkLoads) -> LinkAngles:
         """Link angles of a trial whose loads are known."""
-        deltas, moment = self._deltas(loads, RUNS)
-        q = self.behind(loads, deltas[..., 0])
+        m, found = len(self.trains), self._deltas(loads, RUNS)
+        deltas, q = found[:m], self.behind(loads, found[:m, :, 0])
         low, high, variance = q.copy(), q.copy(), np.zeros(q.shape)
         for train, delta in zip(self.trains, deltas, strict=True):
             j, least, most = self.joints.index(train.joint), delta.min(axis=1), delta.max(axis=1)
             low[:, j], high[:, j] = q[:, j] + delta[:, 0] - most, q[:, j] + delta[:, 0] - least
             variance[:, j] = train.variance(least, most, np.abs(loads.v[:, j]) >= RESTS)
-        return LinkAngles(q, low, high, variance, moment)
+        return LinkAngles(q, low, high, variance, swayed(prepared(self), found[m:, :, 0].T, loads.moment))
 
-    def _deltas(self, loads: LinkLoads, runs: int) -> tuple[np.ndarray, np.ndarray]:
+    def _deltas(self, loads: LinkLoads, runs: int) -> np.ndarray:
         """(m, n, runs) [rad] of each drive train, what its torques are off by taken off as a mesh in contact has it.
 
-        And the moments of `LinkAngles`.
+        Then of a column that bends.
         """
         if not self.trains:
-            return np.zeros((0, len(loads.t), runs)), loads.moment
+            return np.zeros((0, len(loads.t), runs))
         drives, states, samples = self.prepared_for(loads, runs)
         found = link_streams.walked(states, loads.t, samples, loads.inertia, loads.stiffness, LONGEST, drives)
-        m = len(self.trains)
-        deltas = np.asarray(np.moveaxis(found[:, :m] - drives.shifts[:, :runs], 1, 0))
-        return deltas, swayed(drives, found[:, m:, 0], loads.moment)
+        found[:, : len(self.trains)] -= drives.shifts[:, :runs]
+        return np.asarray(np.moveaxis(found, 1, 0))
 
     def prepared_for(self, loads: LinkLoads, runs: int = 1) -> tuple[Drives, np.ndarray, np.ndarray]:
         """What `link_streams` take of a trial: parameters, states (m, runs, 3) at its start, samples (n, 4, m)."""

@@ -70,7 +70,7 @@ class SlippingMotion:
     @property
     def predictable(self) -> bool:
         """Whether yaw, which moves the hand most, is predicted to move by more than its standard deviation."""
-        return bool((self.variance[:, 5]).sum() <= (self.x[:, 5] ** 2).sum())
+        return bool(self.variance[:, 5].sum() <= (self.x[:, 5] ** 2).sum())
 
 
 @dataclass(frozen=True)
@@ -139,18 +139,18 @@ class Links(NamedTuple):
         at, q, _ = self.readings
         return self.trains.loads("", at, q, self.trains.base_motion(t, T_lab_base, at), self.wrist)
 
-    def load(self, t: np.ndarray, T_lab_base: np.ndarray, angles: np.ndarray | None = None) -> Load:
-        """Their inverse dynamics on such a base, at their likely angles where others (n, k) are not given.
+    def load(self, t: np.ndarray, T_lab_base: np.ndarray, links: np.ndarray | None = None) -> Load:
+        """Their inverse dynamics on such a base, at likely positions where others, as of `swaying`, are not given.
 
         The wrist's sensor leans with the base, and the hand weighs downwards: the hand is that of a base upright.
         """
         at, in_plane, floor = self.readings.t, upright(T_lab_base, self.T_lab_0), None
-        links = self.trains.likely(self.loads(t, T_lab_base)) if angles is None else angles
+        q = self.trains.swaying(self.loads(t, T_lab_base)) if links is None else links
         if self.wrist is not None:
             moving = self.trains.base_motion(t, self.T_lab_0 @ from_vector(in_plane), at)
-            floor = self.trains.hand(at, links, self.wrist, moving)
+            floor = self.trains.hand(at, q, self.wrist, moving)
         twist = planar_twist(t, in_plane[:, PLANE], at)
-        return motion_load(self.lab, at, links - self.trains.dynamics.offset, self.T_lab_0, CUTOFF, floor, twist)
+        return motion_load(self.lab, at, self.trains.angles(q), self.T_lab_0, CUTOFF, floor, twist)
 
 
 def links_of(lab: Laboratory, trains: DriveTrains, robot: Clock, trial: Trial, T_lab_0: np.ndarray) -> Links:
@@ -176,7 +176,7 @@ def moving_links(lab: Laboratory, arm: Arm, robot: Clock, trial: MeasuredTrial, 
     """Inverse dynamics of links as their encoders show them; else on the base as it is predicted, or by its markers."""
     links, moved = links_of(lab, arm.trains, robot, trial, rest.T_lab_0), arm.moved.get(trial.id)
     T_lab_base = (trial.base.T if moved is None else moved.T_lab_B) @ inverse(rest.T_0_B)
-    angles = links.trains.likely(links.loads(trial.t_mocap, T_lab_base))
+    angles = links.trains.swaying(links.loads(trial.t_mocap, T_lab_base))
     read = trial.q_link[np.isfinite(trial.q_motor).all(axis=1)]
     return links.load(trial.t_mocap, T_lab_base, shown_by_links(links.trains, read, angles))
 
@@ -257,7 +257,7 @@ def moved_together(
         loads: On a base that does not accelerate in the floor's plane.
 
     Returns:
-        The positions, and link angles (r, k) [rad, m] at the times of the loads, zeros of the readings included.
+        The positions, and links as of `swaying` at the times of the loads.
 
     Raises:
         NotEnoughData: They throw each other apart, as if links were heavier than the robot.
@@ -277,8 +277,8 @@ def moved_together(
     x, delta = walked(bases, forcing.drive, forcing.inertia, links, STEP)
     if not np.isfinite(x).all():
         raise NotEnoughData(f"{forcing.trial_id}: base and arm throw each other apart: check the masses of links")
-    behind = interpolate_columns(loads.t, t, delta[:, : len(trains.trains)] - drives.shifts[:, 0])
-    return x - x[forcing.rest].mean(axis=0), trains.behind(loads, behind.T)
+    delta[:, : len(trains.trains)] -= drives.shifts[:, 0]
+    return x - x[forcing.rest].mean(axis=0), trains.behind(loads, interpolate_columns(loads.t, t, delta).T)
 
 
 def friction_use(model: StickSlip, forcing: PlanarForcing) -> np.ndarray:

@@ -77,6 +77,7 @@ def motion_load(
 ) -> Load:
     """The same along readings q_motor (n, n_joints) [rad, m] at t (n,) [s, mocap clock], and what pushes the hand.
 
+    Two further columns are how what the first joint carries leans about x and y of that joint's frame [rad].
     On a base that moves evenly with `twist` (n, 6) [m/s, rad/s, base frame]: then about its origin, in its axes.
     """
     description = lab.description
@@ -89,8 +90,10 @@ def motion_load(
     if push is not None:
         pushed = interpolate_columns(q.t, t, push.wrench)
         root = np.concatenate([np.broadcast_to(root, (len(pushed), 12)), pushed], axis=1)
-    along = dynamics_along(tree, q.x, spline(q.t, 1), spline(q.t, 2), root)
-    w = along.root @ T_0_root.dualAction.T
+    k, a = len(tree.column), spline(q.t, 2)
+    along = dynamics_along(tree, q.x[:, :k], spline(q.t, 1)[:, :k], a[:, :k], root)
+    leans = (a[:, k:, None] * along.coupling[:, k : a.shape[1]]).sum(axis=1)
+    w = (along.root + leans) @ T_0_root.dualAction.T
     rows = np.linspace(0, len(q.t) - 1, _MASS_SAMPLES).astype(int)
     M = T_0_root.dualAction @ along.composite[rows].mean(axis=0) @ T_0_root.inverse().action
     weight = float(M[0, 0] * np.linalg.norm(description.gravity))
