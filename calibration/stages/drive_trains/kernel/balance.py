@@ -3,11 +3,11 @@
     m_i(delta_i) + sum_j (M_ij (r_j - r_j0) / h + G_ij delta_j) = tau_i + f_c,i Sgn(u_i) + f_v,i u_i
     delta_i = delta_i0 + h r_i,     u_i = dq_i / h - r_i       r_i how fast link i falls behind, u_i how fast it is
 
-Swept through one by one (Gauss-Seidel) links come to that slowly: arm_2 and arm_3 of an arm that is stretched out share
-nine tenths of their inertia, and two sweeps take more of an oscillation out of them than their meshes do. Newton's
-steps for all, from where sweeps left them, come to it in two or three: the mesh is linear on each side of a flank, a
-link that rests is left out until its friction is exceeded, and one whose velocity changes its sign rests. Where they
-find no end links stay as the sweeps had them.
+Newton's steps for all links come to that in two or three: the mesh is linear on each side of a flank, a link that rests
+is left out until its friction is exceeded, and one whose velocity changes its sign rests. Where they find no end links
+are swept through one by one (Gauss-Seidel), each by what the others do in the same step, and tried again from there.
+Sweeps alone are slow: arm_2 and arm_3 of an arm that is stretched out share nine tenths of their inertia, and two of
+them take more of an oscillation out of these than their meshes do.
 Reference: Acary, Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, ch. 12 and 13.
 """
 
@@ -39,20 +39,41 @@ class Step(NamedTuple):
     G: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
-def swept(
-    new: np.ndarray, links: np.ndarray, step: Step, h: float, order: np.ndarray, moves: np.ndarray, values: np.ndarray
-) -> None:
-    """Links (m, 3) after h [s] into `new`: each by what the others do in the same step, `order` (m,), SWEEPS times.
+class Meshes(NamedTuple):
+    """What does not change from step to step, of m links.
 
-    First by links before it, then by those after it, too. Those that do not move, `moves` (m,), stay; `values` (m, 7).
+    Attributes:
+        order: (m,) in which they are swept through.
+        moves: (m,) those that move; others are play operators.
+        free: (m,) those of them whose own inertia counts, so that all forces together have a balance.
+        values: (m, 7) of their drives.
     """
-    m = len(links)
+
+    order: np.ndarray
+    moves: np.ndarray
+    free: np.ndarray
+    values: np.ndarray
+
+
+@njit(cache=True, error_model="numpy")
+def moved(new: np.ndarray, links: np.ndarray, step: Step, h: float, meshes: Meshes) -> None:
+    """Links (m, 3) after h [s] into `new`."""
+    new[:] = links
+    if (meshes.free == meshes.moves).all() and balanced(new, links, step, h, meshes):
+        return
+    swept(new, links, step, h, meshes)
+    balanced(new, links, step, h, meshes)
+
+
+@njit(cache=True, error_model="numpy")
+def swept(new: np.ndarray, links: np.ndarray, step: Step, h: float, meshes: Meshes) -> None:
+    """The same by sweeps: each link first by what those before it do, then by those after it, too."""
+    m, values = len(links), meshes.values
     new[:] = links
     acceleration = np.zeros(m)
     for _ in range(SWEEPS):
-        for i in order:
-            if not moves[i]:
+        for i in meshes.order:
+            if not meshes.moves[i]:
                 continue
             torque = step.load[i]
             for j in range(m):
@@ -65,12 +86,12 @@ def swept(
 
 
 @njit(cache=True, error_model="numpy")
-def balanced(new: np.ndarray, links: np.ndarray, step: Step, h: float, free: np.ndarray, values: np.ndarray) -> bool:
-    """Links (m, 3) after h [s], from where sweeps had them in `new`; whether an end was found, else `new` is left.
+def balanced(new: np.ndarray, links: np.ndarray, step: Step, h: float, meshes: Meshes) -> bool:
+    """The same all at once, from rates in `new`; whether an end was found, else `new` is left.
 
-    Those that are not `free` (m,) stay as `new` has them.
+    Those that are not free stay as `new` has them.
     """
-    m, found = len(links), False
+    m, found, free, values = len(links), False, meshes.free, meshes.values
     A, F, tried = np.empty((m, m)), np.empty(m), np.empty((2, m))
     for i in range(m):
         tried[0, i], tried[1, i] = new[i, 1], np.sign(step.speed[i] - new[i, 1])
@@ -87,12 +108,12 @@ def balanced(new: np.ndarray, links: np.ndarray, step: Step, h: float, free: np.
             break
     for i in range(m if found else 0):
         if free[i]:
-            _moved(new[i], links[i], tried[0, i], h, values[i])
+            _at_rate(new[i], links[i], tried[0, i], h, values[i])
     return found
 
 
 @njit(cache=True, error_model="numpy")
-def _moved(new: np.ndarray, link: np.ndarray, rate: float, h: float, values: np.ndarray) -> None:
+def _at_rate(new: np.ndarray, link: np.ndarray, rate: float, h: float, values: np.ndarray) -> None:
     """A link (3,) after h [s] at a rate."""
     c = contact(values)
     new[0], new[1] = link[0] + h * rate, rate

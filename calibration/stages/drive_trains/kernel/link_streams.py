@@ -2,8 +2,8 @@
 
     tau_i <- tau_i - sum_k M_ik d2 delta_k / dt2 - sum_j G_ij delta_j          k all other links, j all of them
 
-Within a step a link is moved by what the others do in the same step, see `balance`: by sweeps from the hand inwards,
-then all at once. A link that strikes in its gap throws the link that carries it, and is thrown by it. The column that
+Within a step a link is moved by what the others do in the same step, see `balance`: all at once, or by sweeps from the
+hand inwards. A link that strikes in its gap throws the link that carries it, and is thrown by it. The column that
 carries the arm has no motor and no gap: how it leans about x and y, -delta, sways as links move, and moves them.
 Reference: Jean, The non-smooth contact dynamics method, Comput. Methods Appl. Mech. Engrg. 1999 (sweeps over contacts).
 """
@@ -15,7 +15,7 @@ import numpy as np
 from calibration.numerics.compiled import njit
 from calibration.robot.rigid_tree import RigidTree
 from calibration.robot.tree_dynamics import TreeDynamics, sample
-from calibration.stages.drive_trains.kernel.balance import Step, balanced, swept
+from calibration.stages.drive_trains.kernel.balance import Meshes, Step, moved
 from calibration.stages.drive_trains.kernel.link_motion import LIGHT, STILL, Drive, advanced, along, carried, contact
 
 Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
@@ -100,7 +100,7 @@ def together(
     """
     m, rates = len(links), links[:, 1].copy()
     n = _steps(links, a, b, dt, longest)
-    h, new = dt / n, links.copy()
+    h, new, meshes = dt / n, links.copy(), Meshes(drives.inwards, ~drives.plays, drives.dynamic, drives.values)
     step = Step(np.empty(m), np.empty(m), _among(M, drives.columns), _among(G, drives.columns))
     for k in range(n):
         s, before = (k + 1) / n, k / n
@@ -109,8 +109,7 @@ def together(
             step.speed[i] = (along(p, r, d, s) - along(p, r, d, before)) / h
             step.load[i] = a[TORQUE, i] + s * (b[TORQUE, i] - a[TORQUE, i])
             step.M[i, i] = a[INERTIA, i] + s * (b[INERTIA, i] - a[INERTIA, i])
-        swept(new, links, step, h, drives.inwards, ~drives.plays, drives.values)
-        balanced(new, links, step, h, drives.dynamic, drives.values)
+        moved(new, links, step, h, meshes)
         links[:] = new
     return (links[:, 1] - rates) / dt
 

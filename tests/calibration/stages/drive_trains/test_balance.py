@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from calibration.stages.drive_trains.kernel.balance import Step, balanced, swept
+from calibration.stages.drive_trains.kernel.balance import Meshes, Step, balanced, moved, swept
 from calibration.stages.drive_trains.kernel.link_motion import contact, mesh
 
 GAP, COULOMB, VISCOUS, H = 2e-3, 0.4, 0.2, 3.3e-3
 VALUES = np.tile([GAP, 1e-4, COULOMB, VISCOUS, 2e-3, 1.0, 0.0], (3, 1))
-ORDER, ALL = np.array([2, 1, 0]), np.ones(3, dtype=bool)
+ALL = np.ones(3, dtype=bool)
+MESHES = Meshes(np.array([2, 1, 0]), ALL, ALL, VALUES)
 
 
 def random_step(rng: np.random.Generator) -> tuple[np.ndarray, Step]:
@@ -35,11 +36,14 @@ def test_forces_of_all_links_balance():
     for _ in range(300):
         links, step = random_step(rng)
         new = links.copy()
-        swept(new, links, step, H, ORDER, ALL, VALUES)
+        swept(new, links, step, H, MESHES)
+        from_there = new.copy()
         by_sweeps = max(by_sweeps, float(np.abs(np.clip(np.abs(left(new, links, step)) - COULOMB, 0.0, None)).max()))
-        if not balanced(new, links, step, H, ALL, VALUES):
+        if not balanced(from_there, links, step, H, MESHES):
             continue
         found += 1
+        moved(new, links, step, H, MESHES)
+        np.testing.assert_allclose(new, from_there, atol=1e-9)  # wherever they were tried from
         u, force = step.speed - new[:, 1], left(new, links, step)
         np.testing.assert_allclose(new[:, 0], links[:, 0] + H * new[:, 1], atol=1e-15)
         slides = np.abs(u) > 1e-12
@@ -51,17 +55,17 @@ def test_forces_of_all_links_balance():
 def test_links_stay_as_sweeps_have_them_where_no_end_is_found():
     links, step = random_step(np.random.default_rng(1))
     new = links.copy()
-    swept(new, links, step, H, ORDER, ALL, VALUES)
+    swept(new, links, step, H, MESHES)
     before = new.copy()
-    assert not balanced(new, links, step._replace(M=-step.M), H, ALL, VALUES)
+    assert not balanced(new, links, step._replace(M=-step.M), H, MESHES)
     assert (new == before).all()
 
 
 def test_links_that_are_not_free_stay_as_sweeps_have_them():
     links, step = random_step(np.random.default_rng(2))
     new = links.copy()
-    swept(new, links, step, H, ORDER, ALL, VALUES)
+    swept(new, links, step, H, MESHES)
     before = new.copy()
-    assert balanced(new, links, step, H, np.array([True, False, True]), VALUES)
+    assert balanced(new, links, step, H, MESHES._replace(free=np.array([True, False, True])))
     assert (new[1] == before[1]).all() and (new[[0, 2]] != before[[0, 2]]).any()
     assert np.abs(left(new, links, step)[[0, 2]]).max() <= COULOMB + 1e-6
