@@ -244,7 +244,7 @@ def prepared(trains: DriveTrains) -> Drives:
     """Drive trains made ready for their kernels, and the column that carries them where it bends."""
     of, robot = trains.trains, trains.dynamics
     p, m, k = len(inertials(robot)), len(of), len(trains.joints)
-    soft = robot.column.compliance if of and robot.column.compliance.all() else np.zeros(0)
+    soft = robot.column.compliance if of and (robot.column.compliance > 0.0).all() else np.zeros(0)
     column = np.zeros((len(soft), 7))
     column[:, COMPLIANCE], column[:, SPRING] = soft, 1.0
     own, sways = (np.arange(n, n + len(soft)) for n in (k, m))

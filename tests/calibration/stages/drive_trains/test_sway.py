@@ -88,3 +88,10 @@ def test_it_sways_sample_by_sample_as_all_at_once(swaying):
         found.append(angles)
     assert np.abs(np.concatenate([x.q for x in found]) - batch.q).max() < 1e-12
     assert np.abs(np.concatenate([x.moment for x in found]) - batch.moment).max() < 1e-7 * np.abs(batch.moment).max()
+
+
+def test_a_column_whose_compliance_is_not_positive_leans_at_once(swaying):
+    _, _, of, loads = swaying
+    odd = replace(of, dynamics=replace(of.dynamics, column=Column(SOFT * [1.0, -1.0], np.zeros(2))))
+    found = odd.of_loads(loads)
+    assert (found.moment == loads.moment).all() and odd.swaying(loads).shape == loads.q.shape
