@@ -6,6 +6,7 @@ With the velocities and accelerations that `torques.derivatives` has of a record
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +14,9 @@ import numpy as np
 from calibration.robot.rigid_tree import scratch
 from calibration.robot.tree_dynamics import TreeDynamics, room
 from calibration.stages.drive_trains.drive_train import LONGEST
-from calibration.stages.drive_trains.drive_trains import RUNS, DriveTrains, LinkAngles, begun, prepared, swayed
+from calibration.stages.drive_trains.drive_trains import DriveTrains, LinkAngles, begun, prepared
 from calibration.stages.drive_trains.kernel import link_streams
-from calibration.stages.drive_trains.kernel.link_streams import TORQUE, Drives
+from calibration.stages.drive_trains.kernel.link_streams import TORQUE, Drives, Unnamed
 
 
 class StreamState(NamedTuple):
@@ -58,44 +59,33 @@ class Stream:
 
     def begin(self, t: float, moving: np.ndarray, base: np.ndarray | None = None) -> tuple[StreamState, LinkAngles]:
         """The state at a first sample q, v, a (3, k) of an unknown history, and its link angles (1, k)."""
-        state, found, angles = self._room(t, moving)
-        robot, drives, states = self.trains.dynamics, self.prepared, state.states
-        root = self.at_rest if base is None else base
-        link_streams.loaded(robot.tree, drives, root, self.work, found, state.moving, state.samples)
-        states[:] = begun(self.trains, drives, state.samples[TORQUE], found.stiffness[0])
-        link_streams.link_angles(states, state.moving, drives, angles)
-        return state, self._leaning(state, angles)
+        drives, found, root = self.prepared, self.found, self.at_rest if base is None else base
+        samples, angles = np.empty((4, len(drives.columns))), np.empty((4, 1, moving.shape[1]))
+        link_streams.loaded(self.trains.dynamics.tree, drives, root, self.work, found, moving, samples)
+        states = begun(self.trains, drives, samples[TORQUE], found.stiffness[0])
+        link_streams.link_angles(states, moving, drives, angles)
+        moment = link_streams.borne(states, drives, found)
+        return StreamState(t, moving, samples, states, found.torque.copy(), moment), _named(angles, moment)
 
     def step(
         self, before: StreamState, t: float, moving: np.ndarray, base: np.ndarray | None = None
     ) -> tuple[StreamState, LinkAngles]:
         """The state one sample q, v, a (3, k) later, link angles (1, k); `base` (1, 12) as `Dynamics.root` has it."""
-        state, found, angles = self._room(t, moving)
-        robot, drives = self.trains.dynamics, self.prepared
-        state.states[:] = before.states
-        root = self.at_rest if base is None else base
-        link_streams.advanced_drives(
-            robot.tree, drives, root, self.work, found, state.moving, before.samples, state.states, t - before.t,
-            LONGEST, state.samples, angles,
+        samples, states, torque, moment, angles = link_streams.advanced_drives(
+            self._unnamed, self.at_rest if base is None else base, moving, before.samples, before.states, t - before.t,
+            LONGEST,
         )  # fmt: skip
-        return state, self._leaning(state, angles)
+        return StreamState(t, moving, samples, states, torque, moment), _named(angles, moment)
 
-    def _leaning(self, state: StreamState, angles: np.ndarray) -> LinkAngles:
-        """Angles (4, 1, k) with the moments of `LinkAngles`, which take the place of a rigid column's in the state."""
-        lean = state.states[len(self.trains.trains) :, 0, 0]
-        state.moment[0] = swayed(self.prepared, lean[None], state.moment)[0]
-        q, low, high, variance = angles
-        return LinkAngles(q, low, high, variance, state.moment)
+    @cached_property
+    def _unnamed(self) -> Unnamed:
+        return tuple(self.trains.dynamics.tree), tuple(self.prepared), tuple(self.found), self.work
 
-    def _room(self, t: float, moving: np.ndarray) -> tuple[StreamState, TreeDynamics, np.ndarray]:
-        """A state, dynamics and link angles (4, 1, k) to be filled."""
-        m, k, scratch = len(self.prepared.columns), moving.shape[1], self.found
-        torque, moment, angles = np.empty((1, k)), np.empty((1, 2)), np.empty((4, 1, k))
-        found = TreeDynamics(
-            torque, scratch.inertia, scratch.root, moment, scratch.composite, scratch.coupling, scratch.stiffness,
-            scratch.regressor,
-        )  # fmt: skip
-        return StreamState(t, moving, np.empty((4, m)), np.zeros((m, RUNS, 3)), torque, moment), found, angles
+
+def _named(angles: np.ndarray, moment: np.ndarray) -> LinkAngles:
+    """Angles (4, 1, k) of the kernel."""
+    q, low, high, variance = angles
+    return LinkAngles(q, low, high, variance, moment)
 
 
 def stream_of(trains: DriveTrains) -> Stream:

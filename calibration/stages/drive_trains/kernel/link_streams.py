@@ -16,10 +16,21 @@ from calibration.numerics.compiled import njit
 from calibration.robot.rigid_tree import RigidTree
 from calibration.robot.tree_dynamics import TreeDynamics, sample
 from calibration.stages.drive_trains.kernel.balance import Meshes, Step, moved
-from calibration.stages.drive_trains.kernel.link_motion import LIGHT, STILL, Drive, advanced, along, carried, contact
+from calibration.stages.drive_trains.kernel.link_motion import (
+    COMPLIANCE,
+    LIGHT,
+    STILL,
+    Drive,
+    advanced,
+    along,
+    carried,
+    contact,
+)
 
 Q, V, TORQUE, INERTIA = range(4)  # rows of `samples`
 RESTS = 5e-3  # [rad/s, m/s] below which a joint is at rest
+Arrays = tuple[np.ndarray, ...]
+Unnamed = tuple[Arrays, Arrays, Arrays, np.ndarray]  # RigidTree, Drives, TreeDynamics: faster to pass; scratch
 
 
 class Drives(NamedTuple):
@@ -201,11 +212,27 @@ def link_angles(states: np.ndarray, moving: np.ndarray, drives: Drives, out: np.
 
 
 @njit(cache=True, error_model="numpy")
+def borne(states: np.ndarray, drives: Drives, found: TreeDynamics) -> np.ndarray:
+    """Moment (1, 2) under which the column at rest would lean as it does [N.m]; that on one that does not bend."""
+    M, m = found.moment.copy(), len(drives.motor)
+    for i in range(m, len(states)):
+        M[0, i - m] = states[i, 0, 0] / drives.values[i, COMPLIANCE]
+    return M
+
+
+@njit(cache=True, error_model="numpy")
 def advanced_drives(
-    tree: RigidTree, drives: Drives, root: np.ndarray, work: np.ndarray, found: TreeDynamics, moving: np.ndarray,
-    before: np.ndarray, states: np.ndarray, dt: float, longest: float, samples: np.ndarray, angles: np.ndarray,
-) -> None:  # fmt: skip
-    """`loaded`, `streamed` and `link_angles` of a sample dt [s] after `before`."""
+    robot: Unnamed, root: np.ndarray, moving: np.ndarray, before: np.ndarray, states: np.ndarray, dt: float,
+    longest: float,
+) -> tuple[np.ndarray, ...]:  # fmt: skip
+    """`loaded`, `streamed`, `link_angles` and `borne` of a sample dt [s] after one of samples `before` and states.
+
+    Returns:
+        Samples (4, m) and states of now, torque of all joints (1, k), `borne`, angles (4, 1, k).
+    """
+    tree, drives, found, work = RigidTree(*robot[0]), Drives(*robot[1]), TreeDynamics(*robot[2]), robot[3]
+    now, samples, angles = states.copy(), np.empty_like(before), np.empty((4, 1, moving.shape[1]))
     loaded(tree, drives, root, work, found, moving, samples)
-    streamed(states, before, samples, found.inertia[0], found.stiffness[0], dt, longest, drives)
-    link_angles(states, moving, drives, angles)
+    streamed(now, before, samples, found.inertia[0], found.stiffness[0], dt, longest, drives)
+    link_angles(now, moving, drives, angles)
+    return samples, now, found.torque.copy(), borne(now, drives, found), angles
