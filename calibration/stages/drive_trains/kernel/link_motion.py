@@ -28,6 +28,7 @@ from calibration.numerics.compiled import njit
 HALF_GAP, COMPLIANCE, COULOMB, VISCOUS, RELAXATION, SPRING, SLIP = range(7)  # order of `values`
 LIGHT = 1e-5  # [kg.m2] least inertia
 _STEPS = 60  # Newton's, or halves of the interval where one leaves it: forces jump where a flank is struck
+_ENOUGH = 1e-13  # [rad/s] by which the last one changes a velocity
 STILL = 3e-5  # [rad] between two samples: one step will do
 
 
@@ -117,10 +118,11 @@ def stepped(
                 low = u
             else:
                 high = u
-            before, u = u, u + left / (slope + damping)
-            if not low < u < high:
-                u = 0.5 * (low + high)
-            if abs(u - before) <= 1e-13 + 1e-12 * abs(u):
+            step = left / (slope + damping)
+            if abs(step) > _ENOUGH and not low < u + step < high:
+                step = 0.5 * (low + high) - u
+            u += step
+            if abs(step) <= _ENOUGH + 1e-12 * abs(u):
                 break
             force, slope = mesh(at - h * u, v - u, s, h, c)
             left = force - load - damping * u
