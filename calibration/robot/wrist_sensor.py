@@ -104,7 +104,7 @@ class WristSensor:
         """What a hand that is pushed does to the sensor at t (n,) [s], by its readings; None: nothing pushes it."""
         limit = _SHARE * float(self.tree.mass[-1] * np.linalg.norm(self.at_rest[0, 6:9]))
         few = read.thinned(STRIDE)
-        p = self._moved(few) + few.wrench
+        p = self.moved(few) + few.wrench
         zero = p[few.t <= few.t[0] + REST].mean(axis=0)
         force = uniform_filter1d(p[:, :3] - zero[:3], int(_AVERAGE * RATE / STRIDE), axis=0)
         if np.linalg.norm(force, axis=1).max() <= limit:
@@ -116,7 +116,7 @@ class WristSensor:
 
         `base` (n, 12) is twist and proper acceleration of the root at t; None: it is at rest.
         """
-        off = self._moved(read, None if base is None else interpolate_columns(read.t, t, base)) + read.wrench
+        off = self.moved(read, None if base is None else interpolate_columns(read.t, t, base)) + read.wrench
         slow = low_passed(Signal(read.t, off, np.ones(len(off), dtype=bool)), _SLOW).x
         return Push(self._on_body(t, read.t, read.wrench - slow), nominal, outside=False)
 
@@ -129,10 +129,10 @@ class WristSensor:
 
         Moments about the centre of what nominally hangs there: gears that sag turn its weight, which has none there.
         """
-        Y = np.stack([self.alone(unit)._moved(read) for unit in np.eye(4)], axis=2)
+        Y = np.stack([self.alone(unit).moved(read) for unit in np.eye(4)], axis=2)
         about = np.eye(6)
         about[3:, :3] = -pin.skew(pin.SE3(self.body).actInv(self.tree.moment[-1] / self.tree.mass[-1]))
-        return -(read.wrench + self._moved(read)) @ about.T, about @ Y
+        return -(read.wrench + self.moved(read)) @ about.T, about @ Y
 
     def carrying(self, more: np.ndarray) -> "WristSensor":
         """The sensor with a further mass and its first moment (4,) on it."""
@@ -150,7 +150,7 @@ class WristSensor:
         """A wrench in the last body's axes, at other times."""
         return interpolate_columns(t, at, wrench @ pin.SE3(self.body).dualAction.T)
 
-    def _moved(self, at: "SmoothReadings", base: np.ndarray | None = None) -> np.ndarray:
+    def moved(self, at: "SmoothReadings", base: np.ndarray | None = None) -> np.ndarray:
         """f (n, 6) in the sensor's axes about its origin, on a root that moves (n, 12) or is at rest."""
         root = self.at_rest if base is None else base
         w = last_wrench(self.tree, at.q, at.v, at.a, root)

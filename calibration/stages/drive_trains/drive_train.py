@@ -11,7 +11,7 @@ the side.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ from calibration.stages.drive_trains.kernel.link_motion import (
     COULOMB,
     HALF_GAP,
     LIGHT,
+    VISCOUS,
     Drive,
     played,
     simulated,
@@ -125,6 +126,13 @@ class DriveTrain:
         """By how much nominal torques (...) [N.m] exceed those it was found by; all of them where those are unknown."""
         low, high = np.nan_to_num(self.range)
         return np.asarray(torque - np.clip(torque, low, high))
+
+    def rubbing(self, share: float) -> "DriveTrain":
+        """The same with so many times the friction and so much less compliance: it winds the mesh up as before."""
+        values = self.values.copy()
+        values[[COULOMB, VISCOUS]] *= share
+        values[COMPLIANCE] /= share
+        return replace(self, values=values)
 
     def ends(self, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest delta (m,) [rad] at which friction holds the link under torques (m,) [N.m]."""

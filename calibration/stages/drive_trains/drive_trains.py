@@ -16,7 +16,8 @@ from calibration.errors import NoSuchElement
 from calibration.recording.schema import Description
 from calibration.robot.wrist_sensor import Push
 from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Quantity, drive_motion
-from calibration.stages.drive_trains.hung_load import HungLoad, hand_on_floor, hand_on_joints
+from calibration.stages.drive_trains.friction_shown import friction_shown
+from calibration.stages.drive_trains.hung_load import HungLoad, hand_on_floor, hand_on_joints, hanging
 from calibration.stages.drive_trains.kernel import link_streams
 from calibration.stages.drive_trains.kernel.link_motion import COMPLIANCE, SPRING
 from calibration.stages.drive_trains.kernel.link_streams import INERTIA, RESTS, TORQUE, Drives
@@ -164,8 +165,19 @@ class DriveTrains:
         hand, zeros = partial(hand_on_joints, self.urdf, self.description, self.hung, t), self.dynamics.offset
         if wrist is None or (push := hand(q - zeros, wrist)) is None:
             return loads(None, None)
-        links = self.likely(loads(push, None))
-        return loads(hand(links - zeros, wrist), q - links)
+        first = loads(push, None)
+        links, friction = self.likely(first), first.friction
+        of = hanging(self.urdf, self.description, self.hung, t, links - zeros, wrist)
+        if of is not None and of.pushed is None:
+            friction = friction_shown(self.trains, self.joints, first, links, of)
+            links = self.likely(replace(first, friction=friction))
+        return replace(loads(hand(links - zeros, wrist), q - links), friction=friction)
+
+    def rubbing(self, friction: np.ndarray) -> "DriveTrains":
+        """The same with so many times (m,) the friction of each drive train; empty: with the same."""
+        if not len(friction):
+            return self
+        return replace(self, trains=tuple(of.rubbing(s) for of, s in zip(self.trains, friction, strict=True)))
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""
@@ -209,7 +221,8 @@ class DriveTrains:
 
     def prepared_for(self, loads: LinkLoads, runs: int = 1) -> tuple[Drives, np.ndarray, np.ndarray]:
         """What `link_streams` take of a trial: parameters, states (m, runs, 3) at its start, samples (n, 4, m)."""
-        drives, k = prepared(self), len(self.joints)
+        rubbing, k = self.rubbing(loads.friction), len(self.joints)
+        drives = prepared(rubbing)
         samples = np.zeros((len(loads.t), 4, len(drives.columns)))
         for i, train in enumerate(self.trains):
             j, phi = self.joints.index(train.joint), train.inertials if len(train.inertials) else None
@@ -218,7 +231,7 @@ class DriveTrains:
             samples[:, :, i] = np.stack([own.q, own.v, torque, train.moved_inertia(own.inertia)], axis=1)
         for i, c in enumerate(drives.columns[len(self.trains) :], len(self.trains)):
             samples[:, TORQUE, i], samples[:, INERTIA, i] = loads.moment[:, c - k], loads.inertia[:, c, c]
-        return drives, begun(self, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs].copy(), samples
+        return drives, begun(rubbing, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs].copy(), samples
 
 
 def swayed(drives: Drives, lean: np.ndarray, moment: np.ndarray) -> np.ndarray:

@@ -98,7 +98,7 @@ def hung_load(urdf: str, description: Description, offset: np.ndarray, trials: S
     return HungLoad(x[:4], x[4:], C, description.payload_of(), _hung(nominal), float(x @ np.linalg.solve(prior, x)))
 
 
-class _Hanging(NamedTuple):
+class Hanging(NamedTuple):
     """What hangs on a trial's sensor, or pushes it.
 
     Attributes:
@@ -132,7 +132,7 @@ def hand_on_joints(
         q: (n, k) motor readings less their zeros, or the links' angles where they are known [rad, m].
         wrench: (n, 6) readings of the sensor.
     """
-    of = _hanging(urdf, description, hung, t, q, wrench)
+    of = hanging(urdf, description, hung, t, q, wrench)
     if of is None or of.pushed is not None:
         return None if of is None else of.pushed
     return None if of.found is of.known else of.sensor.alone(of.known - of.found).lacking(len(t))
@@ -151,7 +151,7 @@ def hand_on_floor(
 
     Arguments as of `hand_on_joints`; `base` (n, 12) how the root moves, see `torques.base_motion`; None: it is at rest.
     """
-    of = _hanging(urdf, description, hung, t, q, wrench)
+    of = hanging(urdf, description, hung, t, q, wrench)
     if of is None:
         return None
     if of.pushed is not None:
@@ -159,9 +159,9 @@ def hand_on_floor(
     return of.sensor.carrying(of.found).hand(t, of.read, of.sensor.tree, base)
 
 
-def _hanging(
+def hanging(
     urdf: str, description: Description, hung: HungLoad | None, t: np.ndarray, q: np.ndarray, wrench: np.ndarray
-) -> _Hanging | None:
+) -> Hanging | None:
     """None where the sensor tells nothing."""
     sensor = wrist_sensor(urdf, description) if np.isfinite(wrench).any() else None
     if sensor is None:
@@ -172,14 +172,14 @@ def _hanging(
         read = smoothed(t, q, wrench)
         pushed = sensor.carrying(known).push(t, read)
         if pushed is not None or hung is None:
-            return None if pushed is None else _Hanging(sensor, read, known, known, pushed)
+            return None if pushed is None else Hanging(sensor, read, known, known, pushed)
         if mass == hung.payload:
-            return _Hanging(sensor, read, known, known)
+            return Hanging(sensor, read, known, known)
         row = (*_means(sensor, read), mass)
     except NotEnoughData:
         return None
     x, _ = _fitted([row], np.append(hung.links, hung.centre), hung.covariance)
-    return _Hanging(sensor, read, known, replace(hung, links=x[:4], centre=x[4:]).added(mass))
+    return Hanging(sensor, read, known, replace(hung, links=x[:4], centre=x[4:]).added(mass))
 
 
 def _means(sensor: WristSensor, read: SmoothReadings) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ are a fifth of a newton metre at the shoulder.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -59,6 +59,7 @@ class LinkLoads:
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
         stiffness: (n, k + 2, k + 2) G, how tau grows with the joints' positions [N.m/rad, N].
         coupling: (n, k + 2, 6) wrench on the tree's root by unit acceleration of each joint and lean.
+        friction: (m,) s of each drive train, see `friction_shown`; empty: all 1.
     """
 
     trial_id: str
@@ -73,6 +74,7 @@ class LinkLoads:
     moment: np.ndarray
     stiffness: np.ndarray
     coupling: np.ndarray
+    friction: np.ndarray = field(default_factory=lambda: np.ones(0))
 
     def behind(self, delta: np.ndarray) -> "LinkLoads":
         """Loads of links that are delta (n, k) [rad] behind their motors; its own acceleration is still its motor's.
