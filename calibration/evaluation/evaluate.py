@@ -123,7 +123,7 @@ def evaluate(
         traces=tuple(errors),
         regimes=(*estimate.regimes, *joints) if predict.joints is not None else (),
         confirmation=tuple(ladder(confirmed, "mocap")),
-        verdicts=(*remarks, *moved_in_trials(scored), *not_predictable([one.predicted for one in scored])),
+        verdicts=(*remarks, *moved_in_trials(scored), *_remarks([one.predicted for one in scored])),
         points=point_rows(estimate, dataset.description, means),
         predicted=tuple(one.predicted for one in scored),
         main=estimate.main if submitted is None else submitted.name,
@@ -225,6 +225,23 @@ def of_another_robot(rows: tuple[Row, ...]) -> Iterator[Verdict]:
             question = "is it a calibration of this robot" if min(found) < _UNITS else "are its lengths in m"
             message = f"{model}: {min(found):.2f} mm, the nominal robot {nominal:.2f} mm; {question}?"
             yield Verdict(STAGE, "warning", message)
+
+
+def _remarks(trials: Sequence[PredictedTrial]) -> Iterator[Verdict]:
+    yield from not_predictable(trials)
+    yield from frictions_shown(trials)
+
+
+def frictions_shown(trials: Sequence[PredictedTrial]) -> Iterator[Verdict]:
+    """Friction that the wrist's sensor showed in trials under a load that the calibration did not have."""
+    of_trials = ((p.trial_id, *of) for p in trials for of in p.frictions)
+    found = ", ".join(f"{joint} {f:.2f} N.m in {name} (calibrated {old:.2f})" for name, joint, f, old in of_trials)
+    if found:
+        message = (
+            f"under a load that the calibration did not have the wrist's sensor shows another friction of {found}, "
+            "which was used there; calibrate with that load to have it without the sensor"
+        )
+        yield Verdict(STAGE, "ok", message)
 
 
 def not_predictable(trials: Sequence[PredictedTrial]) -> Iterator[Verdict]:

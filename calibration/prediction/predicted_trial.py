@@ -144,6 +144,7 @@ class PredictedTrial:
         dwells: (k, 2) start and stop of the dwells of a static trial [s].
         corrected: Motor readings less the joint models, None without them.
         delivered: What the row that is delivered is made of, of a trial that moves; None where it was not predicted.
+        frictions: Joint, Coulomb friction in this trial as the wrist's sensor shows it, and as calibrated [N.m].
     """
 
     trial_id: str
@@ -156,6 +157,7 @@ class PredictedTrial:
     dwells: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     corrected: Corrected | None = None
     delivered: Delivered | None = None
+    frictions: tuple[tuple[str, float, float], ...] = ()
 
     def save(self, folder: Path) -> None:
         """Write <trial>.nc into a folder that is there."""

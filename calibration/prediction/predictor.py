@@ -98,11 +98,13 @@ class Predictor:
             slipped = [(source, poses.slipped(source)) for source, _ in poses.loaded.suspension.held_out]
             motion = base_motion(poses.T_lab_B, found, tuple((s, one) for s, one in slipped if one is not None))
         moves = entry.kind != "static"
-        samples = tuple(joint_samples(self.joints, self.bundled, trial, poses.geared())) if moves else ()
+        geared = poses.geared() if moves else None
+        samples = tuple(joint_samples(self.joints, self.bundled, trial, geared)) if moves else ()
+        frictions = () if geared is None or self.bundled is None else self.bundled.trains.frictions(geared.loads)
         delivered = poses.delivered() if moves else None
         dwells = dwell_windows(trial)
         own = entry.id, entry.kind, trial.t_mocap
-        return PredictedTrial(*own, rows, motion, samples, poses.T_lab_B, dwells, poses.corrected, delivered)
+        return PredictedTrial(*own, rows, motion, samples, poses.T_lab_B, dwells, poses.corrected, delivered, frictions)
 
     def poses(self, entry: TrialEntry, trial: Trial) -> "TrialPoses":
         """What the rows of one trial are made of."""

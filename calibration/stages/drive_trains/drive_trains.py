@@ -19,7 +19,7 @@ from calibration.stages.drive_trains.drive_train import LONGEST, DriveTrain, Qua
 from calibration.stages.drive_trains.friction_shown import friction_shown
 from calibration.stages.drive_trains.hung_load import HungLoad, hand_on_floor, hand_on_joints, hanging
 from calibration.stages.drive_trains.kernel import link_streams
-from calibration.stages.drive_trains.kernel.link_motion import COMPLIANCE, SPRING
+from calibration.stages.drive_trains.kernel.link_motion import COMPLIANCE, COULOMB, SPRING
 from calibration.stages.drive_trains.kernel.link_streams import INERTIA, RESTS, TORQUE, Drives
 from calibration.stages.drive_trains.torques import (
     UNWEIGHED,
@@ -178,6 +178,11 @@ class DriveTrains:
         if not len(friction):
             return self
         return replace(self, trains=tuple(of.rubbing(s) for of, s in zip(self.trains, friction, strict=True)))
+
+    def frictions(self, loads: LinkLoads) -> tuple[tuple[str, float, float], ...]:
+        """Joint, Coulomb friction under these loads and as calibrated [N.m], where they differ by a tenth."""
+        shown = [(of.joint, s, float(of.values[COULOMB])) for of, s in zip(self.trains, loads.friction, strict=False)]
+        return tuple((joint, float(s * old), old) for joint, s, old in shown if abs(s - 1.0) > 0.1)
 
     def likely(self, loads: LinkLoads) -> np.ndarray:
         """Link angles (n, k) of a trial whose loads are known, zeros of the readings included [rad, m]."""

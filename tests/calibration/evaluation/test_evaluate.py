@@ -8,7 +8,9 @@ import pytest
 
 from calibration import calibrate, evaluate, load, load_estimate, predictions, save_estimate
 from calibration.errors import NotCalibrated, NotEnoughData
+from calibration.evaluation.evaluate import frictions_shown
 from calibration.evaluation.pose_errors import PoseErrors, dwell_means, pose_errors, row_metrics
+from calibration.prediction.predicted_trial import PredictedTrial
 from calibration.recording.schema import Wheel
 from calibration.recording.trial import read_trial, write_trial
 from tests.doubles import rigid_robot
@@ -188,3 +190,10 @@ def test_a_held_out_trial_in_which_the_base_was_moved_is_named(estimate, evaluat
         "base moved during xyz by 20.0 mm, 0 mrad" in reported[0]["message"] and "others" not in reported[0]["message"]
     )
     assert evaluation.verdicts == ()
+
+
+def test_friction_that_a_new_load_shows_is_said():
+    trials = [PredictedTrial("heavy", "swing", np.zeros(0), frictions=(("arm_7_joint", 0.148, 0.109),))]
+    (said,) = frictions_shown([PredictedTrial("usual", "swing", np.zeros(0)), *trials])
+    assert said.verdict == "ok" and "arm_7_joint 0.15 N.m in heavy (calibrated 0.11)" in said.message
+    assert list(frictions_shown([])) == []

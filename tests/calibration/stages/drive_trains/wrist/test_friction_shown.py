@@ -66,6 +66,8 @@ def test_the_wrist_s_sensor_shows_the_friction_under_a_load_that_is_new(swing, s
     )
     assert after < 0.5 * before
     assert (of.of_loads(found).q == of.likely(found)).all()
+    ((joint, friction, calibrated),) = of.frictions(found)
+    assert joint == JOINT and friction == pytest.approx(0.15, rel=0.1) and calibrated == pytest.approx(share * 0.15)
 
 
 def test_what_a_load_winds_up_is_as_calibrated(swing):
@@ -79,11 +81,16 @@ def test_what_a_load_winds_up_is_as_calibrated(swing):
 def test_what_the_calibration_knows_stays(swing, known_as):
     known, q, _, w = swing
     of = trains(known, off(VALUES, 0.8), **known_as)
-    assert (of.loads("", T, q, None, w).friction == 1.0).all()
+    found = of.loads("", T, q, None, w)
+    assert (found.friction == 1.0).all() and of.frictions(found) == ()
 
 
 def test_a_hand_that_is_pushed_shows_none(swing):
     known, q, links, _ = swing
     of = trains(known, off(VALUES, 0.8))
     pushed = of.loads("", T, q, None, readings(of.description, links, HEAVY, push=40.0))
-    assert not len(pushed.friction) and not len(of.loads("", T, q, None, np.full_like(NONE, np.nan)).friction)
+    assert (
+        not len(pushed.friction)
+        and of.frictions(pushed) == ()
+        and not len(of.loads("", T, q, None, np.full_like(NONE, np.nan)).friction)
+    )
