@@ -174,14 +174,15 @@ class DriveTrains:
         return replace(loads(hand(links - zeros, wrist), q - links), friction=friction)
 
     def rubbing(self, friction: np.ndarray) -> "DriveTrains":
-        """The same with so many times (m,) the friction of each drive train; empty: with the same."""
+        """The same with so many times (k,) the friction of each joint; empty: with the same."""
         if not len(friction):
             return self
-        return replace(self, trains=tuple(of.rubbing(s) for of, s in zip(self.trains, friction, strict=True)))
+        return replace(self, trains=tuple(of.rubbing(friction[self.joints.index(of.joint)]) for of in self.trains))
 
     def frictions(self, loads: LinkLoads) -> tuple[tuple[str, float, float], ...]:
         """Joint, Coulomb friction under these loads and as calibrated [N.m], where they differ by a tenth."""
-        shown = [(of.joint, s, float(of.values[COULOMB])) for of, s in zip(self.trains, loads.friction, strict=False)]
+        share = dict(zip(self.joints, loads.friction, strict=False))
+        shown = [(of.joint, share.get(of.joint, 1.0), float(of.values[COULOMB])) for of in self.trains]
         return tuple((joint, float(s * old), old) for joint, s, old in shown if abs(s - 1.0) > 0.1)
 
     def likely(self, loads: LinkLoads) -> np.ndarray:

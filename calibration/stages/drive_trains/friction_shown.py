@@ -21,7 +21,7 @@ from calibration.stages.drive_trains.hung_load import Hanging
 from calibration.stages.drive_trains.kernel.link_motion import COULOMB
 from calibration.stages.drive_trains.torques import LinkLoads
 
-_UNKNOWN = 0.1  # of a friction: less uncertain, and it is as calibrated
+_UNKNOWN = 0.1  # of a friction: less uncertain, or a load less beyond those of the calibration, and it stays
 _SHARES = np.exp(np.linspace(-1.1, 1.1, 45))  # s
 _MEAN, _TOGETHER = 0.2, 1.5  # [s] of a mean, and how long its errors hang together
 _NU, _SENSOR = 4.0, 0.1  # of Student's distribution; [N] a mean is known to at best
@@ -31,7 +31,7 @@ _TURN = 1e-3  # [rad] of the finite difference
 def friction_shown(
     trains: Sequence[DriveTrain], joints: Sequence[str], loads: LinkLoads, links: np.ndarray, of: Hanging
 ) -> np.ndarray:
-    """s (m,) of drive trains in a trial; 1 where the calibration knows it, or had loads like this one.
+    """s (k,) of all joints in a trial; 1 where the calibration knows it, or had loads like this one.
 
     Args:
         trains: Those of the robot.
@@ -40,10 +40,11 @@ def friction_shown(
         links: (n, k) link angles with s = 1, zeros of the readings included [rad, m].
         of: The hand on the sensor, on links that are there.
     """
-    found, open_ = np.ones(len(trains)), [i for i, train in enumerate(trains) if _is_open(train, joints, loads)]
+    found, open_ = np.ones(len(joints)), [train for train in trains if _is_open(train, joints, loads)]
     behind = loads.behind(loads.q - links) if open_ else loads
-    for i in open_:
-        found[i] = _share(trains[i], joints.index(trains[i].joint), behind, of)
+    for train in open_:
+        j = joints.index(train.joint)
+        found[j] = _share(train, j, behind, of)
     return found
 
 
@@ -54,8 +55,9 @@ def _uncertain(train: DriveTrain) -> float:
 
 
 def _is_open(train: DriveTrain, joints: Sequence[str], loads: LinkLoads) -> bool:
-    torque, plays = loads.torque[:, joints.index(train.joint)], train.dynamic and train.form == "dead_zone"
-    return plays and _uncertain(train) > _UNKNOWN * train.values[COULOMB] and bool(train.beyond(torque).any())
+    least, torque = _UNKNOWN * float(train.values[COULOMB]), loads.torque[:, joints.index(train.joint)]
+    plays = train.dynamic and train.form == "dead_zone"
+    return plays and _uncertain(train) > least and bool(np.abs(train.beyond(torque)).max() > least)
 
 
 def _share(train: DriveTrain, j: int, loads: LinkLoads, of: Hanging) -> float:

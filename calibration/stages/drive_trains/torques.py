@@ -59,7 +59,7 @@ class LinkLoads:
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
         stiffness: (n, k + 2, k + 2) G, how tau grows with the joints' positions [N.m/rad, N].
         coupling: (n, k + 2, 6) wrench on the tree's root by unit acceleration of each joint and lean.
-        friction: (m,) s of each drive train, see `friction_shown`; empty: all 1.
+        friction: (k,) s of each joint, see `friction_shown`; empty: all 1.
     """
 
     trial_id: str

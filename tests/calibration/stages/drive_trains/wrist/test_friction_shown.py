@@ -60,7 +60,7 @@ def test_the_wrist_s_sensor_shows_the_friction_under_a_load_that_is_new(swing, s
     known, q, links, w = swing
     of = trains(known, off(VALUES, share))
     found = of.loads("", T, q, None, w)
-    assert found.friction == pytest.approx([1.0 / share], rel=0.1)
+    assert found.friction == pytest.approx([*7 * [1.0], 1.0 / share], rel=0.1)
     before, after = (
         np.sqrt(np.mean((of.likely(x) - links)[:, J] ** 2)) for x in (replace(found, friction=NONE[0, :0]), found)
     )
