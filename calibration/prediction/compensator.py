@@ -157,7 +157,8 @@ class Compensator:
             T_lab_base_start: (4, 4) pose of the base frame at the start; identity where not given.
             velocity: (n, n_joints) of the motor side [rad/s, m/s], where it is known.
             t_wrench: Times (m,) [s, plate's clock] of a wrench (m, 6) that was not taken at t, then the robot's clock.
-            wrist: (n, 6) of the wrist's sensor at t: push and payload load joints and base, a moving hand the base.
+            wrist: (n, 6) of the wrist's sensor at t: push and payload load joints and base, a moving hand the base; it
+                shows what friction holds under a load that the calibration did not have.
 
         Raises:
             NotEnoughData: A wrench without a suspension or for less than a second, or without its clock.
