@@ -10,13 +10,13 @@ means of a fifth of a second hang together.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from calibration.numerics.signals import RATE
 from calibration.robot.wrist_sensor import STRIDE
 from calibration.stages.drive_trains.drive_train import DriveTrain, drive_motion
+from calibration.stages.drive_trains.fit.joint_data import window_means
 from calibration.stages.drive_trains.hung_load import Hanging
 from calibration.stages.drive_trains.kernel.link_motion import COULOMB
 from calibration.stages.drive_trains.torques import LinkLoads
@@ -82,6 +82,4 @@ def _share(train: DriveTrain, j: int, loads: LinkLoads, of: Hanging) -> float:
 
 def _means(x: np.ndarray) -> np.ndarray:
     """Of samples (n, ...) over `_MEAN`."""
-    length = round(_MEAN * RATE / STRIDE)
-    edges = np.arange(0, len(x) + 1, length)
-    return np.array([x[a:b].mean(axis=0) for a, b in pairwise(edges)])
+    return window_means(x, np.arange(0, len(x), round(_MEAN * RATE / STRIDE)))
