@@ -7,7 +7,7 @@ from tests.acceptance.series import MANY, SAMPLED, kept_series
 
 pytestmark = pytest.mark.slow
 OPEN = {  # lines that do not hold, with their sizes in docs/limits.md
-    "fixed": ["share in the 95 % band, swing"],
+    "fixed": ["share in the 95 % band, swing", "share in the 95 % band, static"],
     "sampled": [],
     "jolts": ["share in the 95 % band, swing", "share in the 95 % band, jolts"],
 }
