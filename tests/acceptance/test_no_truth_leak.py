@@ -93,7 +93,7 @@ def whole_run(tmp_path_factory):
 @pytest.mark.parametrize(
     ("factor", "campaign"),
     [
-        (3.0, "quick_run"),
+        pytest.param(3.0, "quick_run", marks=ARM_1),
         pytest.param(3.0, "whole_run", marks=ARM_1),
         (1.0 / 3.0, "quick_run"),
         (1.0 / 3.0, "whole_run"),
