@@ -33,6 +33,7 @@ Status = Literal["estimated", "not_identifiable"]
 VALUES = ("half_gap", "compliance", "coulomb", "viscous", "relaxation", "spring", "slip")
 HARMONICS = ("cos1", "sin1", "cos2", "sin2")
 LONGEST = 3.4e-3  # [s] step of the link's motion
+_NEW = 0.1  # of the friction, by which a load is beyond those of the calibration
 _FRICTIONLESS = 1e-9  # [N.m] friction that holds nothing
 _RIGID = 1e-7  # [rad/(N.m)] least compliance that is simulated
 
@@ -133,6 +134,14 @@ class DriveTrain:
         values[[COULOMB, VISCOUS]] *= share
         values[COMPLIANCE] /= share
         return replace(self, values=values)
+
+    def begun_anew(self) -> "DriveTrain":
+        """The same under a payload heavier than the calibration's, whose trials do not show where links begin then."""
+        return replace(self, start=(np.nan, np.nan))
+
+    def is_new(self, torque: np.ndarray) -> bool:
+        """Whether nominal torques (n,) [N.m] exceed those it was found by, by more than a tenth of its friction."""
+        return bool(np.abs(self.beyond(torque)).max() > _NEW * self.values[COULOMB])
 
     def ends(self, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest delta (m,) [rad] at which friction holds the link under torques (m,) [N.m]."""

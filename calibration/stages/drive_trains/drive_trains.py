@@ -166,18 +166,27 @@ class DriveTrains:
         if wrist is None or (push := hand(q - zeros, wrist)) is None:
             return loads(None, None)
         first = loads(push, None)
-        links, friction = self.likely(first), first.friction
-        of = hanging(self.urdf, self.description, self.hung, t, links - zeros, wrist)
-        if of is not None and of.pushed is None:
-            friction = friction_shown(self.trains, self.joints, first, links, of)
-            links = self.likely(replace(first, friction=friction))
-        return replace(loads(hand(links - zeros, wrist), q - links), friction=friction)
+        first = replace(first, heavier=self._are_heavier(first))
+        links, of = self.likely(first), None
+        if not push.outside:
+            of = hanging(self.urdf, self.description, self.hung, t, links - zeros, wrist)
+        if of is not None:
+            first = replace(first, friction=friction_shown(self.under(first).trains, self.joints, first, links, of))
+            links = self.likely(first)
+        found = loads(hand(links - zeros, wrist), q - links)
+        return replace(found, friction=first.friction, heavier=first.heavier)
 
-    def rubbing(self, friction: np.ndarray) -> "DriveTrains":
-        """The same with so many times (k,) the friction of each joint; empty: with the same."""
-        if not len(friction):
-            return self
-        return replace(self, trains=tuple(of.rubbing(friction[self.joints.index(of.joint)]) for of in self.trains))
+    def under(self, loads: LinkLoads) -> "DriveTrains":
+        """The same as in a trial with these loads: friction that the wrist's sensor shows, and where links begin."""
+        share = dict(zip(self.joints, loads.friction, strict=False))
+        found = [of.rubbing(share.get(of.joint, 1.0)) for of in self.trains]
+        return replace(self, trains=tuple(of.begun_anew() if loads.heavier else of for of in found))
+
+    def _are_heavier(self, loads: LinkLoads) -> bool:
+        """Whether the payload is heavier than the campaign's, and its loads are new to a joint."""
+        if self.hung is None or self.description.payload_of() <= self.hung.payload:
+            return False
+        return any(of.is_new(loads.torque[:, self.joints.index(of.joint)]) for of in self.trains)
 
     def frictions(self, loads: LinkLoads) -> tuple[tuple[str, float, float], ...]:
         """Joint, Coulomb friction under these loads and as calibrated [N.m], where they differ by a tenth."""
@@ -227,8 +236,8 @@ class DriveTrains:
 
     def prepared_for(self, loads: LinkLoads, runs: int = 1) -> tuple[Drives, np.ndarray, np.ndarray]:
         """What `link_streams` take of a trial: parameters, states (m, runs, 3) at its start, samples (n, 4, m)."""
-        rubbing, k = self.rubbing(loads.friction), len(self.joints)
-        drives = prepared(rubbing)
+        under, k = self.under(loads), len(self.joints)
+        drives = prepared(under)
         samples = np.zeros((len(loads.t), 4, len(drives.columns)))
         for i, train in enumerate(self.trains):
             j, phi = self.joints.index(train.joint), train.inertials if len(train.inertials) else None
@@ -237,7 +246,7 @@ class DriveTrains:
             samples[:, :, i] = np.stack([own.q, own.v, torque, train.moved_inertia(own.inertia)], axis=1)
         for i, c in enumerate(drives.columns[len(self.trains) :], len(self.trains)):
             samples[:, TORQUE, i], samples[:, INERTIA, i] = loads.moment[:, c - k], loads.inertia[:, c, c]
-        return drives, begun(rubbing, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs].copy(), samples
+        return drives, begun(under, drives, samples[0, TORQUE], loads.stiffness[0])[:, :runs].copy(), samples
 
 
 def swayed(drives: Drives, lean: np.ndarray, moment: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from calibration.stages.drive_trains.hung_load import Hanging
 from calibration.stages.drive_trains.kernel.link_motion import COULOMB
 from calibration.stages.drive_trains.torques import LinkLoads
 
-_UNKNOWN = 0.1  # of a friction: less uncertain, or a load less beyond those of the calibration, and it stays
+_UNKNOWN = 0.1  # of a friction: less uncertain, and it is as calibrated
 _SHARES = np.exp(np.linspace(-1.1, 1.1, 45))  # s
 _MEAN, _TOGETHER = 0.2, 1.5  # [s] of a mean, and how long its errors hang together
 _NU, _SENSOR = 4.0, 0.1  # of Student's distribution; [N] a mean is known to at best
@@ -55,9 +55,8 @@ def _uncertain(train: DriveTrain) -> float:
 
 
 def _is_open(train: DriveTrain, joints: Sequence[str], loads: LinkLoads) -> bool:
-    least, torque = _UNKNOWN * float(train.values[COULOMB]), loads.torque[:, joints.index(train.joint)]
-    plays = train.dynamic and train.form == "dead_zone"
-    return plays and _uncertain(train) > least and bool(np.abs(train.beyond(torque)).max() > least)
+    plays = train.dynamic and train.form == "dead_zone" and _uncertain(train) > _UNKNOWN * train.values[COULOMB]
+    return plays and train.is_new(loads.torque[:, joints.index(train.joint)])
 
 
 def _share(train: DriveTrain, j: int, loads: LinkLoads, of: Hanging) -> float:

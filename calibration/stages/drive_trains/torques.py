@@ -53,13 +53,13 @@ class LinkLoads:
         v: Motor velocities.
         a: Motor accelerations.
         torque: tau [N.m, N].
-        inertia: (n, k + 2, k + 2) M, of leans of the column, too, see `TreeDynamics` [kg.m2, kg.m, kg]; of a pushed
-            hand, without what hangs on the wrist's sensor.
+        inertia: (n, k + 2, k + 2) M, of the column's leans, too [kg.m2, kg.m, kg]; of a pushed hand, without that.
         regressor: (n, k, p) R of the parameters dphi;
         moment: (n, 2) about x and y of the first joint's frame, that its column bears [N.m].
         stiffness: (n, k + 2, k + 2) G, how tau grows with the joints' positions [N.m/rad, N].
         coupling: (n, k + 2, 6) wrench on the tree's root by unit acceleration of each joint and lean.
         friction: (k,) s of each joint, see `friction_shown`; empty: all 1.
+        heavier: Whether the payload is heavier than any of the calibration.
     """
 
     trial_id: str
@@ -75,6 +75,7 @@ class LinkLoads:
     stiffness: np.ndarray
     coupling: np.ndarray
     friction: np.ndarray = field(default_factory=lambda: np.ones(0))
+    heavier: bool = False
 
     def behind(self, delta: np.ndarray) -> "LinkLoads":
         """Loads of links that are delta (n, k) [rad] behind their motors; its own acceleration is still its motor's.

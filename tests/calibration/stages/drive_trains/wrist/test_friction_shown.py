@@ -85,6 +85,19 @@ def test_what_the_calibration_knows_stays(swing, known_as):
     assert (found.friction == 1.0).all() and of.frictions(found) == ()
 
 
+@pytest.mark.parametrize(("reach", "heavier"), [(0.1, True), (1.0, False)])
+def test_where_usual_loads_begin_does_not_show_where_heavier_ones_do(swing, reach, heavier):
+    known, q, _, w = swing
+    of = trains(known, VALUES, sigma=0.01, reach=reach)
+    of = replace(of, trains=(replace(of.trains[0], start=(0.9, 0.1)),))
+    found = of.loads("", T, q, None, w)
+    assert found.heavier == heavier
+    delta = q[0, J] - of.likely(found)[0, J]
+    tau, (g, c, f) = found.torque[0, J] + of.trains[0].link_inertia, VALUES[:3]
+    expected = c * tau + g * np.clip(tau / f, -1.0, 1.0) if heavier else c * (tau + 0.8 * f) + 0.8 * g
+    assert delta == pytest.approx(expected, abs=0.02 * g)
+
+
 def test_a_hand_that_is_pushed_shows_none(swing):
     known, q, links, _ = swing
     of = trains(known, off(VALUES, 0.8))
