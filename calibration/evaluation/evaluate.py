@@ -117,15 +117,15 @@ def evaluate(
     rows = tuple(ladder(errors, "mocap"))
     remarks += () if estimate.robot else tuple(of_another_robot(rows))
     joints = validation_qualities(predict.joints, [one.residuals for one in scored if one.residuals is not None])
-    means = ((one.entry, one.means) for one in scored if one.means is not None)
+    means, predicted = ((o.entry, o.means) for o in scored if o.means is not None), tuple(o.predicted for o in scored)
     return Evaluation(
         rows=rows,
         traces=tuple(errors),
         regimes=(*estimate.regimes, *joints) if predict.joints is not None else (),
         confirmation=tuple(ladder(confirmed, "mocap")),
-        verdicts=(*remarks, *moved_in_trials(scored), *_remarks([one.predicted for one in scored])),
+        verdicts=(*remarks, *moved_in_trials(scored), *not_predictable(predicted), *frictions_shown(predicted)),
         points=point_rows(estimate, dataset.description, means),
-        predicted=tuple(one.predicted for one in scored),
+        predicted=predicted,
         main=estimate.main if submitted is None else submitted.name,
         budget=budget([one.causes for one in scored if one.causes is not None]),
     )
@@ -225,11 +225,6 @@ def of_another_robot(rows: tuple[Row, ...]) -> Iterator[Verdict]:
             question = "is it a calibration of this robot" if min(found) < _UNITS else "are its lengths in m"
             message = f"{model}: {min(found):.2f} mm, the nominal robot {nominal:.2f} mm; {question}?"
             yield Verdict(STAGE, "warning", message)
-
-
-def _remarks(trials: Sequence[PredictedTrial]) -> Iterator[Verdict]:
-    yield from not_predictable(trials)
-    yield from frictions_shown(trials)
 
 
 def frictions_shown(trials: Sequence[PredictedTrial]) -> Iterator[Verdict]:

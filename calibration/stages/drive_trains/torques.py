@@ -59,7 +59,7 @@ class LinkLoads:
         stiffness: (n, k + 2, k + 2) G, how tau grows with the joints' positions [N.m/rad, N].
         coupling: (n, k + 2, 6) wrench on the tree's root by unit acceleration of each joint and lean.
         friction: (k,) s of each joint, see `friction_shown`; empty: all 1.
-        heavier: Whether the payload is heavier than any of the calibration.
+        heavier: Whether the payload is heavier than the campaign's, and its load new to a joint.
     """
 
     trial_id: str

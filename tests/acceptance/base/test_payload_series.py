@@ -28,8 +28,8 @@ JOLTS = "a link that strikes in its gap in jolts, and in none of the usual swing
 SOFT = "hundredths of a milliradian, as a swing begins: the arm oscillates on its gears and its column"
 HELD = "a heavy payload turns arm_7's link in its gap when it exceeds a friction that usual loads hide: docs/limits.md"
 BEGAN = "arm_7's link rests where it began in its gap, which its motor does not show: docs/limits.md"
-OPEN = {("xyz_2kg", "plate"): FAR, ("xyz_2kg", "orientation"): HELD}
-OPEN |= {("xyz_2kg", f"arm_{i}_joint"): of for i, of in ((1, JOLTS), (2, SOFT), (3, SOFT), (5, JOLTS), (7, HELD))}
+OPEN = {("xyz_2kg", "plate"): FAR}
+OPEN |= {("xyz_2kg", f"arm_{i}_joint"): of for i, of in ((1, JOLTS), (2, SOFT), (7, HELD))}
 OPEN |= {("push", f"arm_{i}_joint"): of for i, of in ((1, JOLTS), (6, JOLTS), (7, BEGAN))}
 
 
@@ -62,11 +62,11 @@ def links(runs):
 
 
 def expect(reason, request):
-    """That a line which some series broke may be broken; of as few robots as one has it may hold, too."""
+    """That a line which the robots of the last series break is broken by them; SEEDS are too few to tell."""
     if reason and "CLAIM_RUNS" not in os.environ:
         pytest.skip(reason)
     if reason:
-        request.applymarker(pytest.mark.xfail(reason=reason))
+        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
 
 
 def _links(folder):
@@ -104,8 +104,7 @@ def test_another_load_is_taken_into_account(errors, trial, base, claim, request)
 
 
 @pytest.mark.parametrize("trial", TRIALS)
-def test_another_load_does_not_turn_the_hand(turns, trial, claim, request):
-    expect(OPEN.get((trial, "orientation")), request)
+def test_another_load_does_not_turn_the_hand(turns, trial, claim):
     found = np.array([of[trial, "measured"] / of["xyz", "measured"] for of in turns])
     claim(f"payload orientation/{trial}", found)
     assert np.median(found) <= WITHIN

@@ -23,7 +23,6 @@ from tests.calibration.stages.drive_trains.wrist.test_hung_load import (
 
 JOINT, J, HEAVY = "arm_7_joint", 7, 2.0
 VALUES = np.array([10e-3, 1e-3, 0.15, 0.05, 6e-3, 1.0, 0.0])  # half gap, compliance, frictions, ...
-NONE = np.zeros((len(T), 6))
 
 
 def trains(known, values, sigma=0.2, reach=0.1):
@@ -62,7 +61,7 @@ def test_the_wrist_s_sensor_shows_the_friction_under_a_load_that_is_new(swing, s
     found = of.loads("", T, q, None, w)
     assert found.friction == pytest.approx([*7 * [1.0], 1.0 / share], rel=0.1)
     before, after = (
-        np.sqrt(np.mean((of.likely(x) - links)[:, J] ** 2)) for x in (replace(found, friction=NONE[0, :0]), found)
+        np.sqrt(np.mean((of.likely(x) - links)[:, J] ** 2)) for x in (replace(found, friction=np.ones(0)), found)
     )
     assert after < 0.5 * before
     assert (of.of_loads(found).q == of.likely(found)).all()
@@ -102,8 +101,5 @@ def test_a_hand_that_is_pushed_shows_none(swing):
     known, q, links, _ = swing
     of = trains(known, off(VALUES, 0.8))
     pushed = of.loads("", T, q, None, readings(of.description, links, HEAVY, push=40.0))
-    assert (
-        not len(pushed.friction)
-        and of.frictions(pushed) == ()
-        and not len(of.loads("", T, q, None, np.full_like(NONE, np.nan)).friction)
-    )
+    unread = of.loads("", T, q, None, np.full((len(T), 6), np.nan))
+    assert not len(pushed.friction) and of.frictions(pushed) == () and not len(unread.friction)
